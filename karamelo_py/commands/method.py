@@ -50,12 +50,12 @@ def method(
     -----
     Before the first solid.
 
-    ``thermo-mechanical``: before each momentum update, heat flows between points of materials with
-    a temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength``
-    with a temperature), also between bodies with common nodes. Otherwise it leaves a body only by a
-    fix. Points take the temperature increments of the nodes (FLIP, for any velocity transfer), so
-    only conduction smears temperatures. `dt` also respects the stable step of conduction, h^2/(4 d)
-    rho cp/kappa in d dimensions. Without that word, points are heated only by their own work.
+    ``thermo-mechanical``: before each momentum update, heat flows between materials with a
+    temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
+    a temperature), also between bodies with common nodes. Else it leaves a body only by a fix.
+    Points take temperature increments (FLIP, for any velocity transfer): only conduction smears
+    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
+    dimensions. If ``mechanical``, points are heated only by their own work.
 
     See Also
     --------
@@ -112,7 +112,7 @@ def scheme(
     initial velocity belongs to half a step before the start: a projectile is g dt t/2 too far, and
     logged velocities and kinetic energies are half a step early. With ``half`` both are
     second-order accurate in the step, and points also store their previous velocity. Velocities set
-    after the first step, such as ``sim.points["vx"] = values``, belong to half a step earlier.
+    later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -172,9 +172,9 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     """Average volume changes over neighbouring points (F-bar).
 
-    Nearly incompressible and plastic bodies are too stiff if low-order basis functions constrain
-    the volume of each point. Averaging the volume increment with the basis weights removes the
-    excess constraints (Coombs et al. 2018); the mean stress is averaged likewise, so forces do the
+    Low-order basis functions constrain the volume of each point: nearly incompressible and plastic
+    bodies are too stiff. Averaging the volume increment with the basis weights removes the excess
+    constraints (Coombs et al. 2018); the mean stress is averaged likewise, so that forces do the
     work of the averaged strain.
 
     Example
@@ -187,8 +187,8 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
     fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
-    sin(psi))). With the pressure of the point alone, non-dilatant sand would lose half of its
-    strength. Load steps use the pressure of the point: do not average there for such sand.
+    sin(psi))). With the point's pressure alone, non-dilatant sand would lose half of its strength.
+    Load steps use it: do not average there for such sand.
 
     See Also
     --------
@@ -304,7 +304,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """Replace the style by the variant that a word selects; return the other options."""
+        """By the variant that a word selects; the other options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
@@ -324,7 +324,7 @@ class _Call:
         basis: str | None = None,
         by_name: bool = False,
     ) -> str:
-        """The same call with another kind or basis, completed, and with `option` at the end."""
+        """With another kind or basis, completed, and with `option` at the end."""
         styles = [self.styles[family] for family in FAMILIES if family in self.styles]
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]

@@ -42,8 +42,8 @@ def delete_particles(
     by
         The word ``region`` or ``where``.
     chosen
-        After ``region``: its ID; points are deleted by their reference positions. After ``where``:
-        a formula of columns of dump particle; points for which it is not 0 are deleted.
+        After ``region``: its ID; reference positions decide. After ``where``: a formula of columns
+        of dump particle, not 0 for deleted points.
 
     Example
     -------
@@ -53,9 +53,8 @@ def delete_particles(
     Notes
     -----
     ``where`` is for between runs. The mass and energy of the deleted points are printed. Before the
-    first run, the remaining points are renumbered, so the command must precede particle groups and
-    contact fixes of these solids, and a solid cannot lose all of its points; between runs numbers
-    do not change.
+    first run, the rest is renumbered: the command must precede particle groups and contact fixes of
+    these solids, and a solid cannot lose all points. Between runs numbers do not change.
 
     See Also
     --------

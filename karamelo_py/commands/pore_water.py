@@ -29,21 +29,21 @@ def pore_water(
     Parameters
     ----------
     material
-        The skeleton: any law of a solid. Its density is the dry density, (1 - n) times the
-        density of the grains. Its stress is the effective stress.
+        The skeleton: any law of a solid, with the dry density, (1 - n) times that of the grains.
+        Its stress is the effective stress.
     n
         Porosity before deformation, from 0.01 to 0.9.
     permeability
-        Hydraulic conductivity k in m/s, from Darcy's law: porosity times velocity of the water
-        relative to the soil is k times the gradient of the head.
+        Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water is k
+        times the gradient of the head.
     intrinsic, viscosity
-        Instead of it the permeability of the soil in m^2, and the viscosity of the water in Pa s.
+        Instead of it: permeability in m^2, viscosity of the water in Pa s.
     K, rho
         Bulk modulus and density of the water.
     gravity
-        Gravity that the conductivity refers to. It is no load: see fix body_force.
+        Gravity of the conductivity; no load: see fix body_force.
     kozeny
-        Whether the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
+        true: the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
 
     Example
     -------
@@ -53,19 +53,18 @@ def pore_water(
 
     Notes
     -----
-    Points move with the soil and carry the water in their pores; nodes have a velocity of the soil
-    and one of the water (Jassim, Stolle & Vermeer 2013; Bandara & Soga 2015). Columns of dumps and
-    computes: ``pore_pressure``, ``porosity``, ``water_content`` (mass of the water per volume
-    before deformation), and ``wx``, ``wy``, ``wz``, the velocity of the water relative to the soil;
-    times the porosity it is the velocity of Darcy's law.
+    Points carry the water in their pores; nodes have velocities of soil and water (Jassim, Stolle &
+    Vermeer 2013; Bandara & Soga 2015). Columns of dumps and computes: ``pore_pressure``,
+    ``porosity``, ``water_content`` (mass of the water per volume before deformation), and ``wx``,
+    ``wy``, ``wz``, its velocity relative to the soil; times the porosity, Darcy's.
 
-    Surfaces are impermeable, except at nodes of a fix pore_pressure. A traction or pressure on a
-    surface acts on the soil; a fix that holds nodes holds the soil, and its reaction
-    includes the water. The fix body_force acts on both.
+    Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
+    soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
+    acts on both.
 
-    The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit at
-    each node and never shortens it. Consolidation to Tv = 1 takes about L c/c_v cells of steps,
-    with length L of the drainage path: with 1e-9 m/s, scale density or time.
+    The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
+    and never shortens it. Consolidation to Tv = 1 takes about L c/c_v cells of steps, with length L
+    of the drainage path: with 1e-9 m/s, scale density or time.
 
     Before the solid of the material. Needs method ulmpm or tlmpm with FLIP or PIC and linear,
     quadratic-spline or cubic-spline, scheme musl, and bodies of 1D, plane strain or 3D on one

@@ -24,7 +24,7 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def carry_out(hub: Hub, **length: Any) -> None:
-    """Carry out a run command of a `length` (see `RunLoop`), or what replaces it.
+    """`length`: see `RunLoop`; or what replaces the run.
 
     A rehearsal notes the run, a `Pause` stops before it, and ``check`` reports instead. A run that
     was over in the restart file of a resumed script is skipped.
@@ -255,9 +255,9 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` resumes after the step of the file. The results are
-    bit-identical to an uninterrupted run, with any number of threads. The log and the dumps are
-    continued; lines written after that step are cut off.
+    ``karamelo-py SCRIPT -restart FILE`` resumes after the step of the file, bit-identically to an
+    uninterrupted run with any number of threads. Log and dumps are continued; lines written after
+    that step are cut off.
 
     The script must be unchanged up to this run, except for set_dt, dt_factor, set_output, dump,
     plot, an added ``boundary(delete)``, and the length of the last run, as a number in its line.
@@ -266,14 +266,14 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     of the shorter run, which are shortened.
 
     A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
-    plots, and the values that the script has read. A run killed while writing leaves the previous
-    file intact. The last state of each run is written too; a failed run writes last_good.<step>.h5
-    instead: if its energy has grown, the last state before the growth, to within ten steps; if its
-    step was above the stable limit from the start, the state before the first step; none with
+    plots, and values that the script has read. A run killed while writing leaves the previous file.
+    The last state of each run is written too; a failed run writes last_good.<step>.h5 instead: if
+    its energy has grown, the last state before the growth, to within ten steps; if its step was
+    above the stable limit from the start, the state before the first step; none with
     boundary(delete), or if the run was resumed from a file at that step.
 
-    Dumps include the state in which a run was interrupted or failed. A resumed run removes it from
-    files with several snapshots, not separate files.
+    Dumps include the state of an interruption or failure. A resumed run removes it from files with
+    several snapshots, not separate files.
 
     Example
     -------
@@ -306,8 +306,8 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` resumes after this line. A further run may be added there.
-    The length of the runs before it must not change.
+    ``karamelo-py SCRIPT -restart FILE`` resumes after this line, where a run may be added. The
+    length of the runs before it must not change.
 
     Example
     -------
@@ -343,9 +343,9 @@ def read_restart(hub: Hub, file: str) -> None:
 
     Notes
     -----
-    First repeat the domain, method and solids of the script that wrote the file, and the fixes and
-    computes to continue: with the same ID and style they retain their values. Initial velocities
-    are not applied again. Anything else may differ. Time and step continue from the file.
+    First repeat the domain, method and solids of the writing script, and the fixes and computes to
+    continue: with the same ID and style they retain their values. Initial velocities are not
+    applied again. Anything else may differ. Time and step continue.
 
     The run starts new output files. A picture or movie with the same ID, style and field retains
     the earlier colour scale.

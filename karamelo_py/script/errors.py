@@ -110,7 +110,7 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """For the user.
+    """An error or a warning for the user.
 
     With the `code` of a run: likely cause, fix, and the command that resumes.
     """

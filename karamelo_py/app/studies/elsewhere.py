@@ -1,7 +1,7 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
-A case travels as data: the script, its files and the variables. The machine that runs it returns
-the log, the record and the files that -keep names, so no disk has to be shared.
+A case travels as data: the script, its files and the variables. Its log, its record and the files
+that -keep names come back: no disk is shared.
 """
 
 import re
@@ -32,7 +32,7 @@ RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
 class Package(NamedTuple):
-    """All that a case needs but its variables."""
+    """All of a case but its variables."""
 
     script: str  # path below a common folder
     files: tuple[tuple[str, bytes], ...]  # paths below it, and contents
@@ -57,7 +57,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 def packed(
     script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str]
 ) -> Package:
-    """Collect the script, its includes, and the files that its arguments or variables name."""
+    """The script, its includes, and the files that arguments or variables name."""
     paths = {path.resolve() for path in script.statements}
     words = {(script.path, word) for words in values.values() for word in words}
     for path, statements in script.statements.items():
@@ -86,7 +86,7 @@ def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
 
 
 def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
-    """Run a case on the machine of a worker."""
+    """On the machine of a worker."""
     machine = socket.gethostname()
     differ = [
         f"{name} {here} for {there}"
@@ -107,18 +107,18 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
 
 
 class Elsewhere:
-    """Runs cases by an executor; a case that is lost is tried again."""
+    """By an executor; a case that is lost is tried again."""
 
     def __init__(self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack):
-        """`send` makes the package known to the machines; what it returns goes with each case."""
+        """`send` makes the package known to the machines; its result goes with each case."""
         self.send, self.executor, self.size, self.ends = send, executor, size, ends
         self.package = send()
-        # Callbacks run in the thread that talks to the machines: it must not wait for them.
+        # Callbacks run in the thread that talks to the machines, which must not wait.
         self.retries = ends.enter_context(ThreadPoolExecutor(1))
         self.machines: dict[Path, str] = {}  # of folders
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
-        """A future of the case's outcome, whose files are in `folder`."""
+        """Its files are in `folder`."""
         outer: Future = Future()
         self._try(case, folder, outer, 1)
         return outer
@@ -161,7 +161,7 @@ class Elsewhere:
 
 
 def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
-    """Connect to the machines that -on names."""
+    """To the machines that -on names."""
     ends = ExitStack()
     if options.on == "mpi":
         return _mpi(package, ends)

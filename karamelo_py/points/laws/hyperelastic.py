@@ -80,8 +80,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     energy
         Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, J = det
         F, with C = F^T F, and of I4 and I6, the squared stretches of two families of fibres; or of
-        the principal stretches l1, l2, l3 and J. Variables of the script are numbers in it. At
-        rest, I1 = I2 = 3 and all others are 1.
+        the principal stretches l1, l2, l3 and J. Variables of the script are numbers. At rest, I1 =
+        I2 = 3, the others are 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6.
 
@@ -96,9 +96,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
     I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. Tangent and wave speed are second
     derivatives. The stored energy is 0 at rest; stress or no stiffness at rest is refused. A
-    warning names the stretch beyond which the energy is not convex along a principal direction,
-    where the body would localize. Formulas of stretches cost more: each point needs its principal
-    directions.
+    warning names the stretch beyond which the energy is not convex along a principal direction: the
+    body would localize. Formulas of stretches cost more.
 
     See Also
     --------

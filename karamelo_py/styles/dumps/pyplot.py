@@ -74,10 +74,10 @@ class PyPlot(Dump):
     scale
         log: colours follow the logarithm of the column.
     quantile
-        Fraction of the values beyond either colour limit, such as 0.01: a few large values do not
+        Fraction of the values beyond either colour limit, such as 0.01, so that few values do not
         use up all colours.
     dpi
-        Pixels per inch. A picture of 600 pixels is 6 inches wide, and has 1800 with 300.
+        Pixels per inch: a picture of 600 pixels has 1800 with 300.
     fontsize
         Font size in points.
     pointsize

@@ -18,14 +18,14 @@ from karamelo_py.styles.fixes.edges import SIDES
 
 
 class Support(Field):
-    """Force that balanced a node when fix absorbing began; NaN before."""
+    """It balanced a node when fix absorbing began; NaN before."""
 
     shape = vector
     start = float("nan")
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """Dashpots rho c A in all directions; `normal` is rho A, of which one component counts."""
+    """rho c A in all directions; `normal` is rho A, of which one component counts."""
     axis, along, across = values
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
@@ -39,7 +39,7 @@ def absorb(mass, v, force, normal, support, values, dt):
 
 
 def dashpot(rate, mass, v, force, dt):
-    """Force -rate m (v + v')/2, with the velocity v' after it and `force` have acted."""
+    """-rate m (v + v')/2, with v' after it and `force` have acted."""
     half = 0.5 * dt * rate
     return (-1 / (1 + half)) * (rate * mass * v + half * force)
 
@@ -60,16 +60,16 @@ class Absorbing(Fix):
 
     Notes
     -----
-    The traction is -rho c v, with the speed of P waves for the velocity normal to the surface and
-    of S waves along it. Of a pulse of 20 cells at normal incidence, 0.2 % of the energy returns;
-    oblique waves return more. In saturated ground, soil and water move as one at the edge.
+    The traction is -rho c v, with the speed of P waves for the normal velocity and of S waves along
+    the surface. Of a pulse of 20 cells at normal incidence, 0.2 % of the energy returns; oblique
+    waves return more. In saturated ground, soil and water move as one at the edge.
 
-    In its first step the fix also takes over the force that holds each node in balance, and applies
-    it from then on. Ground that begins with its stress (fix initial_stress) stays where it is; a
-    load that comes later, such as weight that is switched on, pushes the edge slowly away.
+    In its first step the fix takes over the force that holds each node in balance. Ground that
+    begins with its stress (fix initial_stress) stays where it is; a later load, such as weight,
+    pushes the edge slowly away.
 
-    Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, where the surface stays at
-    its nodes, and in ulmpm while points move less than half a cell.
+    Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
+    move less than half a cell.
 
     See Also
     --------
@@ -103,7 +103,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Speeds of P and S waves, for the mass of the soil alone where pores are full."""
+    """Of P and S waves, for the mass of the soil alone where pores are full."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

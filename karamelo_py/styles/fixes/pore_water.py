@@ -13,7 +13,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Give the pressure; the total is what the last step let out."""
+    """The total is what the last step let out."""
     return values[0], flux[-3]
 
 
@@ -32,10 +32,10 @@ class PorePressure(Fix):
 
     Notes
     -----
-    All other surfaces are impermeable. The group has the nodes at the surface and, where that moves
-    within a cell, those on both sides of it: ulmpm with a surface that settles. The pressure is no
-    load on the soil: a lake also weighs on its bed, by fix edge_traction. Publishes ID_s, the mass
-    of water per time that left there in the step before.
+    Other surfaces are impermeable. The group has the nodes at the surface; where it settles within
+    a cell (ulmpm), those on both sides. The pressure is no load on the soil: a lake also weighs on
+    its bed, by fix edge_traction. Publishes ID_s, the mass of water per time that left in the step
+    before.
 
     See Also
     --------
@@ -74,7 +74,7 @@ class InitialPorePressure(Fix):
 
     Notes
     -----
-    Points without pore water are unaffected. The soil is not loaded: see fix initial_stress.
+    Dry points are unaffected. The soil is not loaded: see fix initial_stress.
 
     See Also
     --------

@@ -86,19 +86,19 @@ class Python(Fix):
     -----
     The function gets a view of the group: dt, time, and arrays with a row per member (position,
     velocity, mass, force ...; of nodes also velocity_update), described on the page on plug-ins.
-    Changes to these arrays take effect. The return value is published: a number as ID, up to three
-    as ID_x, ID_y, ID_z. A step costs some ten microseconds more, plus the time of the function.
+    Changes to them take effect. The return value is published: a number as ID, up to three as ID_x,
+    ID_y, ID_z. A call costs some ten microseconds.
 
-    With several processes all points are gathered in each step. If the function treats each point
-    or node separately and moves no points, write ``pull.point_by_point = True`` after it: each
-    process then calls it for its local points, in any order. ``points.total(terms)`` sums terms
-    (n,) or (n, k) over all points.
+    With several processes all points are gathered in each step. ``pull.point_by_point = True``
+    after a function that treats each point or node separately and moves no points: each process
+    then calls it for its local points, in any order. ``points.total(terms)`` sums terms (n,) or (n,
+    k) over all points.
 
     Restart files hold values that the function stores between steps, if ``remembers = ("taken",
     "left")`` names them: variables in the module, or attributes in the class of a callable object,
     with numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these.
-    The first restart file warns of other such data that has changed. Defaults of arguments, other
-    objects, other modules, and ``np.random`` itself are not checked.
+    The first file warns of other such data that has changed. Defaults of arguments, other objects, other
+    modules, and ``np.random`` itself are not checked.
 
     Example
     -------
@@ -155,7 +155,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of other values that the function has changed: files lack them."""
+        """Warn once of other changed values: files lack them."""
         keeper = self.keeper
         forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
@@ -207,7 +207,7 @@ class Python(Fix):
 
 
 class Keeper:
-    """Owner of the values that a function needs between steps: its object or its module.
+    """The object or module of a function, with the values that it needs between steps.
 
     `names` are the names in ``remembers``; `place` is where this word belongs.
     """
@@ -230,7 +230,7 @@ class Keeper:
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:
-        """Names that have changed since the last call and are not remembered."""
+        """Changed since the last call, and not remembered."""
         before, self.seen = self.seen, self._look()
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 

@@ -116,15 +116,15 @@ class RigidBody(Fix):
     Notes
     -----
     Publishes its centre ID_x, ID_y, ID_z; velocity ID_vx, ...; rotation ID_rx, ...; angular
-    velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ...
-    Names are those of its dimension: in 2D x, y, vx, vy, rz, wz, fx, fy, tz. In 2D the rotation is
-    an angle that may exceed 2 PI; in 3D it is a vector along the axis, at most PI long.
+    velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ... In
+    2D x, y, vx, vy, rz, wz, fx, fy, tz. In 2D the rotation may exceed 2 PI; in 3D it is a vector
+    along the axis, at most PI long.
 
-    It pushes other solids, and they push it, on the grid in ulmpm/contacts (with the friction of
-    fix contact/friction). In the other methods fix contact/rigid_body does this. Its velocity at
-    the end of the step is found together with all impulses: it may be far lighter than what it
-    touches. Momentum is conserved to round-off. As for points, velocities belong to the middle of
-    a step, unless scheme(..., start=half).
+    In ulmpm/contacts it and other solids push each other on the grid (with the friction of fix
+    contact/friction); otherwise by fix contact/rigid_body. Its velocity at the end of the step is
+    found together with all impulses: it may be far lighter than what it touches. Momentum is
+    conserved to round-off. As for points, velocities belong to the middle of a step, unless
+    scheme(..., start=half).
 
     Formulas may contain its own values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the same
     ID replaces this one, and the body continues with its velocity: to release
