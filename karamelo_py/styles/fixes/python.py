@@ -97,8 +97,8 @@ class Python(Fix):
     Restart files hold values that the function stores between steps, if ``remembers = ("taken",
     "left")`` names them: variables in the module, or attributes in the class of a callable object,
     with numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these.
-    The first file warns of other such data that has changed. Defaults of arguments, other objects, other
-    modules, and ``np.random`` itself are not checked.
+    The first file warns of other such data that has changed. Defaults of arguments, other objects,
+    other modules, and ``np.random`` itself are not checked.
 
     Example
     -------
