@@ -29,7 +29,7 @@ def pore_water(
     Parameters
     ----------
     material
-        The skeleton: any law of a solid, with the dry density, (1 - n) times that of the grains.
+        The skeleton: any law of a solid, with the dry density, (1 - n) times the density of grains.
         Its stress is the effective stress.
     n
         Porosity before deformation, from 0.01 to 0.9.

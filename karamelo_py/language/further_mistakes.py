@@ -1,7 +1,7 @@
 """Find further, independent mistakes of a script after the first.
 
-Statements that use what a wrong statement would have defined are skipped, and their own definitions
-recorded in turn; command and style names are still checked.
+Statements that use what a wrong or skipped statement would have defined are skipped; command and
+style names are still checked.
 """
 
 import re

@@ -48,7 +48,7 @@ __all__ = [
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Those of a command or style, without the hub.
+    """Of a command or style, without the hub.
 
     TypeError for an unsupported signature, a fault of its author.
     """

@@ -1,7 +1,7 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
 A case travels as data: the script, its files and the variables. Its log, its record and the files
-that -keep names come back: no disk is shared.
+named by -keep come back: no disk is shared.
 """
 
 import re

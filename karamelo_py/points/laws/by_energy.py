@@ -325,7 +325,7 @@ def squared(s):
 
 @point_function()
 def variables(law, F, b):
-    """I1, I2, J, and those of fibres."""
+    """I1, I2, J, then I4 and I6 of fibres."""
 
 
 @variables.on(OfInvariants)

@@ -127,9 +127,9 @@ class RigidBody(Fix):
     scheme(..., start=half).
 
     Formulas may contain its own values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the same
-    ID replaces this one, and the body continues with its velocity: to release
-    it, write the line again without fixed. In axisymmetry it moves along the axis only. Rigid
-    bodies pass through each other, through rigid solids and through nodes that a fix holds.
+    ID replaces this one, and the body retains its velocity: to release it, repeat the line without
+    fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through each other, rigid
+    solids and nodes that a fix holds.
 
     See Also
     --------

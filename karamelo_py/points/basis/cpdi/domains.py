@@ -153,7 +153,7 @@ def _upright_simplex(basis, kin, place):
 
 
 class Q4(cpdi.CarriedDomain):
-    """Quadrilaterals whose corners move with those of neighbouring points.
+    """Quadrilaterals whose corners move with the grid.
 
     Domains tile the body without gaps (Sadeghirad, Brannon & Guilkey 2013). In strong shear they
     tangle, which ends the run; R4 parallelograms cannot tangle.
@@ -206,7 +206,7 @@ PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
 
 class H8(cpdi.CarriedDomain):
-    """Trilinear hexahedra whose corners move with those of neighbouring points.
+    """Trilinear hexahedra whose corners move with the grid.
 
     Weights and gradients are exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate N
     det J, a cubic in each direction, and grad N det J, of lower order.

@@ -63,7 +63,7 @@ class JohnsonHolmquist2(NamedTuple):
     plastic strain over the failure strain, at once where that is 0. Broken material sustains a
     tension of T (1 - D); beyond, it opens. In compression, a step that lowers the strength converts
     the fraction beta of the lost shear energy to pressure. Dump columns: ep, damage, bulking (the
-    added pressure), opened (the volume ratio of gaps). The rate is that of the strain.
+    added pressure), opened (the volume ratio of gaps). The rate is the strain rate.
 
     See Also
     --------
