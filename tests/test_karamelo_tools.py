@@ -280,6 +280,14 @@ def test_a_body_that_begins_behind_a_plane_is_told(run_interpreted, style, norma
         assert "behind" not in run_interpreted(touching).err
 
 
+def test_a_ball_outside_the_domain_is_told(run_interpreted):
+    """As of 2019, with x, y, z, R, K: K is taken for z, far away, and nothing touches."""
+    for order, told in (("0.4, 0.4, 0.4, 0.2, 1e3", True), ("1e3, 0.2, 0.4, 0.4, 0.4", False)):
+        fix = f"fix(F, indent, all, sphere, {order})"
+        err = run_interpreted(block(3, fix, "run(0)"), folder=order[:3], command="check").err
+        assert ("hint: K and R come before x, y, z" in err) == told
+
+
 def test_a_body_that_begins_in_a_ball_is_told(run_interpreted):
     """A ball that reaches the middle of the block's 0.3 x 0.2, or one beside it."""
     for x, told in (("0.3", True), ("-0.3", False)):

@@ -36,6 +36,7 @@ def test_the_own_step_of_what_flows_bears_a_lone_point(run_interpreted, transfer
     assert stored.max() < 1.5 * stored[:40].max()
     dt = 0.9 * 0.9 * 2 / sqrt(2 * (6 if transfer == "TPIC" else 4)) * 0.1 / C
     assert done.log["dt"][1:].max() == pytest.approx(dt, rel=0.05)  # less by the speed
+    assert "lone_points (points alone in cells); 0.9" in done.out
 
 
 def test_above_the_limit_it_does_not(run_interpreted):

@@ -207,9 +207,6 @@ def field(fields: tuple, kind: type) -> Any:
     return None
 
 
-# --- rows of arrays that may be absent --------------------------------------------------------
-
-
 def load(array, p, like):
     """Load components 0, 1, ... of point `p`, as many as `like` has; () without an array."""
     if array is None:
@@ -249,9 +246,6 @@ def forget(array, p, which):
 
 def load_vector(kin, array, p):
     return kin.Vector._make([array[k, p] for k in range(kin.dimension)])
-
-
-# --- rows by address: independent of the number and types of arrays ------------------------------
 
 
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:

@@ -78,9 +78,6 @@ def prefetch_records(array: Any, i: Any) -> None:
     """Prefetch the records `AHEAD` nodes after those in lanes."""
 
 
-# --- code for lanes -------------------------------------------------------------------------------
-
-
 def _width(nodes: Any, slopes: Any) -> int:
     return round(len(nodes) ** (1 / max(1, len(slopes))))
 

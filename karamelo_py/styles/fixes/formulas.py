@@ -35,7 +35,8 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
             raise ScriptError(
                 f"more components than the {plural(d, 'dimension')} of the domain",
                 expected=f"{wanted} (a further one may only be NULL or 0)",
-                hint=f"the last direction here is {AXES[d - 1]}: gravity is a component of it",
+                hint=f"the last direction here is {AXES[d - 1]}"
+                + ": gravity is a component of it" * (name == "b"),
             )
     if all(formula is None for formula in formulas[:d]):
         hub.warn("all components are NULL: it leaves everything alone")

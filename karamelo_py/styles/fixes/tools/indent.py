@@ -62,6 +62,10 @@ class Indent(BallTool):
         super().__init__(hub, group)
         self.K, self.R = K, R
         self.centre = self.of_time("", (x, y, z))
+        c, domain = self.now(*self.centre), hub.domain
+        past = np.maximum(domain.lo[: len(c)] - c, c - domain.hi[: len(c)]).max()
+        if all(f.is_constant for f in (R, *self.centre)) and past > R.constant:
+            hub.warn("the ball is outside the domain", hint="K and R come before x, y, z")
 
     def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now(self.K, self.R)
