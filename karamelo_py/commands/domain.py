@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 from typing import Literal
 
+from karamelo_py.kernels.equations.periodic import InUse
 from karamelo_py.language import registry
 from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
-from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.domain import Domain, require_domain, require_grid
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE
@@ -100,7 +101,11 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
 create_domain.syntax = "xmin, xmax[, ymin, ymax[, zmin, zmax]][, h]"
 
 
-def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
+def boundary(
+    hub: Hub,
+    style: Literal["error", "delete", "reflect", "periodic"],
+    *directions: Literal["x", "y", "z"],
+) -> None:
     """Set what happens to points that reach the edge of the domain.
 
     Parameters
@@ -108,11 +113,14 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     style
         ``error`` (the default): the run ends with an explanation. ``delete``: the point is removed,
         with its mass and momentum. ``reflect``: the point is mirrored back inside, and its normal
-        velocity is reversed.
+        velocity is reversed. ``periodic``: the point returns at the other end.
+    directions
+        x, y, z: with ``periodic`` alone.
 
     Example
     -------
     boundary(delete)
+    boundary(periodic, x)
 
     Notes
     -----
@@ -126,14 +134,53 @@ def boundary(hub: Hub, style: Literal["error", "delete", "reflect"]) -> None:
     A reflected point retains its stress and tangential velocity. Neighbours may push it back to the
     edge. A body that hits the edge as a whole loses most of its normal velocity.
 
+    In a periodic direction the domain is one cell of an endless row of equal ones: what leaves at
+    one end comes in at the other, and bodies at both ends touch. Its length is a multiple of the
+    cell size. Formulas of nodes should be equal a period apart. Positions in dumps may be outside
+    by what points move in 10 steps; then they return. For method ulmpm with linear or splines,
+    scheme musl, any transfer but XPIC, on one process without a GPU; not with the other styles of
+    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, pore_water.
+
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 
     See Also
     --------
     dimension, fix velocity_nodes
     """
+    if style == "periodic":
+        set_periodic(hub, ["xyz".index(name) for name in directions])
+        return
+    if directions:
+        message = f"boundary({style}) is for all directions"
+        raise ScriptError(message, argument="directions", expected=f"boundary({style})")
     hub.update.boundary = style
     hub.update.boundary_place = hub.place
+
+
+def set_periodic(hub: Hub, directions: list[int]) -> None:
+    domain = require_grid(hub)
+    if not directions or max(directions) >= domain.dimension:
+        raise ScriptError(
+            "the scene has no such direction" if directions else "no direction is named",
+            argument="directions" if directions else "style",
+            expected=f"boundary(periodic, {', '.join('xyz'[: domain.dimension])}), or some of them",
+        )
+    for k in directions:
+        length = domain.hi[k] - domain.lo[k]
+        if abs(domain.cells_of_period(k) * domain.h - length) > 1e-6 * domain.h:
+            raise ScriptError(
+                f"the length of the domain, {length:g}, is no multiple of the cells ({domain.h:g})",
+                argument="directions",
+                expected="dimension(...) with whole cells in periodic directions",
+            )
+    if hub.solids:
+        raise ScriptError(
+            "the solids are there already",
+            argument="style",
+            expected="boundary(periodic, ...) after dimension and before the first solid",
+            code="too-late",
+        )
+    domain.periodic, domain.node_fields = tuple(sorted(set(directions))), (InUse,)
 
 
 boundary.may_differ = True  # a run that points leave can resume with boundary(delete)

@@ -19,6 +19,7 @@ from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
 from karamelo_py.kernels.equations.move import Move
+from karamelo_py.kernels.equations.periodic import Join, JoinVelocity, Seam, ask_to_sort
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.transfers import stores_moment
@@ -417,6 +418,24 @@ def light_node(s):
 light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
+def seams(task: type) -> Any:
+    """Rows that join the images of nodes in periodic directions."""
+
+    def rows(s):
+        ranks = s.control.ranks
+        return (
+            tuple([NodeTask(task(axis)) for axis in ranks.axes]) if isinstance(ranks, Seam) else ()
+        )
+
+    return rows
+
+
+def sort_in_time(s: Setup) -> tuple:
+    return (Once(ask_to_sort),) if isinstance(s.control.ranks, Seam) else ()
+
+
+SEAM = SceneTask(seams(Join), "sums of nodes a period apart")
+SEAM_AGAIN = SceneTask(seams(JoinVelocity), "momentum of nodes a period apart")
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
 FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
 LOSS = SceneTask(
@@ -449,6 +468,8 @@ VELOCITY_BEFORE = (
 FORCE = Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow.
 UPDATE = (
+    SceneTask(sort_in_time),
+    SEAM,
     FRICTION,
     LOSS,
     AVERAGED,
@@ -469,6 +490,7 @@ MOVE = (
 # The moved points' velocity, mapped to the nodes again.
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
+    SEAM_AGAIN,
     NodeTask(nodes.MomentumToVelocity()),
     AXIS,
     AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),

@@ -227,7 +227,7 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
     frame, averaging, *others = of_method
     owners = [frame, update.transfer, averaging, contact, heat, grids]
     laws = (solid.material.law for solid in hub.solids.values())
-    return [*owners, *hub.fixes.values(), update, update.scheme, *others, *laws]
+    return [*owners, hub.domain, *hub.fixes.values(), update, update.scheme, *others, *laws]
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:

@@ -16,7 +16,7 @@ from karamelo_py.kernels.equations.node_updates import SumsToVelocity
 from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Extent, Visit, sweep, sweep_nodes
-from karamelo_py.kernels.table import SUMS
+from karamelo_py.kernels.table import SEAM, SUMS
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
@@ -35,6 +35,7 @@ from karamelo_py.run.lower.build import (
 from karamelo_py.run.lower.check_plugins import try_parts
 from karamelo_py.run.lower.memory import check_room, no_room
 from karamelo_py.run.mpi.subdomain import Subdomain
+from karamelo_py.run.periodic import mark_nodes, return_points
 from karamelo_py.run.step_size import carried_on
 from karamelo_py.run.tiles import WholeDomain
 from karamelo_py.scene.comm import SerialComm
@@ -188,7 +189,12 @@ class SceneArrays:
     def sort(self) -> None:
         """Sort the points by tile, after handing over those in other processes' tiles."""
         self.setup = self.domain.migrate(self.setup)
+        domain = self.hub.domain
+        if domain.periodic:
+            return_points(self.setup, domain)
         self.tiles.sort(self.setup)
+        if domain.periodic:
+            mark_nodes(self.setup)
 
     def sort_if_due(self) -> None:
         """Sort the points if one may have left its tile's reach, or none is sorted."""
@@ -210,6 +216,7 @@ class SceneArrays:
             s, self.mode, Visit((), SUMS.quantities, SUMS.weights), Extent(dt, False, True, False)
         )
         all_well(s)
+        take_rows((SEAM,), s, self.mode, NoHooks())
         sweep_nodes(self.mode, SumsToVelocity(), s, dt)
         if isinstance(s.heat, Conducting):
             take_rows(SHOW, s, self.mode, NoHooks())

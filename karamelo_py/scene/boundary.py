@@ -1,5 +1,6 @@
 """Points at the edge of the domain stop the run, are deleted or are reflected."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,52 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.points.basis import carried
 from karamelo_py.scene.solid import named
 from karamelo_py.script.errors import Place, ScriptError
+
+
+def _not_periodic(hub: Scene) -> Iterator[tuple[str, str, Place | None]]:
+    """Yield what periodic directions do not support, what to write instead, and the line."""
+    update, settings = hub.update, hub.settings
+    method = update.method
+    name = registry.name_of("method", type(method))
+    if name != "ulmpm":
+        yield f"method {name}", "method(ulmpm, ...)", method.place
+    if method.basis_name not in ("linear", "quadratic-spline", "cubic-spline"):
+        yield f"the basis {method.basis_name}", "linear or a spline", method.place
+    if hasattr(update.transfer, "order"):
+        yield "transfer XPIC", "APIC or FLIP", method.place
+    scheme = registry.name_of("scheme", type(update.scheme))
+    if scheme != "musl":
+        yield f"scheme {scheme}", "scheme(musl)", update.scheme_place
+    if method.kinematics(hub).hoops:
+        yield f"{method.kinematics(hub).word} scenes", "plane strain, 3D or 1D", None
+    if update.thermal:
+        yield "heat conduction", "a mechanical method", method.place
+    if update.anti_locking:
+        yield "anti_volumetric_locking", "quadratic-spline, which locks less", None
+    if update.boundary != "error":
+        yield f"boundary({update.boundary})", "boundary(error)", update.boundary_place
+    for solid in hub.solids.values():
+        if solid.material.fluid is not None:
+            yield "pore_water", "a dry material", solid.place
+    for fix in hub.fixes.values():
+        if fix.solids or fix.follows_points or fix.body:
+            instead = "walls by fix velocity_nodes"
+            yield f"fix {fix.style}, which knows one cell", instead, fix.place
+    if settings.comm.size > 1:
+        yield "--ranks", "--threads, which divides the points in one process", None
+    if settings.engine == "gpu":
+        yield "--gpu", "processors, which run the same script", None
+
+
+def check_periodic(hub: Scene) -> None:
+    """Refuse unsupported combinations, all in one message."""
+    errors = [
+        ScriptError(f"boundary(periodic) does not support {what}", expected=instead, place=place)
+        for what, instead, place in _not_periodic(hub)
+    ]
+    if errors:
+        errors[0].others = errors[1:]
+        raise errors[0]
 
 
 def check(hub: Scene) -> None:

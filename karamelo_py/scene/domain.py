@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.equations.periodic import GHOSTS
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import words_of
 from karamelo_py.points.kinematics import KINEMATICS
@@ -22,6 +23,8 @@ class Domain:
     thin = False
     thickness = 1.0  # in 2D; cross-section in 1D
     place: Place | None = None
+    periodic: tuple[int, ...] = ()  # directions
+    node_fields: tuple[type, ...] = ()
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
         self.dimension = dimension
@@ -41,6 +44,15 @@ class Domain:
         """Distance from a face within which a point lies on it."""
         size = self.h if self.h is not None else float((self.hi - self.lo).max()) * 1e-3
         return RELATIVE_TOLERANCE * size
+
+    def cells_of_period(self, k: int) -> int:
+        return round((self.hi[k] - self.lo[k]) / (self.h or 1.0))
+
+    def with_images(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ends (3,) of the grid: beyond the domain in periodic directions."""
+        more = np.zeros(3)
+        more[list(self.periodic)] = GHOSTS * (self.h or 0.0)
+        return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
         """Factor of volumes at `x` (n, d): thickness, or length or area per angle."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.equations.periodic import GHOSTS
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
@@ -213,7 +214,22 @@ class NodeGroup(AnyGroup):
         for lattice in lattices:
             for number, x in lattice.between(region.box_lo, region.box_hi):
                 pieces.append(number[region.inside(x)])
-        return np.concatenate(pieces)
+        found = np.concatenate(pieces)
+        domain = self.hub.domain
+        return with_images(lattices[0], domain, found) if domain.periodic else found
+
+
+def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:
+    """Nodes inside the periodic cell, with those a period apart; ascending."""
+    places = lattice.places(numbers)
+    for k in domain.periodic:
+        period = domain.cells_of_period(k)
+        inside = (places[:, k] >= GHOSTS) & (places[:, k] < GHOSTS + period)
+        shifts = np.arange(-(GHOSTS // period) - 1, GHOSTS // period + 2) * period
+        places = np.repeat(places[inside], len(shifts), axis=0)
+        places[:, k] += np.tile(shifts, len(places) // len(shifts))
+        places = places[(places[:, k] >= 0) & (places[:, k] < lattice.shape[k])]
+    return np.unique(lattice.first + np.ravel_multi_index(tuple(places.T), lattice.shape))
 
 
 KINDS: dict[str, type[AnyGroup]] = {kind.kind: kind for kind in (ParticleGroup, NodeGroup)}

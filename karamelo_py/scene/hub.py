@@ -254,7 +254,13 @@ class Hub:
 
     @property
     def _key_of_lattices(self) -> tuple:
-        return self.domain, self.domain.h, self.update.method, *self.solids.values()
+        return (
+            self.domain,
+            self.domain.h,
+            self.domain.periodic,
+            self.update.method,
+            *self.solids.values(),
+        )
 
     def forget_simulation(self) -> None:
         self._simulation = None

@@ -30,6 +30,7 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import flip_coefficient, lost_fractions, stores_moment
+from karamelo_py.run import periodic
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
 from karamelo_py.run.lower.bodies import lower_bodies
@@ -89,6 +90,8 @@ def check_scene(hub: Hub) -> None:
         if error.place is None:
             error.place, error.command = method.place, "method"
         raise
+    if hub.domain.periodic:
+        boundary.check_periodic(hub)
     if hub.update.boundary != "error":
         boundary.check(hub)
     for solid in hub.solids.values():
@@ -181,6 +184,9 @@ def lower(
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,
     )  # fmt: skip
+    if hub.domain.periodic:
+        seam = periodic.seam_of(setup, hub.domain)
+        setup = setup._replace(control=setup.control._replace(ranks=seam))
     return setup, tiles
 
 

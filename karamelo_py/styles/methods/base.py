@@ -102,7 +102,8 @@ class Method:
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         domain = hub.domain
-        return [self._lattice(domain.dimension, domain.lo, domain.hi, domain.h)]
+        ends = domain.with_images() if domain.periodic else (domain.lo, domain.hi)
+        return [self._lattice(domain.dimension, *ends, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
         """Mask (F,) of fields of rigid solids; (0,) if none is."""

@@ -1,0 +1,111 @@
+"""Periodic directions: nodes that are one node of the body, a period apart.
+
+The grid has `GHOSTS` cells more at both ends of a periodic direction. Points at an end give to
+nodes beyond it; the images of a node then all get the sum of what they have, in one order, so that
+whatever follows at nodes gives them the same bits. Points return to the cell after every `EVERY`
+steps (`karamelo_py.run.periodic`).
+"""
+
+from math import inf
+from typing import NamedTuple
+
+from karamelo_py.compiler import index
+from karamelo_py.compiler.fields import StepField, SummedField, field
+from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.totals import counts
+
+GHOSTS = 6
+EVERY = 10
+
+
+class InUse(StepField):
+    """1 at nodes that points may see."""
+
+
+class Axis(NamedTuple):
+    first: int  # number of the first node
+    stride: int  # difference of node numbers
+    count: int  # nodes along the axis
+    period: int  # cells
+
+
+class Seam(NamedTuple):
+    """The periodic directions of a run; takes the place of processes in `Control.ranks`."""
+
+    axes: tuple  # of `Axis`
+
+
+@counts.on(Seam)
+def _counts_seam(ranks, n):
+    """Return True for one of the images of a node."""
+    counted = n >= 0
+    for axis in ranks.axes:
+        place = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
+        counted = counted & (place >= 0) & (place < axis.period)
+    return counted
+
+
+@node_task
+class Join(NamedTuple):
+    """Sum what the images of a node have, and give it to all of them."""
+
+    axis: Axis
+
+    says = "periodic sums"
+    goes_through = ("sums", "in use")
+
+    def at_node(task, kin, nodes, n, dt):
+        if _is_lowest(task.axis, nodes, n):
+            _join(task.axis, nodes, nodes.sums, n)
+            for one in nodes.fields:
+                if isinstance(one, SummedField):
+                    _join(task.axis, nodes, one.array, n)
+
+
+@node_task
+class JoinVelocity(NamedTuple):
+    axis: Axis
+
+    says = "periodic momentum"
+    goes_through = ("velocity", "in use")
+
+    def at_node(task, kin, nodes, n, dt):
+        if _is_lowest(task.axis, nodes, n):
+            _join(task.axis, nodes, nodes.velocity, n)
+
+
+def _is_lowest(axis, nodes, n):
+    """Return True for the first node in use among its images."""
+    used = field(nodes.fields, InUse)
+    step = axis.period * axis.stride
+    place = (int(n) - axis.first) // axis.stride % axis.count
+    lowest = place >= 0
+    for k in range(1, int(place // axis.period) + 1):
+        if used[index(int(n - k * step)), 0] > 0:
+            lowest = place < 0
+    return lowest
+
+
+def _join(axis, nodes, array, n):
+    used = field(nodes.fields, InUse)
+    step = axis.period * axis.stride
+    place = (int(n) - axis.first) // axis.stride % axis.count
+    more = int((axis.count - 1 - place) // axis.period)
+    for c in range(int(array.shape[1])):
+        total = array[n, c]
+        for k in range(1, more + 1):
+            m = index(int(n + k * step))
+            if used[m, 0] > 0:
+                total += array[m, c]
+        array[n, c] = total
+        for k in range(1, more + 1):
+            m = index(int(n + k * step))
+            if used[m, 0] > 0:
+                array[m, c] = total
+
+
+def ask_to_sort(s):
+    """Have the points sorted after every `EVERY` steps, when those outside return."""
+    if (int(s.control.values[TIMESTEP]) + 1) % EVERY == 0:
+        s.control.motion[0].drift = inf

@@ -1,0 +1,159 @@
+"""Periodic directions: waves, drift, flow down a plane, and what has none."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+WAVE = """
+    method(ulmpm, {way})
+    dimension(1, 0, 1, 1/{N})
+    boundary(periodic, x)
+    region(bar, block, 0, 1)
+    material(m, linear, 1, 1, 0)
+    solid(s, region, bar, 2, m, 1/{N}, 0)
+    fix(v, initial_velocity_particles, all, {drift} + 1e-4*sin(2*PI*x0))
+    fix(s, initial_stress, all, -1e-4*sin(2*PI*x0), 0, 0, 0, 0, 0)
+"""
+FLOW = """
+    N = 8
+    method(ulmpm, APIC, quadratic-spline)
+    dimension(2, 0, {wide}/N, 0, 1.25, 1/N)
+    boundary(periodic, x)
+    region(layer, block, 0, {wide}/N, 0, 1)
+    eos(oil, fluid, 1, 200, 1)
+    strength(oil, fluid, 0.1)
+    material(oil, eos-strength, oil, oil)
+    solid(oil, region, layer, 2, oil, 1/N, 0)
+    region(bottom, block, -INF, INF, -INF, 1e-6)
+    group(bottom, nodes, region, bottom, all)
+    fix(base, velocity_nodes, bottom, 0, 0)
+    fix(g, body_force, all, 0.1, -0.1)
+    log_modify(custom, time, base_x, base_y, g_x)
+    dump(d, all, particle, 100000, d.*.txt, x, y, vx, vy)
+    set_output(100000)
+"""
+DUMP = "dump(d, all, particle, 100000, d.*.txt, x0, x, vx)\n"
+
+
+def final(result):
+    return max(result.folder.glob("d.*.txt"), key=lambda path: int(path.name.split(".")[1]))
+
+
+def columns(path):
+    lines = path.read_text("utf-8").splitlines()
+    k = next(k for k, line in enumerate(lines) if line.startswith("ITEM: ATOMS"))
+    rows = np.array([line.split() for line in lines[k + 1 :]], float)
+    return dict(zip(lines[k].split()[2:], rows.T, strict=True))
+
+
+@pytest.mark.xdist_group("periodic")
+def test_a_wave_comes_back(run_script):
+    """A travelling wave after ten periods: phase and height, with and without a drift."""
+    script = WAVE.format(way="FLIP, quadratic-spline, 1", N=64, drift="0") + DUMP
+    v = columns(final(run_script(script + "run_time(10)")))
+    waves = [np.mean(v["vx"] * f(2 * pi * v["x0"])) * 2e4 for f in (np.sin, np.cos)]
+    assert abs(np.hypot(*waves) - 1) < 0.01
+    assert abs(np.arctan2(waves[1], waves[0])) < 2 * pi * 10 * 0.004
+
+
+@pytest.mark.xdist_group("periodic")
+def test_a_drifting_bar_conserves_momentum(run_script):
+    """Through the seam many times; all points are in the cell again, or a little outside."""
+    script = WAVE.format(way="FLIP, quadratic-spline, 1", N=32, drift="0.2")
+    script += "compute(v, average_velocity, all)\nlog_modify(custom, time, v_x)\n" + DUMP
+    result = run_script(script + "run_time(25)")
+    assert abs(result.log["v_x"][-1] - 0.2) < 1e-12
+    x = columns(final(result))["x"]
+    assert x.min() >= 0
+    assert x.max() < 1 + 0.2 * 10 / 32
+
+
+@pytest.mark.xdist_group("periodic")
+def test_threads_and_restarts_change_no_bit(run_script):
+    script = WAVE.format(way="FLIP, quadratic-spline, 1", N=32, drift="0.5")
+    script += "run(33)\nwrite_restart(half.h5)\nrun(44)\n" + DUMP + "run(3)"
+    whole = final(run_script(script)).read_text("utf-8")
+    assert final(run_script(script, "-restart", "half.h5")).read_text("utf-8") == whole
+    threads = run_script(script, "--threads", "2", folder="threads")
+    assert final(threads).read_text("utf-8") == whole
+
+
+def test_the_width_of_a_cell_does_not_matter(run_interpreted):
+    """Of a layer that shears under gravity: one cell wide, or four."""
+    one, four = (
+        columns(final(run_interpreted(FLOW.format(wide=wide) + "run(12)", folder=str(wide))))
+        for wide in (1, 4)
+    )
+    first = four["x"] < 1 / 8
+    assert np.ptp(one["vx"]) > 1e-3
+    for name in ("y", "vx", "vy"):
+        order, other = (np.lexsort((t["x"], t["y"])) for t in (one, four))
+        narrow = one[name][order]
+        wide = four[name][other][first[other]]
+        assert np.allclose(narrow, wide, rtol=1e-9, atol=1e-14)
+
+
+@pytest.mark.full
+def test_a_viscous_layer_has_the_profile_of_nusselt(run_script):
+    """Down a plane (Nusselt 1916): u = g (H y - y^2/2) / nu, base force g m; 2.5 % with 8 cells."""
+    result = run_script(FLOW.format(wide=2) + "run_time(20)")
+    points = columns(final(result))
+    exact = points["y"] - points["y"] ** 2 / 2
+    assert np.sqrt(np.mean((points["vx"] - exact) ** 2)) < 0.03 * 0.5
+    assert abs(result.log["g_x"][-1] - 0.1 * 0.25) < 1e-12
+    assert abs(result.log["base_x"][-1] + 0.1 * 0.25) < 0.002
+
+
+REFUSED = {
+    "method(tlmpm, FLIP, linear, 1)": "method tlmpm",
+    "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",
+    "method(ulmpm, XPIC, linear, 2)": "transfer XPIC",
+    "method(ulmpm, FLIP, linear, 1)\nscheme(usl)": "scheme usl",
+    "method(ulmpm, FLIP, linear, 1)\nscheme(quasi-static)": "scheme quasi-static",
+    "method(ulmpm, FLIP, linear, 1)\nanti_volumetric_locking(true)": "anti_volumetric_locking",
+    "method(ulmpm, FLIP, linear, 1)\nboundary(delete)": "boundary(delete)",
+}
+SCENE = """
+    {head}
+    dimension(2, 0, 1, 0, 1, 0.25)
+    boundary(periodic{directions})
+    region(body, block, 0, 1, 0.25, 0.75)
+    material(m, linear, 1, 1, 0)
+    {water}
+    solid(body, region, body, 2, m, 0.25, 0)
+    run(1)
+"""
+USUAL = {"head": "method(ulmpm, FLIP, linear, 1)", "directions": ", x", "water": ""}
+
+
+@pytest.mark.parametrize("head", REFUSED)
+def test_what_has_no_periodic_directions_is_refused_by_name(run_interpreted, head):
+    err = run_interpreted(SCENE.format(**USUAL | {"head": head}), status=1).err
+    assert f"boundary(periodic) does not support {REFUSED[head]}" in err
+
+
+MISTAKES = [
+    ({"directions": ""}, (), "no direction is named"),
+    ({"directions": ", z"}, (), "no such direction"),
+    ({"water": "pore_water(m, n=0.4, permeability=1)"}, (), "does not support pore_water"),
+    ({}, ("--gpu",), "does not support --gpu"),
+]
+
+
+@pytest.mark.parametrize(("change", "options", "told"), MISTAKES)
+def test_mistakes_get_one_message(run_interpreted, change, options, told):
+    err = run_interpreted(SCENE.format(**USUAL | change), *options, status=1).err
+    assert told in err
+    assert err.count("error:") == 1
+
+
+@pytest.mark.parametrize("line", ["boundary(error, x)", "dimension(2, 0, 1.1, 0, 1, 0.25)"])
+def test_directions_and_lengths_are_checked(run_interpreted, line):
+    script = SCENE.format(**USUAL)
+    if line.startswith("dim"):
+        script = script.replace("dimension(2, 0, 1, 0, 1, 0.25)", line)
+    else:
+        script = script.replace("boundary(periodic, x)", line)
+    err = run_interpreted(script, status=1).err
+    assert "is for all directions" in err or "is no multiple of the cells" in err
