@@ -76,6 +76,7 @@ def test_two_runs_in_one_folder(tmp_path):
     first = started(tmp_path, "in.a", "-log", "a.mpm")
     try:
         wait_for(tmp_path / "a.mpm")
+        first.send_signal(signal.SIGSTOP)  # it holds the folder, and takes no time
         second = started(tmp_path, "in.a", "-log", "b.mpm")
         assert f"another run is writing to {tmp_path}" in second.communicate(timeout=60)[1]
         assert second.returncode == 1
