@@ -1,4 +1,4 @@
-"""boundary: points that reach the edge of the domain end the run, are deleted, or come back."""
+"""boundary(error | delete | reflect): what happens to points that reach the edge of the domain."""
 
 import re
 
@@ -15,7 +15,7 @@ from karamelo_py.points.grid import turned
 SIZE = (0.3, 0.1, 0.1)
 MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.1, 3: 2 * 0.3 * 0.1 * 0.1}
 COUNT = {1: 6, 2: 12, 3: 24}
-# In single steps of 0.001 no point comes to stand on a node.
+# With steps of 0.001 no point lands on a node.
 V = (9.7, 3.1, -2.1)
 WATCH = (
     "dump(d, all, particle, 10, d.*.LAMMPS, x, y, z, vx, vy, vz, mass)",
@@ -26,7 +26,7 @@ WATCH = (
 
 
 def thrown(d: int, how: str, *lines: str, **options) -> str:
-    """A soft block thrown at the edge x = 0.7: its points leave from step 13 to step 39."""
+    """A soft block that flies over the edge x = 0.7; its points leave in steps 13 to 39."""
     velocity = ", ".join(map(str, V[:d]))
     fly = f"fix(v, initial_velocity_particles, all, {velocity})"
     options = {"law": "soft", "size": SIZE, **options}
@@ -35,7 +35,7 @@ def thrown(d: int, how: str, *lines: str, **options) -> str:
 
 
 def single(d: int, how: str, *lines: str, transfer: str = "FLIP") -> str:
-    """One point at 0.85 in each direction, which flies past the grid without any force."""
+    """One force-free point that starts at 0.85 along each axis and flies out of the grid."""
     box = ", ".join(["0.8, 0.9"] * d)
     domain = ", ".join(["0, 1.2"] * d)
     velocity = ", ".join(map(str, V[:d]))
@@ -66,7 +66,7 @@ def test_error_is_the_default(run_interpreted, d):
 
 
 def test_a_run_that_points_leave_resumes_with_them_deleted(run_interpreted):
-    """As the error says; the arrays of the default and of delete are the same."""
+    """With the command that the error gives; the arrays of error and delete are the same."""
     lost = run_interpreted(thrown(1, "error", "run(35)"), status=1)
     command, remark = re.search(r"resume: karamelo-py (.*?)  # (.*)", lost.err).groups()
     assert remark == "with boundary(delete)"
@@ -99,7 +99,7 @@ def test_a_point_come_loose_from_its_solid_is_told(run_interpreted, last, loose)
 
 @pytest.mark.parametrize("d", few((1, 2, 3), 1, 2))
 def test_deleted_points_are_gone(run_interpreted, d):
-    """Dumps have the others under their own ids; the nodes carry the mass that is left."""
+    """Dumps show the other points under their ids; nodes have only the mass of those."""
     result = run_interpreted(
         thrown(d, "delete", "dump(g, all, grid, 10, g.*.LAMMPS, x, mass)", "run(28)")
     )
@@ -120,7 +120,7 @@ def test_deleted_points_are_gone(run_interpreted, d):
 @pytest.mark.parametrize("d", few((1, 2, 3), 1, 2))
 @pytest.mark.parametrize("transfer", ["FLIP", "PIC", "APIC"])
 def test_a_reflected_point_is_a_mirror_image(run_interpreted, d, transfer):
-    """x = 1.2 - |0.85 + v t - 1.2|, and minus v across the edge, exactly; the rest as it was."""
+    """x = 1.2 - |0.85 + v t - 1.2| and -v across the edge, exactly; other components unchanged."""
     last = run_interpreted(single(d, "reflect", "run(60)", transfer=transfer)).dump("d.60.LAMMPS")
     free = [0.85 + v * 0.06 for v in V[:d]]
     for k, name in enumerate("xyz"[:d]):
@@ -132,7 +132,7 @@ def test_a_reflected_point_is_a_mirror_image(run_interpreted, d, transfer):
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
-    """The field v = L x, seen in the mirror R: R v(R x)."""
+    """The mirror image of the field v = L x is R v(R x)."""
     L, R = np.arange(1.0, d * d + 1).reshape(d, d), np.diag([-1.0, 1.0, -1.0][:d])
     mirror_image = [R @ L @ R @ x for x in np.eye(d)]
     tensor = KINEMATICS[d - 1].Tensor
@@ -154,7 +154,7 @@ def test_a_single_point_is_deleted_or_reflected_at_the_lower_edge(run_interprete
 
 @pytest.mark.parametrize("d", few((1, 2, 3), 1, 2))
 def test_a_reflected_drop(run_interpreted, d):
-    """Nothing is lost; momentum along the edge stays; no point is outside."""
+    """Mass and momentum along the edge are conserved, and no point leaves."""
     result = run_interpreted(thrown(d, "reflect", "run(35)"))
     last = result.dump("d.35.LAMMPS")
     assert len(last.id) == COUNT[d]
@@ -171,7 +171,7 @@ def test_a_reflected_drop(run_interpreted, d):
 
 
 def test_a_body_pressed_to_a_reflecting_edge_gains_energy(run_interpreted):
-    """A block of rubber falls on the edge: the warning names what feeds it, and the remedy."""
+    """A block of rubber falls on the edge: the warning names the cause and a fix."""
     said = run_interpreted("""
         method(ulmpm, FLIP, linear, 1)
         dimension(2, 0, 0.12, 0, 0.12, 0.02)
@@ -186,7 +186,7 @@ def test_a_body_pressed_to_a_reflecting_edge_gains_energy(run_interpreted):
     assert "pressed against an edge of the domain" in said and "fix velocity_nodes" in said
 
 
-# What acts on points splits a step into its stages, also when it acts on no point.
+# A fix on points splits a step into separate stages, even if its group is empty.
 STAGES = (
     "region(nowhere, block, 1.1, 1.15, 1.1, 1.15)",
     "group(none, particles, region, nowhere, all)",
@@ -202,7 +202,7 @@ REFLECTED = [("reflect", scheme) for scheme in SCHEMES]
     "how, scheme", parameters([DELETED[0], REFLECTED[0]], [*DELETED[1:], *REFLECTED[1:]])
 )
 def test_the_same_bits_in_pieces(state_interpreted, how, scheme):
-    """However a run is cut, with outputs, and stage by stage, while points leave in steps."""
+    """In one run, in several with outputs, and in separate stages, while points leave."""
     options = {"scheme": scheme, "law": "linear"}
     whole = state_interpreted(thrown(2, how, "run(28)", **options))
     assert (how == "delete") == bool((whole["mass"] == 0).any())
@@ -227,7 +227,7 @@ def test_the_same_bits_on_two_threads(tmp_path, monkeypatch, how):
 
 
 def test_what_is_deleted_stays_so(run_interpreted):
-    """A further solid, for which the arrays are made anew, brings nothing back."""
+    """Adding a solid, which rebuilds the arrays, brings no deleted point back."""
     lines = (
         "run(25)",
         "region(late, block, 0.1, 0.2, 0.1, 0.2)",
@@ -290,7 +290,7 @@ SPLASH = """
 """
 
 
-# Nearer to the block and to the edge, in a fifth of the cells and a quarter of the steps.
+# Closer together: a fifth of the cells and a quarter of the steps.
 NEARER = {
     "0, 10, 0.01": "1.4, 2.5, 0.01", "block, 1, 1.02": "block, 1.5, 1.52",
     "9.325, 9.335": "2.345, 2.355", "run(99)": "run(25)",
@@ -299,9 +299,9 @@ NEARER = {
 
 @pytest.mark.parametrize("nearer", few((NEARER, {}), NEARER))
 def test_going_back_leaves_no_contact_behind(run_interpreted, nearer):
-    """The splash leaves some steps after the bullet has hit; the run goes back to before the hit.
+    """The splash leaves some steps after the impact, and the run goes back to before the impact.
 
-    Nothing of the first try may be left on the nodes. A group without points shows 0.
+    Nodes must retain nothing of the discarded steps. A group without points shows 0.
     """
     text = SPLASH
     for old, new in nearer.items():
@@ -315,7 +315,7 @@ def test_going_back_leaves_no_contact_behind(run_interpreted, nearer):
 
 
 def test_nan_is_no_edge(run_interpreted):
-    """A point without a place is not deleted: the run ends, as ever."""
+    """A point at NaN is not deleted: the run ends with an error."""
     lines = ("fix(g, body_force, all, sqrt(0.02-time), 0)", "run(200)")
     assert "not a number" in run_interpreted(thrown(2, "delete", *lines), status=1).err
 
@@ -336,7 +336,7 @@ def test_what_is_refused(run_interpreted, old, new, says):
 
 
 def test_points_in_contact_may_be_deleted(state_interpreted):
-    """With those that are left, on one process and on two."""
+    """The other points stay in contact, on one process and on two."""
     lines = (
         "region(two, block, 0.6, 0.7, 0.3, 0.4)",
         "solid(two, region, two, 2, rubber, 0.1, 0)",
@@ -358,7 +358,7 @@ TWO_BODIES = (
 
 
 def test_the_last_points_of_a_law_leave(state_interpreted):
-    """The loops over the points of a law go on over none; also where they are a process's all."""
+    """Loops over the points of a law may become empty, also on a process that has no others."""
     script = thrown(2, "delete", *TWO_BODIES).replace(
         "velocity_particles, all", "velocity_particles, b"
     )

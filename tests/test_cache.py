@@ -1,4 +1,4 @@
-"""Kernels on disk: compiled again when what is in them has changed, and never in the way."""
+"""Kernels on disk: recompiled only when their content changes; faults of the folder stop no run."""
 
 import errno
 import hashlib
@@ -34,7 +34,7 @@ from karamelo_py.scene.hub import Hub
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 
 
-# A package in small: two shapes in files of their own, what they share, and a loop over points.
+# A small package: shapes in separate files, functions they share, and a loop over points.
 FILES = {
     "numbers_used.py": "HALF = 0.5\nUNUSED = 7\n",
     "helpers.py": """
@@ -160,7 +160,7 @@ ALL = ["Disk", "Square", "Strip"]
 
 
 class Shapes:
-    """The package on disk, and runs of its program."""
+    """The package on disk, with a method that runs its program."""
 
     def __init__(self, python, folder):
         self.python, self.folder = python, folder
@@ -175,7 +175,7 @@ class Shapes:
         (self.folder / name).write_text(text.replace(old, new))
 
     def run(self):
-        """Values of the three totals, the shapes they were compiled for, and what was told."""
+        """Return the three totals, the shapes compiled for, and the warnings."""
         path = os.pathsep.join([str(self.folder), os.environ["PYTHONPATH"]])
         own = {"KARAMELO_PY_CACHE": str(self.folder / "cache"), "PYTHONPATH": path}
         done = subprocess.run(
@@ -189,7 +189,7 @@ class Shapes:
 
 @pytest.fixture(scope="module")
 def compiled(compiling, tmp_path_factory):
-    """The files of the kernels of the package as it is above."""
+    """The kernel files of the package before any edit."""
     shapes = Shapes(compiling, tmp_path_factory.mktemp("shapes"))
     assert shapes.run() == (VALUES, ALL, [])
     assert shapes.run() == (VALUES, [], [])
@@ -198,7 +198,7 @@ def compiled(compiling, tmp_path_factory):
 
 @pytest.fixture
 def shapes(compiling, tmp_path, compiled):
-    """The package in a folder of its own, with its kernels."""
+    """A copy of the package with its kernels."""
     shapes = Shapes(compiling, tmp_path)
     shapes.kernels.mkdir(parents=True)
     for name, content in compiled.items():
@@ -262,7 +262,7 @@ EDITS = {
 
 @pytest.mark.parametrize("name", EDITS)
 def test_what_is_compiled_again(shapes, name):
-    """An edit has all traced again; only kernels whose text has changed are compiled again."""
+    """An edit has every kernel traced again; only those whose code changed are compiled."""
     edits, values, again = EDITS[name]
     more = (
         "from loops import area\nfrom strips import Strip\narea.on(Strip)(lambda shape: shape.b)\n"
@@ -280,7 +280,7 @@ def test_what_is_compiled_again(shapes, name):
 
 
 def test_an_edit_taken_back(shapes):
-    """Several states of the sources are kept, so going to and fro costs nothing."""
+    """Kernels of several versions of the sources are kept, so undoing an edit costs nothing."""
     shapes.edit("squares.py", "2.0", "3.0")
     assert shapes.run()[1] == ALL
     assert shapes.run()[1] == []
@@ -324,7 +324,7 @@ def test_folders_in_place_of_files(shapes):
 
 
 class Tag(NamedTuple):
-    """A shape of this file."""
+    """A shape defined in this file."""
 
 
 @point_function()
@@ -372,7 +372,7 @@ def test_a_full_disk_or_a_forbidden_folder(tmp_path, monkeypatch, call):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no owners and modes")
 @pytest.mark.parametrize("whose", ["folder of another", "file of another", "file for all", "link"])
 def test_what_another_user_may_have_written_is_not_read(tmp_path, monkeypatch, whose):
-    """A pickle can run any program: one that others may have put there is not opened."""
+    """Unpickling can run any code, so files that other users could have written are not opened."""
 
     class Harm:
         def __reduce__(self):
@@ -404,7 +404,7 @@ def test_what_another_user_may_have_written_is_not_read(tmp_path, monkeypatch, w
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no owners and modes")
 def test_the_folder_is_closed_to_others(tmp_path, monkeypatch):
-    """A usual umask of 002 opens it to a group."""
+    """With the common umask of 002 the group could write to it."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     (tmp_path / "kernels").mkdir()
     (tmp_path / "kernels").chmod(0o777)
@@ -417,7 +417,7 @@ def test_the_folder_is_closed_to_others(tmp_path, monkeypatch):
 
 
 def test_a_folder_that_is_gone_when_a_loop_is_compiled(tmp_path, monkeypatch):
-    """While it compiles, the folder turns into a file: told, and the loop runs."""
+    """If a file takes its place during compilation, there is a warning and the loop runs."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path / "cache"))
     compiled = machine.compile_text
 
@@ -434,7 +434,7 @@ def test_a_folder_that_is_gone_when_a_loop_is_compiled(tmp_path, monkeypatch):
 
 
 def test_room_and_other_files(tmp_path, monkeypatch):
-    """The files used least recently make room; what the cache has not named itself stays."""
+    """The least recently used kernels are deleted to make room, but no other files."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     folder = tmp_path / "kernels"
     folder.mkdir()
@@ -458,7 +458,7 @@ def test_room_and_other_files(tmp_path, monkeypatch):
 
 
 def test_a_class_that_cannot_be_named_is_found_by_its_text(tmp_path, monkeypatch):
-    """Two classes of one name would be taken for each other in another run."""
+    """In another run two classes of the same name could be confused."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
 
     class Local(NamedTuple):
@@ -470,13 +470,13 @@ def test_a_class_that_cannot_be_named_is_found_by_its_text(tmp_path, monkeypatch
 
 
 def test_a_function_that_a_kernel_is_given_is_not_described():
-    """Its number would be another one in each run: kernels would be kept and never found."""
+    """Its id differs from run to run, so kernels would be saved but never found again."""
     with pytest.raises(cache.Unknown):
         cache.describe(FunctionType(answer))
 
 
 def test_all_that_the_program_registers_has_words():
-    """Without words for one of them no kernel would be found by its sources."""
+    """If one of them had no description, no kernel would be found by its sources."""
     for made in session.registered:
         if not choices.modules_of(made):
             assert cache._words(made) == cache._words(made)
@@ -484,7 +484,7 @@ def test_all_that_the_program_registers_has_words():
 
 
 def test_what_threads_do_is_followed():
-    """Loops over threads are compiled apart from the function that they stand in."""
+    """Loops over threads are compiled separately from the function that contains them."""
 
     def put(tag, out, i):
         out[i] = answer(tag)
@@ -524,7 +524,7 @@ def _add_5(s, n):
 
 
 def test_loops_that_one_function_makes_are_kept_side_by_side(tmp_path, monkeypatch):
-    """Those over nodes are all of one name: each was compiled anew where there are five."""
+    """Loops over nodes share one name; with five of them each used to be recompiled."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     cells = Cells(np.array([[1, 0], [0, 4]], np.int64), np.zeros(4))
     functions = (_add_1, _add_2, _add_3, _add_4, _add_5)
@@ -537,7 +537,7 @@ def test_loops_that_one_function_makes_are_kept_side_by_side(tmp_path, monkeypat
 
 
 class Changing(NamedTuple):
-    """A tag whose implementation is made anew, as in a notebook."""
+    """A tag whose implementation is redefined, as in a notebook."""
 
 
 @kernel
@@ -561,7 +561,7 @@ def test_a_new_implementation_reaches_compiled_kernels():
 
 
 def test_the_wait_is_told_once_before_the_banner(tmp_path, monkeypatch):
-    """What it is, and that it happens once; not if nobody waits."""
+    """The message says what it is and that it happens once; it is absent if nothing is compiled."""
     monkeypatch.setenv("KARAMELO_PY_CACHE", str(tmp_path))
     out = io.StringIO()
     hub = Hub(Console(out))

@@ -1,4 +1,4 @@
-"""Bodies that rest on a contact stay at rest, however long a step is and whatever pulls on them."""
+"""Bodies resting in contact stay at rest whatever the time step, and hold loads below friction."""
 
 import numpy as np
 import pytest
@@ -47,9 +47,10 @@ def scene(kind: str, *lines: str, kinds: dict = KINDS) -> str:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_shortened_step_leaves_bodies_at_rest(run_interpreted, kind):
-    """A run that ends on time takes two shorter steps: the force stays the weight within 1 %.
+    """The last two steps of run_time are shortened: the contact force stays constant within 1 %.
 
-    Springs as stiff as these steps threw the block back, with up to twice its weight.
+    With contact as stiff as the shortened step allows, the block was thrown up by up to twice its
+    weight.
     """
     log = run_interpreted(scene(kind, "run_time(0.6)", *["run_time(0.0113)"] * 3)).log
     short = log.dt < 0.97 * np.median(log.dt)
@@ -63,9 +64,10 @@ def test_a_shortened_step_leaves_bodies_at_rest(run_interpreted, kind):
 
 @pytest.mark.parametrize("kind", ["surface", "plane"])
 def test_a_smaller_step_leaves_bodies_at_rest(run_interpreted, kind):
-    """Half the step means contact four times as stiff, by degrees: at once, four times the force.
+    """At half the step contact becomes four times as stiff, gradually: the force stays the weight.
 
-    A tenth is what the block still moves by, whose period on the softest of them is 40 steps.
+    If it did so at once, the force would be four times the weight. The tolerance of a tenth covers
+    remaining oscillation, whose period on the softest contact is 40 steps.
     """
     text = scene(kind, "set_dt(0.004)", "run(70)", "set_dt(0.002)", "run(70)")
     log = run_interpreted(text.replace("time < 0.5", "time < 0.2")).log
@@ -82,10 +84,10 @@ PULL = "\n".join([
 
 @pytest.mark.parametrize("kind", ROUGH)
 def test_friction_holds_what_it_can(run_interpreted, kind):
-    """A pull of 0.2 of the weight, with mu = 0.25: the block rests, held by all of the pull.
+    """A block pulled by 0.2 of its weight with mu = 0.25 rests, and friction balances the pull.
 
-    Friction that only stops what a point has let it creep for ever, by 2 m/s^2 times the step and
-    the rows of points above the contact: 0.03 m/s here, an eighth of the height from 0.4 on.
+    Friction that only cancels the present slip of a point lets the block creep: by 2 m/s^2 times
+    the time step and the number of rows of points above the contact, 0.03 m/s here.
     """
     log = run_interpreted(scene(kind, PULL, "run_time(0.65)", kinds=ROUGH)).log
     late = log.Time > 0.4
@@ -100,9 +102,9 @@ SLIDES = "fix(start, initial_velocity_particles, all, 0.7, 0)"
 
 @pytest.mark.parametrize("kind", ["surface", "ball"])
 def test_friction_ends_with_its_load(run_interpreted, kind):
-    """A block slides under a weight that fades, and flies on beside the surface as fast as then.
+    """A block slides while its weight fades, then moves on at constant speed along the surface.
 
-    On a ball, sums that rounding left below 0 let friction drive it, ever more: 1 cell in a step.
+    On a ball, sums slightly below 0 from rounding once let friction accelerate it without limit.
     """
     text = scene(kind, SLIDES, "run_time(1)", kinds=ROUGH)
     text = text.replace("-10*min(time/0.1, 1)", FADES).replace("0.8*(time < 0.5)", "0")

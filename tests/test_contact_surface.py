@@ -41,9 +41,9 @@ SLOPE = """
     ids=["rough", "smooth", "belt"],
 )
 def test_a_block_slides_down(run_script, mu, way, share):
-    """With g (sin - mu cos), Coulomb, and g (sin + mu cos) on a belt that runs ahead of it.
+    """Acceleration g (sin - mu cos), or g (sin + mu cos) on a belt that moves faster downhill.
 
-    What errs by up to 2 % of g sin is the noise of a block that was set down at once.
+    The tolerance of 2 % of g sin covers oscillation of the block, whose weight acts at once.
     """
     done = run_script(SLOPE.format(method="tlmpm", mu=mu, way=way))
     late = done.log.Time > 0.1
@@ -88,11 +88,11 @@ BELT = """
 
 @pytest.mark.full
 def test_a_belt_is_drawn_over_a_bollard(run_script):
-    """Euler and Eytelwein: exp(mu pi) of the load, for a thin belt that is drawn however slowly.
+    """Euler and Eytelwein: a pull of exp(mu pi) times the load for a thin belt, however slow.
 
-    The friction of this belt acts at its inner face, half its thickness nearer to the axis than the
-    force in it: without bending it would take exp(mu pi/1.05). Friction without a memory let it
-    creep over the bollard, with 1.26 of the load.
+    Friction acts on the inner face of this belt, half its thickness nearer to the axis than its
+    tension: without bending the ratio would be exp(mu pi/1.05). Friction without memory let the
+    belt creep at 1.26 times the load.
     """
     done = run_script(BELT)
     late = done.log.Time > 2.65
@@ -122,7 +122,7 @@ SAND = """
 
 
 def facets() -> meshio.Mesh:
-    """A hill of 36 facets that falls by a quarter along x, with sides and a bottom."""
+    """A closed surface whose top of 36 facets slopes down by a quarter along x."""
     x, y = np.meshgrid(np.linspace(-1, 21, 7), np.linspace(-1, 11, 4), indexing="ij")
     z = 4 - 0.25 * x + 0.2 * np.sin(x) * np.cos(y)
     top = np.stack([x, y, z], -1).reshape(-1, 3)
@@ -140,10 +140,10 @@ def facets() -> meshio.Mesh:
 
 
 def test_sand_slides_on_facets(run_script, tmp_path):
-    """Friction takes energy, and the ground carries what falls less.
+    """Friction only dissipates energy, and the force on the ground balances the momentum.
 
-    Sums that rounding left below 0 let friction drive a point without load, from step 180 on: with
-    6 times what presses on the ground, and up to 1 cell in a step.
+    Sums slightly below 0 from rounding once let friction accelerate an unloaded point from step 180
+    on, by up to 1 cell per step and with 6 times the normal force.
     """
     (tmp_path / "run").mkdir()
     facets().write(tmp_path / "run" / "ground.stl", binary=True)
@@ -165,7 +165,7 @@ def test_sand_slides_on_facets(run_script, tmp_path):
 
 
 def pushed(run_interpreted, d: int, die: str, *lines: str, folder: str) -> list[float]:
-    """The force on a block from 0.3 on whose lowest points overlap a region below it."""
+    """Force on a block whose lowest points, just above 0.3, overlap a region below it."""
     names = [f"F_{axis}" for axis in "xyz"[:d]]
     text = block(
         d, *lines, die, "fix(F, contact/surface, all, die)",
@@ -176,7 +176,7 @@ def pushed(run_interpreted, d: int, die: str, *lines: str, folder: str) -> list[
 
 
 def test_any_region_pushes(run_interpreted, tmp_path):
-    """The mould that is all but a block, the block, and a mesh of it: the same forces."""
+    """A block, a plane, the exterior of a block and a mesh give the same forces."""
     corners = np.array([[0.0, 0.0], [0.9, 0.0], [0.9, 0.31], [0.0, 0.31]])
     meshio.Mesh(corners, {"triangle": [[0, 1, 2], [0, 2, 3]]}).write(tmp_path / "die.vtk")
     styles = {
@@ -213,7 +213,7 @@ def test_a_region_without_an_inside_is_refused(run_interpreted, tmp_path, outsid
 
 
 def test_a_point_too_deep_ends_the_run(run_interpreted):
-    """The way out of what lies more than a cell below the surface is not known."""
+    """More than a cell below the surface the direction outwards is not known."""
     lines = "region(die, block, 0, 0.9, 0, 0.9)", "fix(F, contact/surface, all, die)"
     said = run_interpreted(block(2, *lines, "set_dt(1e-9)", "run(1)"), status=1).err
     assert "point 1 of solid 'body' is so deep in region 'die' of fix 'F'" in said
@@ -244,7 +244,7 @@ RUBBED = "fix(F, contact/surface, all, die, 0.3, 0.2*time, 0)"
 
 
 def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script, monkeypatch):
-    """As one of a plug-in, which has no outline: by depths that Python finds; with friction."""
+    """Like a region of a plug-in, without outline: Python computes the depths; with friction."""
     text = block(
         2, "region(die, cylinder, 0.4, -4, 4.31)", RUBBED, "log_modify(custom, step, F_x, F_y)",
         "set_dt(0.001)", "set_output(1)", "run(5)",
@@ -258,7 +258,7 @@ def test_a_region_that_kernels_do_not_know_pushes_with_the_same_force(run_script
 
 
 def test_a_point_too_deep_ends_a_compiled_run(run_script):
-    """Whichever thread finds it: one message, and nothing of the compiler."""
+    """One message whichever thread finds the point, and none from the compiler."""
     text = block(2, "region(die, cylinder, 0.4, -4, 4.9)", RUBBED, "set_dt(1e-9)", "run(1)")
     for threads in (1, 2):
         said = run_script(text, "--threads", str(threads), status=1).err

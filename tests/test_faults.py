@@ -1,4 +1,4 @@
-"""Styles that are wrong: one message says which, of what package, where in the script, and why."""
+"""Faulty styles of plug-ins: one message names style, package, line of the script and reason."""
 
 import os
 import re
@@ -42,7 +42,7 @@ NAMES = {"oneword": "OneWord", "forget": "forget"}
 def site(tmp_path_factory):
     """A folder with the package mpm-broken."""
     folder = tmp_path_factory.mktemp("faults")
-    # A link: a file newer than this process would leave later tests without keys of kernels.
+    # A link: with a file newer than this process, later tests would find no kernels on disk.
     (folder / "mpm_broken.py").symlink_to(Path(__file__).with_name("mpm_broken.py"))
     styles = {
         f"karamelo_py.{family}": {
@@ -228,7 +228,7 @@ STRENGTH = "eos(e, linear, 3, 100)\n{}\nmaterial(m, eos-strength, e, s)"
 
 
 def scene(line):
-    """A run with a line in its place, by the command of the line."""
+    """A script with this line in place of the usual one of its command."""
     kind = line.partition("(")[0].replace("compute", "dump")
     if kind == "strength":
         kind, line = "material", STRENGTH.format(line)
@@ -300,8 +300,7 @@ def test_a_material_names_the_part(hub, style, message):
     )
 
 
-def test_a_hook_makes_a_vector(run_interpreted):
-    """Of the class of one that it is given."""
+def test_a_hook_makes_a_vector_of_the_class_it_is_given(run_interpreted):
     folder = run_interpreted(scene("fix(s, turning, all)")).folder
     vx = [np.loadtxt(folder / f"d.{step}.LAMMPS", skiprows=11)[:, -1] for step in (0, 1, 2)]
     assert (vx[0] == 1).all()
@@ -362,7 +361,7 @@ class View(PointsView):
 
 
 def test_ids_are_those_of_dumps(run_interpreted):
-    """They count from 1 in hooks, too."""
+    """In hooks, too, they count from 1."""
     folder = run_interpreted(scene("fix(s, ids, all)")).folder
     columns = np.loadtxt(folder / "d.2.LAMMPS", skiprows=11)
     np.testing.assert_array_equal(columns[:, -1], columns[:, 0])

@@ -1,4 +1,4 @@
-"""Who writes into a folder, and what ends with what: runs, studies and their orphans."""
+"""Folders that several processes would write to, and processes that end with their parent."""
 
 import os
 import signal
@@ -34,7 +34,7 @@ def wait_for(path: Path) -> None:
 
 
 def writers(folder: Path) -> list[int]:
-    """Processes that work in a folder."""
+    """Process ids whose working directory is `folder`."""
     found = []
     for link in Path("/proc").glob("[0-9]*/cwd"):
         try:
@@ -47,7 +47,7 @@ def writers(folder: Path) -> list[int]:
 @linux
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGKILL])
 def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
-    """However it ends; and while it is at work, an equal one is refused."""
+    """Also if the study is killed; while it runs, a second one in the same folder is refused."""
     (tmp_path / "in.a").write_text(LONG)
     words = ("sweep", "in.a", "-var", "E=1,2", "-jobs", "1", "-record", "Step")
     study = started(tmp_path, *words)
@@ -71,7 +71,7 @@ def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
 
 @posix
 def test_two_runs_in_one_folder(tmp_path):
-    """The second is refused, whatever its log is called: both would write the same dumps."""
+    """The second is refused even with another log, since both would write the same dumps."""
     (tmp_path / "in.a").write_text(LONG)
     first = started(tmp_path, "in.a", "-log", "a.mpm")
     try:
@@ -99,7 +99,7 @@ def test_a_run_without_a_log(run_interpreted):
 @posix
 @pytest.mark.parametrize("closed", [(1,), (2,), (0, 1, 2)])
 def test_output_that_is_closed(tmp_path, closed):
-    """As by >&- in a shell: the run goes on, and no file takes the place of what is closed."""
+    """As with >&- in a shell: the run goes on, and no file gets a closed descriptor."""
     text = LONG.replace("set_output(100)", "set_output(1)").replace("100000000", "2")
     (tmp_path / "in.a").write_text(text)
     run = started(tmp_path, "in.a", preexec_fn=lambda: [os.close(at) for at in closed])
@@ -123,7 +123,7 @@ def test_a_folder_that_is_gone(tmp_path):
 
 @posix
 def test_a_study_without_room(tmp_path):
-    """A limit of the size of files stands for a full disk."""
+    """A limit on file sizes stands in for a full disk."""
     (tmp_path / "in.a").write_text(LONG.replace("100000000", "2"))
     limited = (
         "import resource, sys; sys.dont_write_bytecode = True; "

@@ -26,7 +26,6 @@ class Timings:
         self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
         self._depth = 0  # of nested compilation
         self._begun = np.zeros(2)
-        self._says = True
 
     @contextmanager
     def counted(self, name: str) -> Iterator[None]:
@@ -36,6 +35,7 @@ class Timings:
 
     @contextmanager
     def telling_of_compilation(self) -> Iterator[None]:
+        self._says = True
         telling = files.telling(partial(self.hub.warn, hint=ANOTHER_FOLDER))
         with compilation.told_to(self), telling:
             yield
