@@ -39,7 +39,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.contact import Bodies, ListedPairs, SeparateFields, list_pairs
 from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
-from karamelo_py.kernels.table import AtNodes, Once, each_point
+from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, SOFT, direction_of
 from karamelo_py.kernels.views import place_at, state_at, volume_of
@@ -699,22 +699,21 @@ def _reaction(body, s):
 
 
 @noinline
-def _follow(body, s, again):
-    """Let a body's nodes follow the surfaces that it touches, for the velocity that deforms these.
+def _follow(s, n, again):
+    """Let a node of a body follow the surface that it touches, for the velocity that deforms this.
 
     A light body may be faster than the surface until the gap is closed: straining it by the body's
     velocity would add more energy than the body has. `again`: v* of this step is known.
     """
     contact, nodes = s.contact, s.nodes
-    for r in range(1, 1 + s.spans[0, 0]):
-        for n in range(s.spans[r, 0], s.spans[r, 1]):
-            if n // contact.stride == body.field and nodes.sums[n, MASS] > 0:
-                for other in range(contact.slot.size):
-                    m = n + (other - body.field) * contact.stride
-                    if other != body.field and not contact.rigid[other] and nodes.sums[m, MASS] > 0:
-                        for k in range(s.kin.dimension):
-                            v = nodes.update[m, k] if again else nodes.velocity[m, k]
-                            nodes.velocity[n, k] = v
+    for body in s.bodies.bodies:
+        if n // contact.stride == body.field and nodes.sums[n, MASS] > 0:
+            for other in range(contact.slot.size):
+                m = n + (other - body.field) * contact.stride
+                if not contact.rigid[other] and nodes.sums[m, MASS] > 0:
+                    for k in range(s.kin.dimension):
+                        v = nodes.update[m, k] if again else nodes.velocity[m, k]
+                        nodes.velocity[n, k] = v
 
 
 # --- rows -------------------------------------------------------------------------------------
@@ -756,20 +755,6 @@ def _part(s):
             add_to(s.control.totals, WORK, -0.5 * change)
 
 
-@kernel
-def _follow_again(s):
-    for body in s.bodies.bodies:
-        if isinstance(s.contact, SeparateFields):
-            _follow(body, s, True)
-
-
-@kernel
-def _follow_before(s):
-    for body in s.bodies.bodies:
-        if isinstance(s.contact, SeparateFields):
-            _follow(body, s, False)
-
-
 def _lead_point(s, block, p):
     """Give a point of a body its mean velocity in the step, which displaces it exactly."""
     for body in s.bodies.bodies:
@@ -790,6 +775,14 @@ def _lead(body, s, points, p):
 
 FreeBodies.rows_first = (Once(_meet),)  # type: ignore[attr-defined]
 FreeBodies.rows_last = (Once(_part), each_point(_lead_point, Rigid))  # type: ignore[attr-defined]
-BodiesAtPoints.rows_last = (*FreeBodies.rows_last, AtNodes(POST_CONTACT, ON_UPDATE))  # type: ignore[attr-defined]
-FreeBodies.rows_before = (Once(_follow_before),)  # type: ignore[attr-defined]
-FreeBodies.rows_after = (Once(_follow_again),)  # type: ignore[attr-defined]
+FreeBodies.rows_before = (  # type: ignore[attr-defined]
+    each_node(lambda s, n: _follow(s, n, False)),
+)
+FreeBodies.rows_after = (  # type: ignore[attr-defined]
+    each_node(lambda s, n: _follow(s, n, True)),
+)
+BodiesAtPoints.rows_last = (  # type: ignore[attr-defined]
+    *FreeBodies.rows_last,  # type: ignore[attr-defined]
+    AtNodes(POST_CONTACT, ON_UPDATE),
+)
+BodiesAtPoints.rows_before = BodiesAtPoints.rows_after = ()  # type: ignore[attr-defined]

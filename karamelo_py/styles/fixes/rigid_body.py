@@ -49,19 +49,6 @@ class Components:
         return [float(item.constant) for item in self.items if item is not None]
 
 
-class Ways:
-    """Annotation: directions in parentheses, such as (x, rz)."""
-
-    script_kind = "directions in parentheses: (x, rz)"
-
-    def __init__(self, argument: Argument, names: list[str]):
-        self.argument, self.names = argument, names
-
-    @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> "Ways":
-        return cls(argument, pieces(argument.text))
-
-
 def pieces(text: str) -> list[str]:
     """Split ``(a, b)`` at the outer commas."""
     if not (text.startswith("(") and text.endswith(")")):
@@ -162,7 +149,7 @@ class RigidBody(Fix):
         torque: Components | None = None,
         motion: Components | None = None,
         turning: Components | None = None,
-        fixed: Ways | None = None,
+        fixed: Argument | None = None,
         pivot: Components | None = None,
         mass: Annotated[float, Positive] | None = None,
         inertia: Components | None = None,
@@ -304,18 +291,18 @@ class RigidBody(Fix):
                 item.evaluate(self.hub.values)
         return items
 
-    def _hold(self, fixed: Ways | None) -> None:
+    def _hold(self, fixed: Argument | None) -> None:
         known = [WAYS[k] for k in self.ways]
-        for name in fixed.names if fixed else ():
+        for name in pieces(fixed.text) if fixed else ():
             if name not in known:
                 raise ScriptError(
-                    f"the body has no direction '{name}'", place=fixed.argument.place,
+                    f"the body has no direction '{name}'", place=fixed.place,
                     expected="some of " + ", ".join(known),
                 )  # fmt: skip
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
                 raise ScriptError(
-                    f"{name} is fixed, and {word} prescribes it", place=fixed.argument.place,
+                    f"{name} is fixed, and {word} prescribes it", place=fixed.place,
                     expected="one of the two",
                 )  # fmt: skip
             self.led[WAYS.index(name)] = Expression(0.0)
