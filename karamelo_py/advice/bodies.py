@@ -172,7 +172,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Smooth plates hold all sides of a box but one, so that it deforms evenly.
+    """Smooth plates hold all sides of a box but one.
 
     A plate is a fix that holds all nodes of one side in its normal direction.
     """

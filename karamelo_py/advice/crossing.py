@@ -106,7 +106,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Time until a body meets each box ahead of it, (n, d); inf if never."""
+    """Time until a body meets each box ahead, (n, d); inf if never."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)
@@ -123,7 +123,7 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Path so far, as a mean over stressed material; 0 if loads maintain the stress."""
+    """Path, as a mean over stressed material; 0 if loads maintain the stress."""
     energy = facts.simulation.control.energy[0]
     matters = energy.watch_energy and energy.lost > OF_ENERGY and loses(facts)
     loaded = energy.supplied > LOADED * energy.largest_energy

@@ -23,7 +23,7 @@ APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain the `status` of a failed step.
+    """Explain a failed step.
 
     `smaller` is the step to suggest if it was too large from the start.
     """
@@ -126,7 +126,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """Point with the smallest id: id, old and new position, velocity, grid."""
+    """With the smallest id: id, old and new position, velocity, grid."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling

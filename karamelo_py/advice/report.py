@@ -146,7 +146,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """The largest number of unknowns of an implicit step, and the memory of its matrix.
+    """Unknowns of an implicit step, and the memory of its matrix.
 
     Nodes couple if a point sees both.
     """

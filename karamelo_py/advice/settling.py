@@ -26,7 +26,7 @@ class Settling(NamedTuple):
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Displacement of bodies at rest that settle on their supports.
+    """Displacement of bodies that settle by their weight.
 
     The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
     + m_1/m), with the speed c of longitudinal waves.

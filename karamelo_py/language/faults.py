@@ -20,7 +20,7 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 @contextmanager
 def as_script_error(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
-    """Convert an exception of a style (``fix drag``) to an error of the script at `place`.
+    """Convert an exception of a style (``fix drag``) to an error at `place`.
 
     `where` is the active part, such as a hook; the last line in the file of `code` is named.
     """

@@ -76,7 +76,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """True for use of a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
+        """It uses a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -85,7 +85,7 @@ class Dependents:
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Find mistakes after the statement that failed with the error `first`, in order.
+    """Mistakes after the statement that failed with the error `first`, in order.
 
     The interpreter's hub is used for trials; do not use it afterwards.
     """
@@ -150,7 +150,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 def misnamed(
     interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
 ) -> list[ScriptError]:
-    """Wrong names of commands and styles in statements.
+    """Wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
     are valid even if the definition of a `wanting` name failed.

@@ -101,7 +101,7 @@ class Interpreter:
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
-        """Execute the rest of the script on another hub, with copied variables.
+        """Execute the rest on another hub, with copied variables.
 
         This finds mistakes late in a script before a long run.
         """
@@ -319,7 +319,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """True if a name has any meaning, as a call or in later lines."""
+        """As a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful

@@ -93,9 +93,9 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget a module of this name imported by a script in another folder.
+    """Forget a module imported by a script in another folder.
 
-    Returns whether there is a module of this name.
+    True if there is a module of this name.
     """
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
@@ -150,7 +150,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Like `find`, for a statement whose first argument is an ID, not the style."""
+    """As `find`, for a statement whose first argument is an ID, not the style."""
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")

@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """The statements executed so far, except those that only control output (``may_differ``).
+    """Statements executed so far, except those that only control output (``may_differ``).
 
     `values` has the results of value(...) by statement number.
     """
@@ -30,7 +30,7 @@ class Record:
 class Replay:
     """Compares a repeated script with the record in a `file`.
 
-    The record ends at the restart state; its last statement may be an unfinished run (`within`).
+    It ends at the restart state; its last statement may be an unfinished run (`within`).
     """
 
     def __init__(self, record: Record, within: bool, file: str):

@@ -147,7 +147,7 @@ def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Later statements: what they define ("" for a variable), ID and line.
+    """Later statements: definitions ("" for a variable), ID and line.
 
     Starts with the innermost script, `back` statements before its next one.
     """

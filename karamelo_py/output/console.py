@@ -125,7 +125,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show the progress and the activity `within` a step; fast enough for each step.
+        """Show the activity `within` a step, too; fast enough for each step.
 
         `fraction` is None if the end is unknown (run_until, run_while).
         """

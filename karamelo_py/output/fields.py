@@ -155,7 +155,7 @@ class Fields(PointTable):
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Largest value of a function of points, and the first point that has it."""
+        """Largest value, and the first point that has it."""
 
         def of_rank() -> tuple[float, int]:
             best = -inf, 0
@@ -275,7 +275,7 @@ def _bounces(_: Setup, block: Block) -> np.ndarray | None:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial internal energy of a gas; stored energy is relative to it, to retain digits."""
+    """Initial energy of a gas; stored energy is relative to it, to retain digits."""
     law = elastic_law(block.laws)
     if not can(law, taken_heat):
         return None

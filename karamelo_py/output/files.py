@@ -68,7 +68,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open `path` at byte `start` (0: new); an error truncates it to `start`, plus `tail`."""
+    """Open at byte `start` (0: new); an error truncates it to `start`, plus `tail`."""
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
@@ -201,7 +201,7 @@ _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDi
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock a folder or file, if the system can; None if another program has locked it."""
+    """Lock it, if the system can; None if another program has locked it."""
     try:
         import fcntl
 

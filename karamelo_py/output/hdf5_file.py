@@ -22,7 +22,7 @@ _MASK = 0xFFFFFFFF
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open an HDF5 file at its present content; OSError if not HDF5, truncated or damaged."""
+    """Open a file at its present content; OSError if not HDF5, truncated or damaged."""
     import h5py
 
     with path.open("rb", buffering=0) as raw, h5py.File(_Closed(raw), "r") as root:

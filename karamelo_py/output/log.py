@@ -19,7 +19,7 @@ NUMBER_WIDTH = 16  # as -1.234567891e-05
 
 
 class Log(Rhythmic):
-    r"""Table of logged quantities: a header, then rows.
+    r"""Table: a header, then rows.
 
     Columns start at the margin, separated by blanks for ``numpy.loadtxt("log.mpm", skiprows=1)``
     and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; by commas in .csv. Later runs append; if the

@@ -189,7 +189,7 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections where they bend slightly."""
+    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections of slight bends."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)

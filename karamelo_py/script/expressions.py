@@ -109,7 +109,7 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Evaluate (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
+        """(n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 

@@ -25,7 +25,7 @@ _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Statements of a script; arguments of calls stay unparsed.
+    """Statements; arguments of calls stay unparsed.
 
     The first syntax error has further ones in `others`, and correct statements in `statements`.
     """

@@ -23,7 +23,7 @@ _WRITTEN = (
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
-    """Read a regular file of at most `largest` bytes (None: any size).
+    """Read at most `largest` bytes (None: any size).
 
     OSError if it is not regular or cannot be read.
     """

@@ -218,7 +218,7 @@ _MOST_LEVELS = 60
 def program(
     root: Term, place: Callable[[str], tuple[int, int]], *, depth: int | None = None
 ) -> formula.Program:
-    """Compile the stack program of a term.
+    """Stack program of a term.
 
     `place` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
     the program stores no rows.

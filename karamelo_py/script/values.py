@@ -20,8 +20,8 @@ def in_a_row(suffixes: Sequence[str]) -> bool:
 class Values:
     """Named numbers in one array that kernels read and write.
 
-    The array is never reallocated, so references stay valid. Slots 0, 1 and 2 are time, timestep
-    (the number of the step) and dt.
+    It is never reallocated, so references stay valid. Slots 0, 1 and 2 are time, timestep (the
+    number of the step) and dt.
     """
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ class Values:
         return slot
 
     def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES) -> None:
-        """Publish the values of a fix or compute: ``ID_x`` for "x" and so on, ``ID`` for "".
+        """Publish ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other
         suffixes. Earlier names of the ID that `suffixes` lacks are removed.

@@ -38,7 +38,7 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """About `POINTS` of the points (n,), the same in each state; small solids stay complete."""
+    """About `POINTS`, the same in each state; small solids stay complete."""
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)

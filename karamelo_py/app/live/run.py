@@ -79,7 +79,7 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Send the last news and a final error, and wait for open pages to close.
+        """Send the last news and error; wait for open pages to close.
 
         With `waits`, at a terminal, wait for a first page.
         """

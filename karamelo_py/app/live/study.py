@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """The page of a study; `stopped` is set when a viewer ends it.
+    """`stopped` is set when a viewer ends it.
 
     `recorded` are recorded values, `axes` initial axes of the chart; row folders are relative to
     `base`.

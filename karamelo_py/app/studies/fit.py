@@ -133,7 +133,7 @@ class Search:
     def slopes(self, fraction: np.ndarray, both: bool = False) -> np.ndarray:
         """Derivatives (n, variables) towards the middle, or over `both` sides.
 
-        Raises NoDerivatives if runs on both sides fail.
+        NoDerivatives if runs on both sides fail.
         """
         moves = np.diag(np.where(fraction < 0.5, STEP, -STEP))
         first, *ahead = self.differences(fraction, *(fraction + moves))
@@ -166,7 +166,7 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """The lowest point around an end, along variables and the weakest direction.
+        """The lowest point around it, along variables and the weakest direction.
 
         `end` gets slopes over both sides.
         """

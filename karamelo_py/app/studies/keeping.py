@@ -18,10 +18,9 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 
 
 class Kept(NamedTuple):
-    """Verdict on the column in a run.
+    """Verdict: ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step) ...
 
-    ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step), ``unknown`` (given
-    up or killed); a part of the energy ``falls`` or ``grows``.
+    ``unknown``: given up or killed; a part of the energy ``falls`` or ``grows``.
     """
 
     word: str
@@ -35,7 +34,7 @@ class Kept(NamedTuple):
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Verdict on `y` over `x`, and the mean of its last part over the first."""
+    """Verdict, and the mean of the last part over the first."""
     span = ENDS * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
@@ -50,7 +49,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a column in a run; values of the computes `parts` are no totals."""
+    """Values of the computes `parts` are no totals."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -78,7 +77,7 @@ def _general(note: Mapping[str, str]) -> str:
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """Write a Markdown table with rows by the variables `by`, and list silent failures.
+    """A Markdown table with rows by the variables `by`, and silent failures.
 
     Messages follow, by numbers. Variables in step with row variables are omitted.
     """

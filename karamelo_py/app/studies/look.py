@@ -54,7 +54,7 @@ def place(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Colour, marker and dashes (by number) of each line.
+    """Colour, marker and dashes (by number).
 
     The first variable sets colour and marker, the others the dashes: fixed for known words, else
     the next unused.

@@ -234,7 +234,7 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Mask (n,) of a log's rows with increasing time.
+    """Rows (n,) with increasing time.
 
     A stopped run ends with an earlier good state; one that went back has discarded rows.
     """

@@ -153,7 +153,7 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
 ) -> Row:
-    """Make the row of a run; unknown cells are None.
+    """Unknown cells are None.
 
     A failed run has no recorded values. A finished run's reason is why a value is missing.
     """

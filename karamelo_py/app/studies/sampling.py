@@ -84,7 +84,7 @@ def _law(name: str, kind: str, text: str) -> Any:
 def samples(
     laws: Sequence[Any], count: int, sequence: str, seed: int, factor: np.ndarray | None = None
 ) -> np.ndarray:
-    """Draw (count, variables); `factor`: Cholesky factor of the correlation of normal scores.
+    """(count, variables); `factor`: Cholesky factor of the correlation of normal scores.
 
     A longer Sobol' or Halton sequence begins with the shorter one.
     """
@@ -101,7 +101,7 @@ def samples(
 
 
 def correlation(path: Path, names: Sequence[str]) -> np.ndarray:
-    """Cholesky factor of the matrix in a file whose columns have the names of the variables."""
+    """Cholesky factor of the matrix in a file with the variables' names."""
     table = read_table(path)
     for name in names:
         if name not in table:
@@ -143,7 +143,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def prepare(options: Namespace) -> dict[str, Any]:
-    """Replace random variables in the options by lists of samples; return facts for the record."""
+    """Random variables become lists of samples; facts for the record."""
     from_formulas = any(CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
     if not options.sample:
         if from_formulas:

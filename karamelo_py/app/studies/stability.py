@@ -178,7 +178,7 @@ def in_short(row: Row, code: str) -> str:
 
 
 class Map:
-    """A stability map over one or two `axes` of the variables in `values`.
+    """Stability over one or two `axes` of the variables in `values`.
 
     Growth is measured by the log column `energy` by more than the factor `bound`, else by the
     program. The column `error` shades stable cells. Variables go in step with their `leaders`.

@@ -243,7 +243,7 @@ def _said(case: Mapping[str, str]) -> str:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """Fit the time of a case by ridge regression of logarithms.
+    """Time by ridge regression of logarithms.
 
     A product of powers of its numbers and factors of its words.
     """
@@ -327,7 +327,7 @@ def open_study(
     options: Namespace, plan: variables.StudyPlan, out: Path, items: Sequence[Recorded], *,
     axes: Sequence[str] = (), facts: Row, **settings: Any,
 ) -> Study:  # fmt: skip
-    """Start a study: lock its folder, write `facts` of it, open its page with `axes`.
+    """Lock its folder, write `facts` of it, open its page with `axes`.
 
     `settings` are further fields of `Study`.
     """

@@ -71,7 +71,7 @@ def _spread(name: str, value: str) -> list[str]:
 def cases(
     values: dict[str, list[str]], zipped: Sequence[Sequence[str]] = (), where: Sequence[str] = ()
 ) -> list[dict[str, str]]:
-    """Combine the values of all variables, the first one changing slowest.
+    """Combine all values, the first variable changing slowest.
 
     Variables `zipped` go in step; `where` are conditions.
     """

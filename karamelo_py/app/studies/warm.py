@@ -72,7 +72,7 @@ class WarmProcesses:
     def start(
         self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Start a run with output and error in `files`; return the child's pid, or None."""
+        """Start a run whose output and error go to `files`; the child's pid, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
-    """Base of computes of means: `terms` of points are weights, and weights times quantities.
+    """Base of means: `terms` of points are weights, and weights times quantities.
 
     With zero total weight the mean is 0.
     """

@@ -56,7 +56,7 @@ class Dump(Rhythmic):
         self.hub.warn(begins_anew(self.path()), place=self.place)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], owner: str) -> None:
-        """Warn of columns that are 0 because no point or node (`owner`) stores them."""
+        """Columns are 0 because no point or node (`owner`) stores them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {owner} have no such field")

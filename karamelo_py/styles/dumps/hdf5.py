@@ -79,7 +79,7 @@ class Hdf5Dump(TableDump):
             raise ScriptError(f"cannot write {path}: {message}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
-        """Check that the disk has room for a snapshot of any content.
+        """Refuse a disk without room for a snapshot of any content.
 
         HDF5 writes at any time, and may neither report nor survive a failure.
         """
@@ -97,7 +97,7 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Continue the file of an earlier run, with the snapshots that it had then.
+        """Continue with the snapshots of an earlier run.
 
         They are rewritten for equal bytes. A file that a killed program was writing can be read but
         not written.
@@ -205,7 +205,7 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Open the file so that its content stays readable if the program dies.
+    """Open it so that its content stays readable if the program dies.
 
     h5py's swmr=True also opens a file that a killed program has left, if it was opened that way
     from the start (`h5py.File.swmr_mode` does it a moment later).
