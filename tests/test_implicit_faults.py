@@ -219,7 +219,7 @@ def test_multigrid_that_fails_is_no_singular_matrix(monkeypatch, recwarn):
     with pytest.raises(solvers.Unconverged):
         solvers.amg(A, b, rigid, 1e-10, {})
     assert not recwarn.list
-    monkeypatch.setattr(solvers, "MANY", 10)
+    monkeypatch.setattr(solvers, "AMG_FROM", 10)
     assert np.allclose(A @ solvers.solve("auto", A, b, rigid, 1e-10, {}), b)
     monkeypatch.setattr(solvers, "find_spec", lambda name: None)
     monkeypatch.setattr(solvers, "amg", None)
