@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import numpy as np
+
 from karamelo_py.kernels import pore_water as rows
 from karamelo_py.language import registry
 from karamelo_py.points.basis.linear import Linear
@@ -10,6 +12,7 @@ from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
 from karamelo_py.points.laws.pore_water import Saturated
 from karamelo_py.points.transfers.flip import FLIP, PIC, FLIPPerTime
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.views import PointsView
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place, ScriptError
 
@@ -39,6 +42,10 @@ class PoreWater(NamedTuple):
     def heavier(self, dry: float) -> float:
         """Density of soil and water over the `dry` density."""
         return 1 + self.n * self.rho / dry
+
+    def set_pressure(self, points: PointsView, pressure: np.ndarray) -> None:
+        """Set the pressure (n,) of the water of points; the dry ones are unaffected."""
+        points.impose(rows.impose_pore_pressure, pressure, Saturated)
 
     def check(self, hub: Hub) -> None:
         """Refuse unsupported combinations, all in one message."""

@@ -287,22 +287,26 @@ class InitialStress(Fix):
     ):  # fmt: skip
         super().__init__(hub, group)
         self.formulas = (sxx, syy, szz, syz, sxz, sxy)
-        for solid in hub.solids.values():
-            law = solid.material.whole
-            follows = not can(elastic_law(law), with_stress) or can(law, ignited)
-            if group.touches(solid) and follows:
-                raise ScriptError(
-                    f"the stress of solid '{solid.id}' follows from its deformation "
-                    "and cannot be set",
-                    argument="group",
-                    expected="a material in rate form, such as linear, or eos-strength but for jwl",
-                )
+        refuse_following(hub, group)
 
     def initial_integrate(self, points: PointsView) -> None:
         x, x0 = points.position, points.reference_position
         named = zip(NAMES, self.formulas, strict=True)
         values = self.hub.values
         points.set_stress({n: f.evaluate_points(values, x, x0) for n, f in named if f is not None})
+
+
+def refuse_following(hub: Hub, group: ParticleGroup) -> None:
+    """Refuse points of materials whose stress follows from their deformation."""
+    for solid in hub.solids.values():
+        law = solid.material.whole
+        follows = not can(elastic_law(law), with_stress) or can(law, ignited)
+        if group.touches(solid) and follows:
+            raise ScriptError(
+                f"the stress of solid '{solid.id}' follows from its deformation and cannot be set",
+                argument="group",
+                expected="a material in rate form, such as linear, or eos-strength but for jwl",
+            )
 
 
 class Detonation(Fix):
