@@ -309,6 +309,12 @@ def test_a_pendulum(run_interpreted, d):
     assert np.ptp(log.b_x) == 0
 
 
+def test_a_body_that_touches_nothing_is_reported(run_interpreted):
+    text = HIT.format(method="ulmpm", touch="", ratio=1).replace(", f_y", "")
+    result = run_interpreted(text.replace("run(20)", "run(1)"))
+    assert "it passes through other solids" in result.err and "contact/rigid_body" in result.err
+
+
 @pytest.mark.full
 @pytest.mark.parametrize("scene", ["in.rolling", "in.floating"])
 def test_one_thread_or_two(run_script, scene):

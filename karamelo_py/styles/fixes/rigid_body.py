@@ -497,6 +497,20 @@ def surfaces_of(body: Any) -> list[ContactRigidBody]:
     return [f for f in fixes if isinstance(f, ContactRigidBody) and f.body is body.body]
 
 
+def _touches_nothing(fix: Any, scene: Any) -> bool:
+    """Return True if other solids on its grid do not notice a body."""
+    method, solids = scene.hub.update.method, scene.hub.solids.values()
+    soft = any(not can(solid.material.law, constrained_velocity) for solid in solids)
+    return soft and not (surfaces_of(fix) or method.fields_per_solid or method.own_grids)
+
+
+known_failure(
+    RigidBody,
+    "body '{part.body.id}'",
+    when=_touches_nothing,
+    reason="it passes through other solids: a rigid body has no mass on a common grid",
+    cure="fix(ID, contact/rigid_body, all, {part.body.id}, mu), or method(ulmpm/contacts, ...)",
+)
 known_failure(
     ContactRigidBody,
     "points in the body '{part.body.id}'",
