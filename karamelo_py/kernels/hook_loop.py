@@ -473,6 +473,7 @@ def _work_at_nodes(members, call, count):
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
     velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
+    sums, momentum = members.nodes.sums, arrays.of_momentum(members.kin)
     hooks, control, dt, terms = call.hooks, call.control, call.dt, call.hooks.scratch[WORKS]
     for c in range(members.kin.dimension):
         for q in range(count):
@@ -480,8 +481,10 @@ def _work_at_nodes(members, call, count):
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n) and not _is_of_rigid(hooks, n)
-            later = velocity[n, c] if again else update[n, c]
-            moved = update[n, c] - update[n, change + c] + later
+            # XPIC has replaced the change of v* by then.
+            moved = 2 * update[n, c] - update[n, change + c]
+            if again and counts:
+                moved = velocity[n, c] + sums[n, momentum + c] / sums[n, arrays.MASS]
             terms[q] = 0.5 * dt * load * moved if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 

@@ -372,7 +372,7 @@ def sum_series(s: Setup) -> tuple:
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     terms = Repeated(lambda s: s.transfer.order - 1, _next_term)
-    return WORK_OF_LOADS, NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
+    return NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
 
 
 def _next_term(k: int) -> tuple:
