@@ -217,6 +217,17 @@ def test_work_on_nodes_of_little_mass_is_what_points_take(run_interpreted, schem
     assert "energy balance" not in result.err
 
 
+@pytest.mark.full
+def test_work_on_nodes_of_little_mass_in_xpic(run_interpreted):
+    """Its series takes some per cent; by v* of the nodes 76 % were lost."""
+    text = PULLED.format("ulmpm", "musl", PULL.replace("1e4*min(time/0.2, 1)", "1e3"))
+    text = text.replace("FLIP, linear, 1", "XPIC, quadratic-spline, 5")
+    text = text.replace("region(bar, block, 0, 2)", "region(bar, block, 0.4, 1.6)")
+    text = text.replace("-0.01, 0.01", "-INF, 0.4").replace("1.99, 2.01", "1.5, INF")
+    result = run_interpreted(text)
+    assert abs(float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])) < 20
+
+
 def test_a_step_above_the_limit_is_named(run_interpreted):
     """A run that blows up stops, names step, cause and cure, and keeps the last good state."""
     lines = ["dt_factor(1.9)", "set_output(100)", "run(400)"]
