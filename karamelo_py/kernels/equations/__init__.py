@@ -202,9 +202,6 @@ def _joined(parts):
     return values, tuple([flat(ways) for ways in zip(*growths, strict=True)])
 
 
-# --- what equations take of a point -------------------------------------------------------------
-
-
 def reads(*names: str) -> Callable:
     """Declare the point fields that a function reads."""
 
@@ -236,9 +233,6 @@ def v(pt):
 def moment(pt):
     """Tensor stored with the velocity; () if none."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
-
-
-# --- tuples of tags -------------------------------------------------------------------------------
 
 
 def empty_all(tasks, w, x):

@@ -136,9 +136,6 @@ class SetMeanStress(eq.Task):
         return eq.Report(real(0, pt.dt), fastest)
 
 
-# --- the averaged ratio in a gather of strain --------------------------------------------------
-
-
 def no_ratio(w, like):
     """Return the initial total of the averaged volume ratio; () without averaging."""
     return (real(0, like),) if isinstance(w.averaging, FBar) else ()
@@ -159,9 +156,6 @@ def averaged(pt, dl, ratio):
     _, _, f = pt.law_state_F
     trial = pt.of(VolumeRatio)[0, pt.p]
     return scaled_increment(pt.w.frame, pt.kin, dl, f, ratio[0] / trial)
-
-
-# --- means at nodes -----------------------------------------------------------------------------
 
 
 @node_task
