@@ -161,6 +161,12 @@ region(last, block, 0.8, 0.9)
 eos(tnt, jwl, 2, 500, 5, 4, 1, 0.3, 5, 30, Q1=1.5)
 material(tnt, eos-strength, tnt, thin)
 solid(tnt, region, last, 2, tnt, 0.1)
+region(first, block, 0, 0.2)
+eos(stone, linear, 2, 100)
+eos(rock, p-alpha, stone, 1.2, 0.1, 5)
+damage(spall, tuler-butcher, 0.1, 1, 0.01)
+material(rock, eos-strength, rock, thin, spall)
+solid(rock, region, first, 2, rock, 0.1)
 fix(light, detonation, all, (x0 - 0.8)/30)
 fix(v, initial_velocity_particles, all, sin(9*x0))
 run(4)
@@ -175,6 +181,7 @@ FLOWS = {
     "g": "mohr-coulomb, 80, 0.1, 30, 5",
     "h": "swift, 80, 0.4, 0.5, 0.01, 0.5",
     "i": "linear, 80",
+    "j": "johnson-holmquist-2, 80, 0.9, 0.6, 0.3, 0.6, 0, 1, 0.2, 2.8, 1.5, 0.005, 1",
 }
 
 

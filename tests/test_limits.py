@@ -17,7 +17,7 @@ STYLES = {
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
     "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],
-    "ceramics": [("strength", "johnson-holmquist"), ("eos", "p-alpha"), ("eos", "ignition")],
+    "concrete": [("strength", "hjc"), ("damage", "gurson"), ("eos", "ignition")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],
 }
