@@ -309,6 +309,13 @@ def test_a_pendulum(run_interpreted, d):
     assert np.ptp(log.b_x) == 0
 
 
+def test_pore_water_is_refused(run_interpreted):
+    text = HIT.format(method="ulmpm", touch=POINTS, ratio=1)
+    wet = "0.3)\npore_water(soft, n=0.3, permeability=1e-5)"
+    result = run_interpreted(text.replace("0.3)", wet, 1), status=1)
+    assert "does not push pore water" in result.err and "a dry material" in result.err
+
+
 def test_a_body_that_touches_nothing_is_reported(run_interpreted):
     text = HIT.format(method="ulmpm", touch="", ratio=1).replace(", f_y", "")
     result = run_interpreted(text.replace("run(20)", "run(1)"))

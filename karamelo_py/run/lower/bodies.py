@@ -90,12 +90,16 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         "runs in one process": settings.comm.size > 1,
         "runs on processors": settings.engine == "gpu",
         "needs double precision": settings.precision != "double",
+        "does not push pore water": any(
+            solid.material.fluid is not None for solid in hub.solids.values()
+        ),
     }
     cure = (
         "scheme(musl), or a prescribed motion: fix velocity_particles",
         "no --ranks; --threads divides the points",
         "no --gpu",
         "no precision(single)",
+        "a dry material",
     )
     for fix in moving:
         for (why, refused), hint in zip(wrong.items(), cure, strict=True):
