@@ -198,6 +198,23 @@ def test_an_element_is_undrained(run_interpreted):
     assert abs(table["sxx"] / (-1e7 / (3 * 0.5) * 3e-5) - 1) < 1e-3
 
 
+def test_a_modified_skeleton_keeps_its_water(run_interpreted):
+    script = (
+        COLUMN
+        + """
+        fix(hold, velocity_nodes, all, 0)
+        fix(p, initial_pore_pressure, all, 100*x0)
+        compute(p, probe, all, pore_pressure)
+        log_modify(custom, step, p)
+        run(2)
+        modify(material, clay, E=2e7)
+        run(1)
+    """
+    )
+    log = run_interpreted(script.replace("N = 16", "N = 4")).log
+    assert abs(log["p"][-1] / 50 - 1) < 1e-6
+
+
 REFUSED = {
     "method(ulmpm, APIC, quadratic-spline)": "transfer APIC",
     "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",

@@ -106,8 +106,9 @@ def _names(part: MaterialPart) -> set[str]:
 def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> MaterialPart:
     made, values = remade(hub, entry.kind, entry.style, values, numbers)
     after = type(entry)(entry.kind, entry.style, made, values)
-    if isinstance(after, Material):
+    if isinstance(after, Material) and isinstance(entry, Material):
         fit_to_domain(hub, after)
+        after.fluid = entry.fluid
     after.id, after.place = entry.id, entry.place
     return after
 
