@@ -63,8 +63,7 @@ def drift_of(facts: BasicFacts) -> Noise | None:
     if not (facts.scheme.traits.keeping and facts.moves and facts.kept > 0.9) or _thrown(facts):
         return None
     limits = drift_limits(facts.basis)
-    averages = facts.scheme.traits.bears_drift
-    bound = (limits.averaged if averages else limits.drift)[facts.sparse]
+    bound = (limits.averaged if facts.scheme.traits.bears_drift else limits.drift)[facts.sparse]
     bound /= limits.line if facts.d == 1 else 1
     speed = cells = 0.0
     for body in vibrating(facts):
@@ -83,17 +82,14 @@ def drift_of(facts: BasicFacts) -> Noise | None:
 
 
 def _thrown(facts: BasicFacts) -> bool:
-    return (
-        len(facts.motions) == 1
-        and bool((facts.motions[0].fast == facts.motions[0].slow).all())
-        and facts.hub.update.boundary != "reflect"
-        and facts.simulation.points.total("stored") == 0
-        and all(
-            fix.first_step_only
-            or (fix.accelerates and all(f is None or f.is_constant for f in fix.formulas))
-            for fix in facts.hub.fixes.values()
-        )
-    )
+    if len(facts.motions) != 1 or facts.hub.update.boundary == "reflect":
+        return False
+    for fix in facts.hub.fixes.values():
+        steady = fix.accelerates and all(f is None or f.is_constant for f in fix.formulas)
+        if not (fix.first_step_only or steady):
+            return False
+    even = bool((facts.motions[0].fast == facts.motions[0].slow).all())
+    return even and facts.simulation.points.total("stored") == 0
 
 
 def turn_of(facts: BasicFacts) -> Noise | None:
@@ -101,8 +97,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
     if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
         return None
     limits, dt, most = drift_limits(facts.basis), facts.simulation.dt, None
-    averages = facts.scheme.traits.bears_drift
-    bound = (limits.rim_averaged if averages else limits.rim)[facts.sparse]
+    bound = (limits.rim_averaged if facts.scheme.traits.bears_drift else limits.rim)[facts.sparse]
     for body in vibrating(facts):
         spin, reach = body.motion.spin, body.motion.reach
         speed, angle = spin * reach / facts.waves, spin * facts.duration
@@ -145,11 +140,8 @@ def sides(body: Body) -> np.ndarray:
 
 def fixed_directions(facts: BasicFacts, body: Body) -> np.ndarray:
     """Directions (d,) in which fixes hold nodes at a body."""
-    directions = np.zeros(facts.d, np.bool_)
-    for fix, x in fixes_at(facts, body):
-        if len(x):
-            directions |= [formula is not None for formula in fix.formulas[: facts.d]]
-    return directions
+    fixes = [fix for fix, x in fixes_at(facts, body) if len(x)]
+    return np.array([any(fix.formulas[k] is not None for fix in fixes) for k in range(facts.d)])
 
 
 def is_free(facts: BasicFacts, body: Body) -> bool:

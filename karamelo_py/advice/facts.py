@@ -58,6 +58,7 @@ class SceneFacts(BasicFacts):
 
     drift, rotation = cached_property(drift_of), cached_property(turn_of)
     lag, crossing = cached_property(lag_of), cached_property(expected)
+    driven = cached_property(settling.driven)
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
     # Step over the stable step, and over the limit for neighbours of different density.

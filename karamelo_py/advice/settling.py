@@ -15,8 +15,9 @@ from karamelo_py.advice.bodies import fixes_at, lattice_at, sides, yields
 from karamelo_py.advice.crossing import loses
 from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
+from karamelo_py.script.expressions import Expression
 
-CELLS = 0.25  # displacement at rest: below, hardly a point crosses a cell
+CELLS = 0.25  # displacement: below, hardly a point crosses a cell
 
 
 class Settling(NamedTuple):
@@ -67,3 +68,25 @@ def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
     if not len(x):
         return False
     return bool(x.max() < body.motion.low[k] + h or x.min() > body.motion.high[k] - h)
+
+
+def driven(facts: BasicFacts) -> Settling:
+    """Cells by which fixes on nodes stretch, compress or shear an elastic body."""
+    most = Settling()
+    for body in facts.bodies if facts.moves and facts.scheme.traits.inertia else ():
+        held = [(f, x) for f, x in fixes_at(facts, body) if len(x) and body.solid in facts.elastic]
+        for k in range(facts.d):
+            ways = [_way(facts, fix.formulas[k], x) for fix, x in held if fix.formulas[k]]
+            cells = np.ptp(ways, axis=0).max() / body.solid.h if ways else 0.0
+            most = max(most, Settling(body.solid.id, 0.0, cells), key=lambda each: each.cells)
+    return most if most.cells > CELLS else Settling()
+
+
+def _way(facts: BasicFacts, formula: Expression, x: np.ndarray) -> np.ndarray:
+    """Displacements at the mean position, at some times."""
+    values, now, speeds = facts.hub.values, facts.hub.update.time, np.zeros(16)
+    for n in range(16):
+        values.set("time", now + facts.duration * (n + 0.5) / 16)
+        (speeds[n],) = formula.evaluate_points(values, x.mean(axis=0, keepdims=True))
+    values.set("time", now)
+    return np.cumsum(speeds) * facts.duration / 16

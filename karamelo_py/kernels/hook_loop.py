@@ -636,7 +636,6 @@ def _act_on_motion(members, task, call, count):
         # Forces act while the hook moves a point from its initial velocity in the step.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
-        rigid = leads and hooks.table[h].uses_place == 0
         for q in range(count):
             p = hooks.chosen[q]
             velocity, position, total = _call_point_function(
@@ -653,7 +652,7 @@ def _act_on_motion(members, task, call, count):
             y[c, p] = position
             for moment in members.moments:
                 # Otherwise nodes, and strains around, follow what the point had from the grid.
-                for k in range(d if rigid else 0):
+                for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
             if slot >= 0:
                 totals.add_to(control.totals, slot + c, total)

@@ -26,8 +26,7 @@ class USL(NamedTuple):
     points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
     scaled by mass / limit. Momentum is conserved.
 
-    Strains must contain velocities that fix velocity_particles prescribes: with it, on points that
-    deform, steps are those of musl.
+    With fix velocity_particles on points that deform, steps are those of musl.
 
     Example
     -------

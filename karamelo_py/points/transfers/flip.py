@@ -14,6 +14,7 @@ Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 
 SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
 LAG = 0.03  # of a free body's angular velocity
 BRAKED = 0.05  # of its rotational energy
+BARELY = 0.01  # revolutions without relevant energy
 TURNS = 1.5  # revolutions of a free body with a relevant loss by FLIP
 
 
@@ -177,7 +178,7 @@ def _lags(transfer, scene):
 def _brakes(transfer, scene):
     """Energy loss of a free rotation: (1 - alpha) of the lag per step, twice."""
     lag, simulation = scene.lag, scene.simulation
-    if not lag.fraction > 0:
+    if not lag.turns > BARELY:
         return None
     step = simulation.steps.limit if transfer.traits.per_time else simulation.dt
     gone = 1 - exp(-2 * (1 - transfer.alpha) * lag.fraction * scene.duration / step)

@@ -50,7 +50,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
         lines, values = lines + length, values + len(constants)
     soft = np.ones(count, np.bool_)
     for solid in hub.solids.values():
-        if can(solid.material.law, constrained_velocity):
+        if solid.rigid:
             soft[solid.first_id : solid.first_id + solid.count] = False
     surfaces = tuple(
         kernel.TouchingSurface(

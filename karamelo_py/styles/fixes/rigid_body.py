@@ -11,7 +11,6 @@ from karamelo_py.language.arguments import NULL
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import Argument, NonNegative, Positive
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -159,7 +158,7 @@ class RigidBody(Fix):
         if not hub.update.method.fields_per_solid:
             self.node_fields = (RigidSums,)
         d = kin.dimension
-        if not can(solid.material.law, constrained_velocity):
+        if not solid.rigid:
             raise ScriptError(
                 f"solid '{solid.id}' deforms: its material '{solid.material.id}' is not rigid",
                 argument="solid",
@@ -242,8 +241,7 @@ class RigidBody(Fix):
                     kept[at : at + 3] = self.state[at : at + 3]
             self.state[:] = kept
             self._spin_up()
-        laws = {s.id: s.material.law for s in self.hub.solids.values() if s is not self.body}
-        others = [ID for ID, law in laws.items() if can(law, constrained_velocity)]
+        others = [s.id for s in self.hub.solids.values() if s.rigid and s is not self.body]
         if others and before is None:
             self.hub.warn(
                 f"'{self.body.id}' passes through other rigid solids: {', '.join(others)}",

@@ -8,12 +8,11 @@ import numpy as np
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import places_before
-from karamelo_py.points.transfers import stores_moment
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, point_hook
 from karamelo_py.script.errors import plural
-from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
+from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
 
 SAMPLE = 1000  # points at which formulas are compared, about
@@ -161,16 +160,6 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
             yield _said(other, axes, caught)
 
 
-def _slips(fix: Any, scene: Any) -> bool:
-    """Check whether points retain an affine part that their formulas of place do not prescribe."""
-    placed = any(f is not None and f.names & set(POINT_SEEDS) for f in fix.formulas)
-    affine = stores_moment(scene.transfer) and not scene.simulation.implicit
-    if not (placed and affine and fix.leads_points):
-        return False
-    solids = filter(fix.group.touches, scene.hub.solids.values())
-    return len(fix.group) < sum(len(solid.volume0) for solid in solids)  # some are left to pull
-
-
 def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
     by_nodes = other.prescribes_velocity
     return {
@@ -178,9 +167,7 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
         "points": "all nodes around " * by_nodes + plural(len(ids), "point"),
         "axes": " and ".join(f"v{AXES[k]}" for k in axes),
         "more": DIFFERENT * by_nodes,
-        "apart": "nodes that these points do not see"
-        if by_nodes
-        else "groups that have no points in common",
+        "apart": ("groups without common points", "nodes that these points do not see")[by_nodes],
     }
 
 
@@ -220,13 +207,4 @@ known_failure(
     reason="fix '{other.id}' (line {other.place.line}) gives {points} of this group another "
     "{axes}: this fix decides{more}",
     cure="{apart}, or NULL for one of the components",
-)
-known_failure(
-    VelocityOfPoints,
-    "grip '{part.id}'",
-    when=_slips,
-    reason="with formulas of positions, {scene.transfer_name} retains the velocity gradients that "
-    "points have from the grid: the rest of the body slips past them, and the force is too small "
-    "(a bar pulled by two cells of points: by 60 %)",
-    cure="velocities that do not depend on positions; FLIP; or tlmpm with velocity_nodes",
 )
