@@ -498,7 +498,7 @@ def surfaces_of(body: Any) -> list[ContactRigidBody]:
 def _touches_nothing(fix: Any, scene: Any) -> bool:
     """Return True if other solids on its grid do not notice a body."""
     method, solids = scene.hub.update.method, scene.hub.solids.values()
-    soft = any(not can(solid.material.law, constrained_velocity) for solid in solids)
+    soft = not all(solid.rigid for solid in solids)
     return soft and not (surfaces_of(fix) or method.fields_per_solid or method.own_grids)
 
 
