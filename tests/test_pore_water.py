@@ -198,6 +198,16 @@ def test_an_element_is_undrained(run_interpreted):
     assert abs(table["sxx"] / (-1e7 / (3 * 0.5) * 3e-5) - 1) < 1e-3
 
 
+@pytest.mark.parametrize(
+    ("Tv", "word"), [("1e-4", "undrained"), ("0.1", "coupled"), ("3", "drained")]
+)
+def test_check_says_whether_water_flows_in_time(run_interpreted, Tv, word):
+    script = INPUTS / "in.terzaghi"
+    out = run_interpreted(script, "-var", "Tv", Tv, "-var", "N", "4", command="check").out
+    assert f"Tv = {float(Tv):.2g} across the shortest side of 'clay', {word}:" in out
+    assert "flux of the water; water that comes and goes" in out
+
+
 def test_a_modified_skeleton_keeps_its_water(run_interpreted):
     script = (
         COLUMN

@@ -74,6 +74,10 @@ def report(hub: Hub, end_time: float = inf) -> None:
             after = step_after_motion(simulation)
             most = f" ({n / after:.0f} if points move from the start)" if after < 1 else ""
             say(f"steps          about {n:.0f}{most}, {n * one:.1g} s or more")
+            for solid in hub.solids.values():
+                if solid.material.fluid is not None:
+                    words = solid.material.fluid.time_scale(solid, end_time - simulation.time)
+                    say(f"water          {words}")
             slowest = max(hub.fixes.values(), key=lambda fix: fix.seconds(), default=None)
             if slowest is not None and 2 * slowest.seconds() > one:
                 say(f"               most of it for fix {slowest.style} '{slowest.id}'")

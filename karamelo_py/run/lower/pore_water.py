@@ -9,9 +9,12 @@ from karamelo_py.kernels import pore_water as rows
 from karamelo_py.language import registry
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.splines import CubicSpline, QuadraticSpline
+from karamelo_py.points.kinematics import Space
+from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import Saturated
 from karamelo_py.points.transfers.flip import FLIP, PIC, FLIPPerTime
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.script.errors import Place, ScriptError
@@ -19,6 +22,7 @@ from karamelo_py.script.errors import Place, ScriptError
 METHODS = "ulmpm", "tlmpm"
 BASES = Linear, QuadraticSpline, CubicSpline
 KINEMATICS = "1D", "plane-strain", "3D"
+UNDRAINED, DRAINED = 3e-4, 2.0  # c_v t / H^2
 ROWS = rows.AtWater  # registers the rows of such scenes
 
 
@@ -42,6 +46,20 @@ class PoreWater(NamedTuple):
     def heavier(self, dry: float) -> float:
         """Density of soil and water over the `dry` density."""
         return 1 + self.n * self.rho / dry
+
+    def time_scale(self, solid: Solid, duration: float) -> str:
+        """Say whether a solid is drained in a time, across its shortest side."""
+        law, kin = solid.material.whole, Space()
+        M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
+        consolidation = M * self.stiffness / (M + self.stiffness) / self.drag
+        side = min((solid.hi - solid.lo)[: solid.domain.dimension])
+        Tv = consolidation * duration / side**2
+        state = "coupled: water flows during the run"
+        if Tv < UNDRAINED:
+            state = "undrained: less than 2 % of the water flows"
+        elif Tv > DRAINED:
+            state = "drained: the dry soil and its weight in water would do"
+        return f"Tv = {Tv:.2g} across the shortest side of '{solid.id}', {state}"
 
     def set_pressure(self, points: PointsView, pressure: np.ndarray) -> None:
         """Set the pressure (n,) of the water of points; the dry ones are unaffected."""
