@@ -11,7 +11,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
 from karamelo_py.compiler.tuples import flat
-from karamelo_py.kernels.arrays import Nodes, Points, Setup, Tiling, arrays_of
+from karamelo_py.kernels.arrays import Hooks, Nodes, Points, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.totals import WORK, carry
 from karamelo_py.output.fields import PIECE
@@ -217,6 +217,8 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
         memory[memory != 0] = 0
         if "touched/nodes" in state:  # a process without points uses no nodes
             memory[state["touched/nodes"][()]] = state["touched/rows"]
+    if isinstance(simulation.hooks, Hooks):
+        simulation.hooks.loads[:] = 0  # of a step that did not end
     simulation.changed()
 
 
