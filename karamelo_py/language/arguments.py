@@ -116,16 +116,16 @@ class Argument:
 
     def listed(self) -> list[Argument]:
         """The parts of ``(a, b, ...)``, or the argument itself."""
-        if not self.text.startswith("("):
-            return [self]
-        code, start, parts = self._raw.code, self._raw.start, []
+        code, parts = self._raw.code, []
         begin, depth = 1, 0
         for k, letter in enumerate(code):
             depth += (letter == "(") - (letter == ")")
+            if depth == 0 and k < len(code) - 1:
+                return [self]  # (a + b)*(c + d)
             if depth == (letter != ")") and letter in ",)":
-                parts.append(self._from(start + begin, start + k))
+                parts.append(self._from(self._raw.start + begin, self._raw.start + k))
                 begin = k + 1
-        return parts
+        return parts or [self]
 
     def numbers(self) -> list[str]:
         variables = self._interpreter.variables.items()

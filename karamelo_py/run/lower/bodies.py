@@ -14,11 +14,17 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
-from karamelo_py.styles.fixes.rigid_body import ContactRigidBody, RigidBody, surfaces_of
+from karamelo_py.styles.fixes.rigid_body import (
+    ContactRigidBody,
+    RigidBody,
+    bodies_of,
+    contacts_of,
+    surfaces_of,
+)
 
 
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
-    moving = [fix for fix in hub.fixes.values() if isinstance(fix, RigidBody)]
+    moving = bodies_of(hub)
     _refuse(hub, moving)
     held = np.zeros(
         (sum(lattice.node_count for lattice in lattices), hub.domain.dimension), np.bool_
@@ -81,9 +87,8 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
 
 def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     bodies = {fix.body for fix in moving}
-    for fix in hub.fixes.values():
-        if isinstance(fix, ContactRigidBody):
-            _refuse_contact(hub, fix, bodies)
+    for touch in contacts_of(hub):
+        _refuse_contact(hub, touch, bodies)
     method, settings = hub.update.method, hub.settings
     wrong = {
         "takes explicit steps": hub.update.scheme.traits.implicit,

@@ -36,7 +36,7 @@ class Components:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> "Components":
-        parts = [argument.part(text) for text in pieces(argument.text)]
+        parts = argument.listed()
         return cls(argument, [None if p.text == NULL else Expression(p.value(hub)) for p in parts])
 
     def numbers(self) -> list[float]:
@@ -46,21 +46,6 @@ class Components:
                 expected="numbers", hint="motion and turning take formulas of time",
             )  # fmt: skip
         return [float(item.constant) for item in self.items if item is not None]
-
-
-def pieces(text: str) -> list[str]:
-    """Split ``(a, b)`` at the outer commas."""
-    if not (text.startswith("(") and text.endswith(")")):
-        return [text]
-    parts, level, begin, inner = [], 0, 0, text[1:-1]
-    for k, sign in enumerate(inner):
-        level += (sign == "(") - (sign == ")")
-        if level < 0:
-            return [text]  # (a + b) * (c + d)
-        if sign == "," and level == 0:
-            parts.append(inner[begin:k])
-            begin = k + 1
-    return [part.strip() for part in (*parts, inner[begin:])]
 
 
 class RigidBody(Fix):
@@ -174,9 +159,7 @@ class RigidBody(Fix):
         moves = tuple(range(d)) if not kin.hoops else (1,)
         self.ways = (*moves, *spins)
         self.given = velocity is not None, spin is not None
-        self.previous = next(
-            (f for f in hub.fixes.values() if isinstance(f, RigidBody) and f.body is solid), None
-        )
+        self.previous = next((fix for fix in bodies_of(hub) if fix.body is solid), None)
         self.led = self._spread(motion, range(d)) + self._spread(turning, spins, 3)
         self._hold(fixed)
         self.pivot = self._held_at(pivot, velocity)
@@ -291,16 +274,17 @@ class RigidBody(Fix):
 
     def _hold(self, fixed: Argument | None) -> None:
         known = [WAYS[k] for k in self.ways]
-        for name in pieces(fixed.text) if fixed else ():
+        for part in fixed.listed() if fixed else ():
+            name = part.text
             if name not in known:
                 raise ScriptError(
-                    f"the body has no direction '{name}'", place=fixed.place,
+                    f"the body has no direction '{name}'", place=part.place,
                     expected="some of " + ", ".join(known),
                 )  # fmt: skip
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
                 raise ScriptError(
-                    f"{name} is fixed, and {word} prescribes it", place=fixed.place,
+                    f"{name} is fixed, and {word} prescribes it", place=part.place,
                     expected="one of the two",
                 )  # fmt: skip
             self.led[WAYS.index(name)] = Expression(0.0)
@@ -490,9 +474,16 @@ class ContactRigidBody(Fix):
         )
 
 
-def surfaces_of(body: Any) -> list[ContactRigidBody]:
-    fixes = body.hub.fixes.values()
-    return [f for f in fixes if isinstance(f, ContactRigidBody) and f.body is body.body]
+def bodies_of(hub: Hub) -> list[RigidBody]:
+    return [fix for fix in hub.fixes.values() if isinstance(fix, RigidBody)]
+
+
+def contacts_of(hub: Hub) -> list[ContactRigidBody]:
+    return [fix for fix in hub.fixes.values() if isinstance(fix, ContactRigidBody)]
+
+
+def surfaces_of(body: RigidBody) -> list[ContactRigidBody]:
+    return [fix for fix in contacts_of(body.hub) if fix.body is body.body]
 
 
 def _touches_nothing(fix: Any, scene: Any) -> bool:
