@@ -195,6 +195,29 @@ def test_a_page_that_takes_nothing_is_closed(simulation, monkeypatch):
     assert not server.watched
 
 
+def test_a_page_without_a_sign_does_not_hold_a_job(simulation, monkeypatch):
+    """Few news fit into the buffers of a page that reads nothing; open pages send a sign."""
+    monkeypatch.setattr(servers, "AWAY", 0.6)
+    monkeypatch.setattr(servers, "BEAT", 0.1)
+    page = simulation.live()
+    server = page._page.server
+    port, path = re.match(r"http://127\.0\.0\.1:(\d+)(/\S+/)", page.address).groups()
+    with socket.socket() as link:
+        link.connect(("127.0.0.1", int(port)))
+        link.sendall(f"GET {path}events HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        waiting = threading.Thread(target=server.stay, daemon=True)
+        waiting.start()
+        for _ in range(6):
+            time.sleep(0.2)
+            urllib.request.urlopen(f"{page.address}here", data=b"")
+        assert waiting.is_alive() and server.watched
+        waiting.join(10)
+        assert not waiting.is_alive() and server.watched
+    page.close()
+    while server.watched:
+        time.sleep(0.05)
+
+
 def test_pages_end_with_their_simulation(tmp_path):
     before = threading.active_count()
     for _ in range(3):

@@ -19,6 +19,7 @@ from karamelo_py.script.errors import ScriptError
 PATIENCE = 1.0  # seconds for the last news at the end
 BEAT = 2.0  # seconds between messages, to notice closed pages
 STUCK = 30.0  # seconds without receipt: the page counts as closed
+AWAY = 180.0  # seconds without a sign of an open page, after the end; pages send one in 20
 UNKNOWN = 5.0  # seconds to send the secret word
 MOST = 64  # connections; leaves file descriptors for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
@@ -55,7 +56,8 @@ class Server:
         require_plotly()
         self.page, self.news = page, news
         self.answers = {"plotly.js": _plotly, "points.js": _points, **answers}
-        self.actions = actions
+        self.actions = {"here": lambda _: None, **actions}
+        self.heard = 0.0  # time of the last request
         self.version = 0
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}
@@ -83,8 +85,11 @@ class Server:
             )
 
     def stay(self) -> None:
+        """Wait until pages are closed, or give no sign: a page that takes nothing has buffers."""
+        self.heard = time.monotonic()
         with self._changed:
-            self._changed.wait_for(lambda: self.opened and not self._shown)
+            while not self.opened or (self._shown and time.monotonic() < self.heard + AWAY):
+                self._changed.wait(BEAT)
 
     def close(self) -> None:
         self.flush()
@@ -213,6 +218,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())
             if right:
+                server.heard = time.monotonic()
                 self.connection.settimeout(STUCK)
             return (name if right else None), dict(parse_qsl(asked.query))
 

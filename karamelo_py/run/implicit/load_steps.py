@@ -279,7 +279,9 @@ class LoadSteps:
         except Loose as reason:
             where = ", ".join(f"{x:.4g}" for x in equations.positions[int(reason.at)])
             solid = self._solid_at(equations, np.arange(len(nodes)) == reason.at)
-            raise Failed(f"{reason}: nothing holds solid '{solid}' near ({where})") from None
+            raise Failed(
+                f"{reason}: nothing holds solid '{solid}' near ({where}), or it flows there without hardening"
+            ) from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(int(reason.at))}')") from None
         update = simulation.hub.update
