@@ -280,8 +280,8 @@ class LoadSteps:
             where = ", ".join(f"{x:.4g}" for x in equations.positions[int(reason.at)])
             solid = self._solid_at(equations, np.arange(len(nodes)) == reason.at)
             raise Failed(
-                f"{reason}: nothing holds solid '{solid}' near ({where}), or it flows there without "
-                "hardening"
+                f"{reason}: nothing holds solid '{solid}' near ({where}), or it flows "
+                "there without hardening"
             ) from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(int(reason.at))}')") from None
