@@ -58,9 +58,9 @@ def is_free(path) -> bool:
     return True
 
 
-def test_processes_at_once_compile_each_kernel_once(tmp_path):
+def test_processes_at_once_compile_each_kernel_once(tmp_path, compiling):
     """Three start on an empty cache: what one compiles the others read."""
-    shapes = Shapes(tmp_path)
+    shapes = Shapes(compiling, tmp_path)
     with ThreadPoolExecutor() as pool:
         done = list(pool.map(lambda _: shapes.run(), range(3)))
     assert [values for values, _, _ in done] == [VALUES] * 3

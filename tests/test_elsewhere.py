@@ -104,7 +104,8 @@ def test_the_files_of_a_script_travel_with_it(folder):
     (folder / "parts").mkdir()
     (folder / "parts" / "more.txt").write_text('k = 1\nload_file = "loads.csv"\n', "utf-8")
     (folder / "parts" / "loads.csv").write_text("x,y\n0,1\n", "utf-8")
-    (folder / "body.msh").write_text("mesh", "utf-8")
+    (folder / "store.msh").write_text("mesh", "utf-8")
+    (folder / "body.msh").symlink_to(folder / "store.msh")
     (folder / "secret.txt").write_text("not named", "utf-8")
     text = 'mesh = "none"\ninclude(parts/more.txt)\n' + SCRIPT
     (folder / "in.lin").write_text(

@@ -44,6 +44,7 @@ CALLS = {
     "plane_stress": (BARE, "create_domain(0, 1, 0, 1)\nplane_stress(false)"),
     "uniaxial_stress": (BARE, "dimension(1, 0, 1, 0.1)\nuniaxial_stress(false)"),
     "axisymmetric": (BARE, "create_domain(0, 1, 0, 1)\naxisymmetric(true)"),
+    "pore_water": (SCENE, "material(w, linear, 1, 10, 0)\npore_water(w, n=0.4, permeability=1)"),
     "cylindrical": (BARE, "dimension(1, 0, 1, 0.1)\ncylindrical(true)"),
     "spherical": (BARE, "dimension(1, 0, 1, 0.1)\nspherical(true)"),
     "boundary": (SCENE, "boundary(delete)"),

@@ -1,6 +1,7 @@
 """Random variables of studies: distributions, results, probabilities, sensitivity."""
 
 import json
+import re
 
 import numpy as np
 import pandas
@@ -150,6 +151,23 @@ def test_the_settlement_of_a_column(folder):
     table = pandas.read_csv("sweep.csv")
     exact = table.rho * 9.81 * 10**2 / (2 * table.E)
     assert table.u.to_numpy() == pytest.approx(exact.to_numpy(), rel=0.03)
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_each_value_of_another_variable_is_a_sample(folder, capsys):
+    """v = a + 2 b: means differ by 2 between b = 0 and 1; nothing is pooled."""
+    words = ["-var", "a=normal(1, 0.1)", "-var", "b=0,1", "-sample", "6", "-fails", "v_x > 2"]
+    assert main(["sweep", "in.lin", *words, "-record", "v_x"]) == 0
+    out = capsys.readouterr().out
+    first, second = out.split("\nb = 0\n")[1].split("\nb = 1\n")
+    means = [float(re.search(r"^v_x +(\S+)", part, re.M)[1]) for part in (first, second)]
+    assert means[1] - means[0] == pytest.approx(2, rel=1e-3)
+    assert "0 of 6 runs" in first and "6 of 6 runs" in second
+    assert main(["chart", "sweep.csv", "-distribution", "v_x", "-o", "d.png"]) == 1
+    assert "-where 'b == 0'" in capsys.readouterr().err
+    assert (
+        main(["chart", "sweep.csv", "-distribution", "v_x", "-o", "d.png", "-where", "b == 0"]) == 0
+    )
 
 
 @pytest.mark.usefixtures("starts_are_cheap")

@@ -13,7 +13,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
-from os.path import commonpath
+from os.path import abspath, commonpath
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
@@ -58,7 +58,7 @@ def packed(
     script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str]
 ) -> Package:
     """The script, its includes, and the files that arguments or variables name."""
-    paths = {path.resolve() for path in script.statements}
+    paths = {Path(abspath(path)) for path in script.statements}
     words = {(script.path, word) for words in values.values() for word in words}
     for path, statements in script.statements.items():
         for one in statements:
@@ -66,11 +66,12 @@ def packed(
             if isinstance(one, CommandCall):
                 words |= {(path, raw.code.strip()) for raw in one.arguments}
     for path, word in words:
-        if word and "\n" not in word and len(word) < 1000 and (path.parent / word).is_file():
-            paths.add((path.parent / word).resolve())
+        plain = word and "\n" not in word and len(word) < 1000 and not Path(word).is_absolute()
+        if plain and (path.parent / word).is_file():
+            paths.add(Path(abspath(path.parent / word)))
     root = Path(commonpath([path.parent for path in paths]))
     files = tuple((path.relative_to(root).as_posix(), path.read_bytes()) for path in sorted(paths))
-    name = script.path.resolve().relative_to(root).as_posix()
+    name = Path(abspath(script.path)).relative_to(root).as_posix()
     settings = launch.threads, launch.repeat, launch.limit
     return Package(name, files, settings, launch.texts, tuple(keep), versions())
 
@@ -94,7 +95,9 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
         if here != there
     ]
     if differ:
-        outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
+        outcome = CaseOutcome(
+            "failed", f"{machine} has {', '.join(differ)}", {}, code="other-versions"
+        )
         return Returned(outcome, {}, machine)
     launch, _ = _unpacked(package)
     with TemporaryDirectory(prefix="karamelo-py-case-") as name:
@@ -102,7 +105,10 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
         outcome = launch.run(case, folder)
         paths = {folder / one for one in RETURNED}
         paths |= {path for pattern in package.keep for path in folder.glob(pattern)}
-        files = {path.name: path.read_bytes() for path in sorted(paths) if path.is_file()}
+        files = {
+            path.relative_to(folder).as_posix(): path.read_bytes()
+            for path in sorted(paths) if path.is_file()
+        }  # fmt: skip
     return Returned(outcome, files, machine)
 
 
@@ -151,6 +157,7 @@ class Elsewhere:
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir(parents=True)
             for name, content in result.files.items():
+                (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 (folder / name).write_bytes(content)
         self.machines[folder] = result.machine
         result.outcome.folder = folder

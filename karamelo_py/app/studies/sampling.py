@@ -144,9 +144,9 @@ def add_options(parser: ArgumentParser) -> None:
 
 def prepare(options: Namespace) -> dict[str, Any]:
     """Random variables become lists of samples; facts for the record."""
-    from_formulas = any(CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
+    calls = (CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
     if not options.sample:
-        if from_formulas:
+        if any(call and call[1] in KINDS for call in calls):
             raise ScriptError("random variables are sampled", expected="-sample N, such as 200")
         if options.correlation or options.fails:
             raise ScriptError("-correlation and -fails", expected="-sample N with them")

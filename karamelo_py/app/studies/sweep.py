@@ -55,7 +55,8 @@ def run(options: Namespace) -> int:
     write(out, rows)
     tell(rows, study)
     if drawn:
-        uncertainty.tell(rows, [item.word for item in items], options.fails)
+        others = [name for name in plan.values if name not in drawn["random"]]
+        uncertainty.tell(rows, [item.word for item in items], options.fails, others)
     if not items and not options.time:
         print("no result is recorded: repeat the command with -record NAME, which reads the logs")
     if not any(row["status"] == "done" for row in rows):

@@ -53,7 +53,26 @@ def probability(count: int, of: int) -> Interval:
     return Interval(count / of, float(interval.low), float(interval.high))
 
 
-def tell(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> None:
+def samples_in(rows: Sequence[Row], others: Sequence[str]) -> dict[str, list[Row]]:
+    """Rows by the values of variables that are not random."""
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        found.setdefault(", ".join(f"{name} = {row[name]}" for name in others), []).append(row)
+    return found
+
+
+def tell(
+    rows: Sequence[Row], results: Sequence[str], fails: str | None, others: Sequence[str] = ()
+) -> None:
+    """Print statistics for each sample, one for each combination of the variables `others`."""
+    print("\nin brackets: with a probability of 95 %, by resampling")
+    for words, sample in samples_in(rows, others).items():
+        if words:
+            print(f"\n{words}")
+        _tell_of(sample, results, fails)
+
+
+def _tell_of(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> None:
     done = [row for row in rows if row["status"] == "done"]
     table = plain_table(["result"], ["mean", "deviation", *(f"{q:.0%}" for q in QUANTILES)])
     for name in results:
@@ -62,7 +81,6 @@ def tell(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> None
         if len(values) > 2:
             table.add_row(name, *map(str, statistics_of(values)))
     if table.row_count:
-        print("\nin brackets: with a probability of 95 %, by resampling")
         terminal().print(table)
     if lost := len(rows) - len(done):
         print(f"{plural(lost, 'run')} without results are left out")
@@ -90,21 +108,29 @@ def draw(options: Namespace, table: Table) -> int:
     names = list(table.made.get("random", ())) or [
         n for n in table.variables if len({row[n] for row in table.rows}) > 2
     ]
+    others = [n for n in table.variables if n not in names] if table.made.get("random") else []
+    if len(several := samples_in(table.rows, others)) > 1:
+        first, *_ = several
+        raise ScriptError(
+            f"the runs are {len(several)} samples: {'; '.join(several)}"[:200],
+            expected="one of them, by -where",
+            hint=f"-where '{first.replace(' = ', ' == ').replace(', ', ' && ')}'",
+        )
     result = column(table.rows, name)
     some = np.isfinite(result)
     if some.sum() < 3:
         raise ScriptError(f"fewer than 3 runs have numbers of '{name}'")
     figure = blank_figure(2.6 * (len(names) + 1) + 1, 3.2)
-    first, *others = np.atleast_1d(figure.subplots(1, len(names) + 1))
+    first, *panels = np.atleast_1d(figure.subplots(1, len(names) + 1))
     first.hist(result[some], bins="auto", density=True, color=look.PALETTE[1], alpha=0.5)
     for interval in statistics_of(result[some])[2:]:
         first.axvline(interval.value, color="0.2", linewidth=1)
         first.axvspan(interval.low, interval.high, color="0.2", alpha=0.15, linewidth=0)
     first.set(xlabel=table.label(name), ylabel="density")
-    for axes, variable in zip(others, names, strict=True):
+    for axes, variable in zip(panels, names, strict=True):
         axes.plot(column(table.rows, variable)[some], result[some], ".", color=look.PALETTE[1])
         axes.set(xlabel=table.label(variable), ylabel=table.label(name))
-    for axes in (first, *others):
+    for axes in (first, *panels):
         tidy(axes)
         axes.set_axisbelow(True)
     first.set_title(options.title or table.script, loc="left", fontsize=10)

@@ -9,7 +9,6 @@ from contextlib import suppress
 from itertools import product
 from math import prod
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple, NoReturn
 
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
@@ -206,8 +205,9 @@ class ScriptFiles:
         if reduction not in ("", "max", "min", "mean", "first", "last"):
             return ""
         parts = {
-            words[0]: SimpleNamespace(style=words[1], published=_published(family, words[1]))
-            for family in ("fix", "compute") for words in self.words(family) if len(words) > 1
+            words[0]: style
+            for family in ("fix", "compute") for words in self.words(family)
+            if len(words) > 1 and (style := _style(family, words[1]))
         }  # fmt: skip
         for words in self.words("units"):
             with suppress(TypeError, KeyError):
@@ -215,10 +215,10 @@ class ScriptFiles:
         return ""
 
 
-def _published(family: str, style: str) -> tuple[str, ...]:
+def _style(family: str, name: str) -> Any:
     with suppress(ScriptError):
-        return tuple(registry.find(family, style).published)
-    return ()
+        return registry.find(family, name)
+    return None
 
 
 def add_family(parser: ArgumentParser) -> None:

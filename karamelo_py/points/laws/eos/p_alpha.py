@@ -138,7 +138,7 @@ def _compressed_p_alpha(eos, memory, step, heating):
     old = memory.alpha
     low = eos.ps - (eos.ps - eos.pe) * power((old - 1) / (eos.alpha0 - 1), 1 / eos.n)
     crushing = (solid_pressure(eos, step.j, old, ()) > low * old) & (old > 1)
-    high, p = eos.ps, low
+    high, p, moves = eos.ps, low, crushing
     for _ in range(MOST_PASSES):
         alpha, slope = on_curve(eos, p)
         solid = solid_pressure(eos, step.j, alpha, ())
@@ -147,8 +147,9 @@ def _compressed_p_alpha(eos, memory, step, heating):
         low, high = where(excess < 0, p, low), where(excess < 0, high, p)
         new = p - excess / (1 - (K - solid) * slope / (alpha * alpha))
         new = where((low < new) & (new < high), new, 0.5 * (low + high))
-        moves = crushing & (abs(new - p) > 4 * round_off(p) * eos.ps)
-        p = new
+        settled = abs(new - p) <= 4 * round_off(p) * eos.ps
+        p = where(moves, new, p)  # the same number of passes, whatever other lanes need
+        moves = moves & (not settled)
         if not any_lane(moves):
             break
     alpha, _ = on_curve(eos, p)
