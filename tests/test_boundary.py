@@ -240,6 +240,18 @@ def test_what_is_deleted_stays_so(run_interpreted):
     assert list(after.type[-4:]) == [2] * 4
 
 
+def test_a_fix_that_remembers_counts_each_step_once(run_interpreted, tmp_path):
+    """Steps are repeated after points are deleted."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "counting.py").write_text(
+        "remembers = ('steps',)\nsteps = 0\n\n\n"
+        "def count(points):\n    global steps\n    steps += 1\n    return steps\n"
+    )
+    lines = ("fix(c, python, all, counting.count)", "log_modify(custom, step, c)", "run(28)")
+    log = run_interpreted(thrown(2, "delete", *lines, "set_output(7)")).log
+    assert log.c[-1] == log.Step[-1] == 28
+
+
 def test_groups_and_computes_go_on_without_the_deleted(run_interpreted):
     result = run_interpreted(
         thrown(

@@ -95,10 +95,55 @@ def test_prescribed_and_fixed_directions(run_interpreted, d):
 
 def test_a_body_of_revolution_moves_along_its_axis(run_interpreted):
     """Its mass per radian is rho r dr dz: 6 times 2^2 / 2 times 1."""
-    text = alone("velocity=(0, 1), force=(7, 12)", "b_x, b_y", line="axisymmetric(true)")
+    text = alone("velocity=(0, 1), force=(0, 12)", "b_x, b_y", line="axisymmetric(true)")
     log = run_interpreted(text.replace("block, 2, 4,", "block, 0, 2,")).log
     assert log.b_y - log.b_y[0] == pytest.approx(log.Time + log.Time**2 / 2)
     assert not log.b_x.any()
+
+
+@pytest.mark.parametrize("word", ["velocity", "force", "gravity", "motion"])
+def test_motion_off_the_axis_is_refused(run_interpreted, word):
+    text = alone(f"{word}=(1, 0.5)", "step", line="axisymmetric(true)")
+    result = run_interpreted(text.replace("block, 2, 4,", "block, 0, 2,"), status=1)
+    assert "moves along the axis only, not along x" in result.err and "expected: 0" in result.err
+
+
+MORE = {
+    "moved": ("run(10)", "translate_particles(body, region, body, 2, 0)\nrun(10)", "after its"),
+    "fewer": ("run(10)", "delete_particles(body, region, half)\nrun(10)", "after its"),
+    "later": ("run(10)", "run(1)\ndelete_particles(body, where, x > 3)\nrun(1)", "cannot be del"),
+    "eroded": ("run(10)", "fix(e, erosion, all, x > 3, every=1)\nrun(10)", "cannot be deleted"),
+    "reflect": ("set_dt", "boundary(reflect)\nset_dt", "boundary(error)"),
+    "delete": ("set_dt", "boundary(delete)\nset_dt", "boundary(error)"),
+}
+
+
+@pytest.mark.parametrize("case", MORE)
+def test_points_and_body_stay_together(run_interpreted, case):
+    old, new, message = MORE[case]
+    text = alone("velocity=(1, 0), spin=0.1", "step", line="region(half, block, 3, 9, 0, 9)")
+    result = run_interpreted(text.replace(old, new), status=1)
+    assert message in result.err and result.err.count("error:") == 1, result.err
+
+
+def test_points_may_be_moved_before_the_fix(run_interpreted):
+    text = alone("velocity=(1, 0)", "b_x")
+    moved = "translate_particles(body, region, body, 2, 0)\nfix(b,"
+    assert run_interpreted(text.replace("fix(b,", moved)).log.b_x[-1] == pytest.approx(6)
+
+
+def test_a_body_under_another_id_is_refused_in_a_restart(run_interpreted):
+    text = alone("velocity=(1, 0)", "step")
+    run_interpreted(text.replace("run(10)", "restart(5, r.*.h5)\nrun(5)"), folder="a")
+    again = text.replace("fix(b,", "fix(other,").replace("run(10)", "read_restart(r.5.h5)\nrun(5)")
+    result = run_interpreted(again, folder="a", status=1)
+    assert "are not where its fix has the body" in result.err, result.err
+
+
+def test_a_spinning_body_without_its_fix_is_reported(run_interpreted):
+    text = alone("spin=1", "step").replace("run(10)", "run(1)\ndelete_fix(b)\nrun(1)")
+    result = run_interpreted(text.replace("log_modify(custom, step, time, step)", ""))
+    assert "its points fly straight on" in " ".join(result.err.split())
 
 
 def test_a_body_is_released(run_interpreted):
@@ -205,6 +250,19 @@ def test_momentum_is_conserved_and_energy_does_not_grow(run_interpreted, method,
     assert energy.max() < 1.01 * energy[0]
 
 
+def test_contact_force_of_a_body_is_published(run_interpreted):
+    """As its own force, and its torque about the origin."""
+    names = "ContactForce_b_y, ContactTorque_b_z, b_x, b_y, b_vx, b_vy, b_fx, b_fy, b_tz"
+    text = HIT.format(method="ulmpm", touch=POINTS, ratio=1).replace("p_x, p_y", names)
+    log = run_interpreted(text).log
+    x, y = log.b_x, log.b_y
+    dt = np.diff(log.b_x)[0] / log.b_vx[1]
+    x, y = x[1:] - dt * log.b_vx[1:], y[1:] - dt * log.b_vy[1:]  # before each step
+    about = log.b_tz[1:] + x * log.b_fy[1:] - y * log.b_fx[1:]
+    assert log.ContactForce_b_y == pytest.approx(log.b_fy) and np.abs(log.b_fy).max() > 0
+    assert log.ContactTorque_b_z[1:] == pytest.approx(about, rel=1e-4)
+
+
 @pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("tlmpm", POINTS)])
 def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
     text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")
@@ -236,6 +294,14 @@ def test_a_box_floats(run_script, refine, draught, end):
     assert depth / 0.7 == pytest.approx(0.48, rel=draught)
     assert log.b_fy[late].mean() == pytest.approx(0.96 * 600 * 9.81, rel=0.03)
     assert np.abs(log.b_rz).max() < 1e-3
+
+
+@pytest.mark.parametrize("block", [0, 1])
+def test_scripts_of_the_page_give_no_warning(run_script, block):
+    page = (INPUTS.parent / "docs" / "howto" / "free-body.md").read_text("utf-8")
+    text = re.findall(r"```karamelo\n(.*?)```", page, re.DOTALL)[block]
+    result = run_script(text)
+    assert "warning" not in result.err + result.out
 
 
 def test_rigid_bodies_that_pass_through_each_other_are_reported(run_interpreted):

@@ -318,7 +318,8 @@ ENERGY = np.dtype([
     ("first_few", np.float64),  # mean of the first looks
     ("first_mean", np.float64),  # mean of the first window
     ("largest_mean", np.float64),
-    ("largest_energy", np.float64),  # of kinetic, stored and work
+    ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
+    ("largest_energy", np.float64),  # of kinetic, stored, work and rigid bodies
     ("largest_own", np.float64),  # the same, without pure drift
     ("of_drift", np.float64),  # kinetic energy of the centres of mass
     ("elastic", np.float64),  # elastic energy at the last look

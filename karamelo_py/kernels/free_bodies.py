@@ -60,6 +60,7 @@ MOVE = 34  # displacement of the centre in this step, over dt
 SPREAD = 37  # of other points: (rotation in this step - 1) / dt, by rows
 PASSES, FAILED = 46, 47  # of Newton's method: in this step, and steps without a solution
 STATE = 48
+ABOUT_ORIGIN = 48  # column of published values: torque of contact about the origin, three rows
 # Columns of FreeBody.constants.
 OF_MASS, INERTIA, AXES, START, BOUND = 0, 1, 4, 13, 16  # AXES: principal axes, by columns
 SPEED_AT_MOST = 17  # of a point of the body, in this step
@@ -512,6 +513,16 @@ def _finish(body, s, total):
 
 
 @noinline
+def _energy(body):
+    """Kinetic energy, with the mass matrix at the start of this step."""
+    u, M, energy = body.vectors[U], body.matrices[0], 0.0
+    for a in range(6):
+        for b in range(6):
+            energy += 0.5 * u[a] * M[a, b] * u[b]
+    return energy
+
+
+@noinline
 def _set_angle(state, dt, dimension):
     if dimension < 3:
         state[ANGLE + 2] += dt * state[W + 2]
@@ -526,7 +537,18 @@ def _set_angle(state, dt, dimension):
 @noinline
 def _publish(body, values):
     for k in range(body.slots.shape[0]):
-        values[body.slots[k, 0]] = body.state[body.slots[k, 1]]
+        column = body.slots[k, 1]
+        if column < STATE:
+            values[body.slots[k, 0]] = body.state[column]
+        else:
+            values[body.slots[k, 0]] = _about_origin(body, column - ABOUT_ORIGIN)
+
+
+@noinline
+def _about_origin(body, k):
+    """Torque of contact about the origin, from the centre before this step."""
+    state, before, i, j = body.state, body.vectors[TRIAL], (k + 1) % 3, (k + 2) % 3
+    return state[TORQUE + k] + before[i] * state[FORCE + j] - before[j] * state[FORCE + i]
 
 
 # --- contact at points ------------------------------------------------------------------------
@@ -541,13 +563,13 @@ def _place_of(s, points, p):
 
 @point_function(otherwise=True)
 def depth_near(shape, kin, x, reach):
-    """Depth at `x`; -reach at all places further from the surface, inside as well."""
+    """Depth at `x`; -reach if the surface is further away than that, on either side."""
     return depth(shape, kin, x, reach)
 
 
 @depth_near.on(Surface)
 def _depth_near_faces(shape, kin, x, reach):
-    # Whether faces enclose a place takes longer than that none is near.
+    # Testing whether faces enclose a position takes longer than finding that none is near.
     return depth(shape, kin, x, reach) if distance(shape, kin, x, reach) < reach else -reach
 
 
@@ -743,6 +765,7 @@ def _meet(s):
 
 @kernel
 def _part(s):
+    energy = 0.0
     for body in s.bodies.bodies:
         if isinstance(s.contact, SeparateFields):
             _reaction(body, s)
@@ -753,6 +776,8 @@ def _part(s):
         if isinstance(s.contact, SeparateFields):
             # Contact took the velocity at the end of the step, not the mean of both ends.
             add_to(s.control.totals, WORK, -0.5 * change)
+        energy += _energy(body)
+    s.control.energy[0].of_bodies = energy
 
 
 def _lead_point(s, block, p):

@@ -249,9 +249,14 @@ def judge(control):
     energy.balance = balance
     energy.supplied = max(energy.supplied, abs(energy.work - energy.first_work))
     energy.largest_energy = max(
-        energy.largest_energy, abs(energy.kinetic), abs(energy.stored), energy.supplied
+        energy.largest_energy,
+        abs(energy.kinetic),
+        abs(energy.stored),
+        energy.supplied,
+        energy.of_bodies,
     )
-    vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift)
+    # Rigid bodies exchange energy with what they touch: a small part of theirs may be all of its.
+    vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
     for i in range(3):
@@ -332,6 +337,7 @@ def begin_to_look(s, mode, level, anew):
         energy.windows = 0
         energy.growth = energy.grown = energy.supplied = 0.0
         energy.sum_of_balance = energy.largest_energy = energy.largest_own = 0.0
+        energy.of_bodies = 0.0
         energy.time_of_look = s.control.values[TIME]
     step = int(s.control.values[TIMESTEP])
     if step % LOOK == 0 and (anew or energy.stored_at != step):

@@ -65,7 +65,7 @@ class RollBack:
     def after(self, status: int) -> bool:
         """Judge steps that ended with `status`; return False if the run went back."""
         simulation, point = self.simulation, self.point
-        if status == STOPPED and boundary.delete_leaving(self.hub, simulation, point.arrays):
+        if status == STOPPED and boundary.delete_leaving(self.hub, simulation, self._repeat):
             self._keep()
             return False
         watch = simulation.energy_watch
@@ -114,6 +114,13 @@ class RollBack:
         return answer or Trouble(
             f"a step failed ({when(self.simulation)})", self.simulation.remedy, "point"
         )
+
+    def _repeat(self) -> None:
+        """Repeat the steps up to the last good one; the outputs have their rows."""
+        step, present = self.simulation.step, PartStates.of(self.hub, OUTPUTS)
+        self.point.return_to(self.simulation)
+        self.point.again(self.simulation.advance, step)
+        present.give(self.hub)
 
     def _points_only_leave(self) -> bool:
         """Return True if points leave without an energy gain: smaller steps do not help."""

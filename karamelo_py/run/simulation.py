@@ -14,6 +14,7 @@ from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, StepKind, advanc
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.run.energy import EnergyWatch
 from karamelo_py.run.light_nodes import stable_share
+from karamelo_py.run.lower.bodies import check_bodies
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
 from karamelo_py.run.mpi.whole import PointsMoved
 from karamelo_py.run.scene_arrays import SceneArrays
@@ -224,6 +225,9 @@ class Simulation(SceneArrays):
             # No hook precedes it in a step, so output shows its state from the start.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
+        rigid = any(solid.rigid for solid in self.hub.solids.values())
+        if rigid and self.comm.size == 1 and self.hub.settings.engine == "processor":
+            check_bodies(self.hub, self.setup.blocks, self.now)
         self.hub.update.method.begin(self.hub, self.setup.contact)
 
     def _set_initial(self, fix: Fix) -> None:

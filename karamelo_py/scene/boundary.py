@@ -1,6 +1,6 @@
 """Points at the edge of the domain stop the run, are deleted or are reflected."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -78,8 +78,8 @@ def check(hub: Scene) -> None:
         )
 
 
-def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
-    """Delete points that left the domain in a failed step, and restore its start.
+def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
+    """Delete points that left the domain in a failed step, whose start `repeat` restores.
 
     Depends on the state only, not on threads or on how a run is divided.
     """
@@ -89,9 +89,7 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
     if not len(gone):
         return False
     step, none_before = simulation.step, simulation.present.all()
-    simulation.restore(snapshot)
-    if step > simulation.step:
-        simulation.advance(step - simulation.step)
+    repeat()
     simulation.remove(gone)
     if none_before:
         hub.warn(
@@ -111,6 +109,14 @@ def delete_leaving(hub: Scene, simulation: Any, snapshot: dict) -> bool:
 def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, float]:
     """Delete points (ids, ascending); mass and energy, negative work in the balance."""
     simulation = hub.simulation
+    for fix in hub.fixes.values():
+        body = fix.body
+        if body and ((ids >= body.first_id) & (ids < body.first_id + body.count)).any():
+            raise ScriptError(
+                f"points of '{body.id}' cannot be deleted: fix '{fix.id}' moves it as a rigid body",
+                place=place,
+                hint=f"a group without points of '{body.id}', or delete_fix({fix.id})",
+            )
     if len(ids) == np.count_nonzero(simulation.present):
         raise ScriptError(
             f"step {simulation.step}, time {simulation.time:.6g}: no point would be left",

@@ -6,9 +6,10 @@ import numpy as np
 
 from karamelo_py.compiler import address_of, address_of_python
 from karamelo_py.kernels import free_bodies as kernel
+from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.contact import ListedPairs
 from karamelo_py.kernels.touching import CALL
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import can, constrained_velocity, is_rigid
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
@@ -21,6 +22,9 @@ from karamelo_py.styles.fixes.rigid_body import (
     contacts_of,
     surfaces_of,
 )
+from karamelo_py.styles.methods.base import LOADS, slots_of_loads
+
+APART = 1e-3  # cells between a point and its place in a rigid body: round-off is far smaller
 
 
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
@@ -68,10 +72,14 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
         )
         for touch in surfaces_of(fix)
     )
+    slots = fix.slots()
+    if f"{LOADS[0]}_{fix.body.id}_x" in hub.values and not separate:
+        first = zip(slots_of_loads(hub, fix.body), (kernel.FORCE, kernel.ABOUT_ORIGIN), strict=True)
+        slots = np.concatenate([slots, *([(a + k, b + k) for k in range(3)] for a, b in first)])
     ends = fix.body.first_id, fix.body.first_id + fix.body.count
     return kernel.FreeBody(
         field=hub.update.method.lattice_of(hub, fix.body), ids=np.array(ends), dofs=fix.dofs,
-        constants=fix.constants, state=fix.state, slots=fix.slots(),
+        constants=fix.constants, state=fix.state, slots=slots,
         evaluate=address_of(evaluate_in_table, EVALUATE), programs=programs,
         code=np.concatenate([np.empty((0, 2), np.int64), *code]), numbers=np.concatenate(numbers),
         scratch=np.zeros((STACK + ROWS + 1, BLOCK)), matrices=np.zeros((2, 6, 7)),
@@ -85,6 +93,42 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
     )  # fmt: skip
 
 
+def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
+    """Refuse bodies whose points are not where the state of the fix has them.
+
+    Warns of rigid solids that rotate without a fix: their points fly straight on.
+    """
+    count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
+    x, v = np.full((2, count, d), np.nan)  # of deleted points
+    for block in blocks:
+        if is_rigid(block.laws):
+            x[block.points.id] = block.points.x[now, :d].T
+            v[block.points.id] = block.points.v[:d].T
+    moving = bodies_of(hub)
+    for fix in moving:
+        body = fix.body
+        present = x[body.first_id : body.first_id + body.count]
+        away = np.abs(present - fix.rigid_positions()).max()
+        if not away <= APART * hub.domain.h:  # NaN: deleted
+            message = f"points of '{body.id}' are not where its fix has the body"
+            if np.isnan(away):
+                message = f"points of '{body.id}' are missing"
+            raise _error(fix, message, "the fix that moved it, with the same ID, from the start")
+    bodies = [fix.body for fix in moving]
+    fixes = [fix for fix in hub.fixes.values() if fix.leads_points]
+    for solid in hub.solids.values():
+        led = solid in bodies or any(fix.group.touches(solid) for fix in fixes)
+        speeds = v[solid.first_id : solid.first_id + solid.count]
+        speeds = speeds[np.isfinite(speeds[:, 0])]
+        if not led and len(speeds) and np.ptp(speeds, axis=0).max() > APART * np.abs(speeds).max():
+            hub.warn(
+                f"rigid solid '{solid.id}' rotates or deforms: nothing moves it, and its points "
+                "fly straight on",
+                place=solid.place,
+                hint=f"fix(ID, rigid_body, {solid.id}, ...), or fix velocity_particles",
+            )
+
+
 def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     bodies = {fix.body for fix in moving}
     for touch in contacts_of(hub):
@@ -95,6 +139,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         "runs in one process": settings.comm.size > 1,
         "runs on processors": settings.engine == "gpu",
         "needs double precision": settings.precision != "double",
+        "needs all its points": hub.update.boundary in ("delete", "reflect"),
         "does not push pore water": any(
             solid.material.fluid is not None for solid in hub.solids.values()
         ),
@@ -104,6 +149,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         "no --ranks; --threads divides the points",
         "no --gpu",
         "no precision(single)",
+        "boundary(error)",
         "a dry material",
     )
     for fix in moving:
@@ -114,6 +160,9 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     rigid = [solid for solid in solids if can(solid.material.law, constrained_velocity)]
     for fix in moving:
         body, apart = fix.body, method.own_grids or method.fields_per_solid
+        if body.places is not fix.weighed:
+            message = f"points of '{body.id}' were moved or deleted after its mass was found"
+            raise _error(fix, message, "fix rigid_body after the commands that change the points")
         other = next((solid for solid in rigid if solid not in bodies and not apart), None)
         if other is not None:
             message = f"'{body.id}' moves freely, and rigid solid '{other.id}' on its grid does not"

@@ -222,6 +222,8 @@ class RigidBody(Fix):
             for given, at in zip(self.given, (kernel.V, kernel.W), strict=True):
                 if given:
                     kept[at : at + 3] = self.state[at : at + 3]
+            if not self.hub.update.step:  # its points may have been moved
+                kept[kernel.X : kernel.X + 3] = self.state[kernel.X : kernel.X + 3]
             self.state[:] = kept
             self._spin_up()
         others = [s.id for s in self.hub.solids.values() if s.rigid and s is not self.body]
@@ -232,6 +234,14 @@ class RigidBody(Fix):
             )
         for slot, column in self.slots():
             self.hub.values.array[slot] = self.state[column]
+
+    def rigid_positions(self) -> np.ndarray:
+        """Positions (n, d) of its points, from its state."""
+        d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
+        arm[:, :d] = self.body.x0
+        arm -= self.constants[kernel.START : kernel.START + 3]
+        R = self.state[kernel.R : kernel.R + 9].reshape(3, 3)
+        return (self.state[kernel.X : kernel.X + 3] + arm @ R.T)[:, :d]
 
     def refresh(self) -> None:
         failed = int(self.state[kernel.FAILED])
@@ -266,10 +276,16 @@ class RigidBody(Fix):
                 f"{len(given.items)} components", place=given.argument.place,
                 expected=f"{len(ways)} {what}" if ways else "nothing: it does not rotate here",
             )  # fmt: skip
-        for way, item in zip(ways, given.items, strict=True):
+        for way, item, part in zip(ways, given.items, given.argument.listed(), strict=True):
             items[way % 3] = item
-            if item is not None:
-                item.evaluate(self.hub.values)
+            if item is None:
+                continue
+            item.evaluate(self.hub.values)
+            if way not in self.ways and not (item.is_constant and float(item.constant) == 0):
+                raise ScriptError(
+                    f"the body moves along the axis only, not along {WAYS[way]}", place=part.place,
+                    expected="0",
+                )  # fmt: skip
         return items
 
     def _hold(self, fixed: Argument | None) -> None:
@@ -310,6 +326,7 @@ class RigidBody(Fix):
         return [0.0 if item is None else float(item.constant) for item in given]
 
     def _weigh(self, solid: Solid, mass: float | None, inertia: Components | None) -> None:
+        self.weighed = solid.places
         kin, d, m = self.hub.domain.kin, self.hub.domain.dimension, np.asarray(solid.mass, float)
         x, total = np.zeros((solid.count, 3)), float(m.sum())
         x[:, :d] = solid.x0
@@ -413,9 +430,9 @@ class ContactRigidBody(Fix):
 
     For ulmpm and tlmpm. A body rolls on its radius plus half a point: with a radius of 3 cells, its
     acceleration on a slope is 3.6 % too large (2 % in 3D). Use ulmpm/contacts for liquids, and for
-    bodies that slide or are held by friction: a box slides with 0.04 % more than the exact
-    acceleration there, 5 % less here, and one that friction can hold creeps by 0.04 cells in 500
-    steps.
+    bodies that slide or are held by friction. The acceleration of a sliding box is 0.04 % too large
+    with ulmpm/contacts and 5 % too small with this fix, and a box that friction should hold creeps
+    by 0.04 cells in 500 steps.
 
     See Also
     --------
