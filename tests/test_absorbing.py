@@ -1,6 +1,7 @@
 """Edges through which waves leave."""
 
 import pytest
+from test_gpu_runs import alike
 
 ROCK = """
     h = 1
@@ -74,3 +75,17 @@ def test_a_wave_leaves_saturated_ground(run_script):
     way = "tlmpm, FLIP, linear, 1"
     energy = run_script(ROCK.format(way=way, water=water) + pulse).log["k"]
     assert energy[-1] < 0.003 * energy[0]
+
+
+def test_on_a_gpu(run_script):
+    """Compiled, as hooks called by address are bound to loops then."""
+    script = (
+        ROCK.format(way="tlmpm, FLIP, linear, 1", water="").replace("100", "9")
+        + f"""
+    fix(v, initial_velocity_particles, all, x0^2)
+    log_modify(custom, time, E, left_x, right_x)
+    set_output(1)
+    run(8)
+    """
+    )
+    alike(run_script(script, folder="here"), run_script(script, "--gpu", folder="there"), 1e-11)
