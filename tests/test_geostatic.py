@@ -1,5 +1,10 @@
 """Ground that begins with the stress of its weight."""
 
+import numpy as np
+import pytest
+
+from karamelo_py.styles.fixes.geostatic import load_above, to_middles
+
 LAYERS = """
     method(tlmpm, FLIP, linear, 1)
     dimension({d}, {box}, 0.25)
@@ -76,3 +81,81 @@ def test_a_stress_that_follows_from_deformation_is_refused(run_interpreted):
     script = LAYERS.format(**LINE).replace("clay, linear", "clay, neo-hookean")
     err = run_interpreted(script, status=1).err
     assert "follows from its deformation" in err
+
+
+def test_columns_are_the_same_wherever_the_points_lie():
+    """Points at x = 0, 0.1, ... 1, whose edges are at round numbers of columns only roughly."""
+    x = np.array([(0.1 * i, 0.1 * j) for i in range(11) for j in range(20)])
+    for shift in (0.0, 0.05, 1 / 3):
+        load = load_above(x + shift, np.full_like(x, 0.1), np.full((len(x), 1), 18000.0))
+        depth = 1.95 - x[:, 1]
+        assert load[:, 0] == pytest.approx(18000 * depth, rel=1e-9)
+
+
+def test_gauss_points_go_to_the_middles_of_their_boxes():
+    """In cells with a gap between them; points of a file stay."""
+    at, weight = np.polynomial.legendre.leggauss(3)
+    middle = np.array([weight[0] / 4, 0.5, 1 - weight[0] / 4])
+    cells = np.array([0.0, 1, 2, 7, 8])
+    x, to = ((cells[:, None] + one).reshape(-1, 1) for one in (at / 2 + 0.5, middle))
+    size = np.tile(weight / 2, len(cells))[:, None]
+    assert x + to_middles(x, size) == pytest.approx(to)
+    x = np.random.default_rng(1).random((50, 2))
+    assert not to_middles(x, np.full_like(x, 0.14)).any()
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_layers_of_points_of_any_size(d):
+    """2 points per cell of clay under 3 of sand, and a width that is no multiple of either."""
+    for wide in (1.0, 0.9):
+        layers = []
+        for size, base, top in ((0.5, 0, 1), (1 / 3, 1, 2)):
+            flat = [np.arange(size / 2, 6 * wide, size) for _ in range(d - 1)]
+            grid = np.meshgrid(*flat, np.arange(base + size / 2, top, size), indexing="ij")
+            layers.append((np.stack(grid, axis=-1).reshape(-1, d), size))
+        x = np.concatenate([at for at, _ in layers])
+        size = np.concatenate([np.full_like(at, one) for at, one in layers])
+        clay = x[:, -1] < 1
+        weight = np.where(clay, 15900.0, 18000.0)[:, None]
+        exact = np.where(clay, 18000 + 15900 * (1 - x[:, -1]), 18000 * (2 - x[:, -1]))
+        load = load_above(x, size, weight)[:, 0]
+        if wide == 1 or d == 1:
+            assert load == pytest.approx(exact, rel=1e-9)
+        else:
+            within = np.all((x[:, :-1] > 1) & (x[:, :-1] < 4.4), axis=1)
+            assert load[within] == pytest.approx(exact[within], rel=1e-9)
+
+
+def test_a_dam_with_other_points_per_cell(run_interpreted):
+    """Three points per cell of sand load the two per cell of clay below, and those alone."""
+    scene = PLANE | {
+        "more": """region(under, block, 0.5, 1, 0, 1)
+        solid(sand, region, high, 3, sand, 0.25, 0)
+        group(below, particles, region, under, solid, clay)""",
+        "high": "0.5, 1, 1, 2",
+    }
+    script = (
+        LAYERS.format(**scene)
+        .replace("tlmpm", "ulmpm")
+        .replace("run(20)", "set_dt(1e-6)\n    run(1)")
+    )
+    log = run_interpreted(script.replace("probe, all", "probe, below")).log
+    assert abs(log["s_s22"][-1] / (-(1800 + 1590 / 2) * 10) - 1) < 1e-3
+
+
+def test_columns_of_points_from_a_file(run_interpreted, tmp_path):
+    """At x = 0, 0.1, ..., 1, where round-off once split and merged columns."""
+    rows = [f"{0.1 * i}, {0.1 * j + 0.05}, 0.01" for i in range(11) for j in range(20)]
+    (tmp_path / "soil.csv").write_text("\n".join(["x, y, volume", *rows]), encoding="utf-8")
+    script = f"""
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, -1, 2, 0, 3, 0.2)
+    material(sand, linear, 1800, 1e7, 0.25)
+    solid(sand, points, "{tmp_path / "soil.csv"}", sand, 0.2)
+    fix(start, geostatic_stress, all, gravity=10)
+    dump(d, all, particle, 1, d.*.LAMMPS, x, y, s22)
+    set_dt(1e-9)
+    run(1)
+    """
+    found = run_interpreted(script).snapshots("d")[-1]
+    assert found["s22"] == pytest.approx(-18000 * (2 - found["y"]), rel=1e-4)

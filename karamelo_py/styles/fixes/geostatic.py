@@ -1,5 +1,6 @@
 """Fix geostatic_stress: the stress of ground under its weight."""
 
+from itertools import product
 from typing import Annotated
 
 import numpy as np
@@ -30,9 +31,10 @@ class GeostaticStress(Fix):
 
     Notes
     -----
-    The vertical stress of a point is the weight of the points of the group above it, in columns of
-    their size, also of several layers. In materials with pore_water, up to the surface of the
-    ground, the pressure of the water is hydrostatic and the stress is the effective stress. Below a
+    The vertical stress of a point is the weight of the points of the group above it, in columns as
+    wide as the largest point; layers may differ in material and in points per cell. A material with
+    pore_water is full of water up to its highest point in the column: the pressure of the water is
+    hydrostatic below that point, and the stress is the effective stress. Below a
     level surface the ground is at rest with fix body_force; below a slope it is close to it. The
     material has to take a stress: see initial_stress.
 
@@ -58,17 +60,12 @@ class GeostaticStress(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         d, ids, x = self.hub.domain.dimension, points.ids - 1, points.position.astype(float)
-        size = 2 * from_solids(self.hub, ids, lambda solid, rows: solid.half_size[rows], d)
+        size = 2 * from_solids(self.hub, ids, _half, d)
+        x += from_solids(self.hub, ids, lambda solid, rows: to_middles(
+            solid.x0_of(rows), 2 * _half(solid, rows)), d)  # fmt: skip
         dry, in_pores, water = (from_solids(self.hub, ids, of) for of in (_dry, _in_pores, _water))
-        columns = np.floor((x[:, :-1] - self.hub.domain.lo[: d - 1]) / size[:, :-1]).astype(int)
-        _, column = np.unique(columns, axis=0, return_inverse=True)
-        down = np.lexsort((-x[:, -1], column.ravel()))
-        above = self.gravity * np.column_stack([dry + in_pores, water]) * size[:, -1:]
-        first = np.diff(column.ravel()[down], prepend=-1) != 0
-        total = np.cumsum(above[down], axis=0) - above[down]
-        begins = np.maximum.accumulate(np.where(first, np.arange(len(down)), 0))
-        load = np.empty_like(total)
-        load[down] = total - total[begins] + 0.5 * above[down]
+        weights = self.gravity * np.column_stack([dry + in_pores, water])
+        load = load_above(x, size, weights)
         pressure = np.where(water > 0, load[:, 1], 0.0)
         vertical = pressure - load[:, 0]
         names = {f"{k}{k}": self.k0 * vertical for k in (1, 2, 3)}
@@ -78,6 +75,74 @@ class GeostaticStress(Fix):
             if solid.material.fluid is not None:
                 solid.material.fluid.set_pressure(points, pressure)
                 break
+
+
+def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Steps (n, d) from the points of one solid to the middles of their boxes.
+
+    Boxes side by side fill the cells; Gauss points, also Karamelo's three per cell, do not lie in
+    their middles. Other points than those on lines along the axes stay.
+    """
+    step = np.zeros_like(x)
+    for along, length, out in zip(x.T, size.T, step.T, strict=True):
+        order = np.argsort(along)
+        at, long = along[order], length[order]
+        begins = np.diff(at, prepend=-np.inf) > 1e-6 * long
+        line, at, long = np.cumsum(begins) - 1, at[begins], long[begins]
+        if long.sum() > 1.5 * (at[-1] - at[0] + long.max()):
+            continue
+        middle = np.cumsum(long) - long / 2
+        piece = np.cumsum(np.diff(at, prepend=at[0]) > 1.5 * long)  # gaps in the solid divide it
+        off = np.bincount(piece, at - middle) / np.bincount(piece)
+        out[order] = (middle + off[piece] - at)[line]
+    return step
+
+
+def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weight per area above the centres of points that are boxes.
+
+    Parameters
+    ----------
+    x, size
+        Centres and sizes of the boxes, (n, d); the last direction is up.
+    weights
+        Weights per volume, (n, k).
+
+    Returns
+    -------
+    (n, k). Columns fill the width of the points and are at least as wide as the widest; each box
+    gives its weight to the columns that it overlaps, and takes the mean of their loads.
+    """
+    flat, half = x[:, :-1], size[:, :-1] / 2
+    begin = (flat - half).min(axis=0)
+    width = (flat + half).max(axis=0) - begin
+    count = np.maximum(width / size[:, :-1].max(axis=0) * (1 + 1e-9), 1).astype(int)
+    left, across = (flat - half - begin) / width * count, 2 * half / width * count
+    first = np.minimum(left.astype(int), count - 1)
+    inside = np.clip((first + 1 - left) / across, 0, 1)  # part of a box in its first column
+    load = np.zeros_like(weights)
+    corners = np.array(list(product((0, 1), repeat=flat.shape[1])), int)
+    boxes = np.tile(np.arange(len(x)), len(corners))
+    part = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
+    columns = np.concatenate([np.minimum(first + c, count - 1) for c in corners])
+    _, column = np.unique(columns, axis=0, return_inverse=True)
+    # The load in a column, from above, changes its slope at the tops and bottoms of boxes.
+    slope = (part * across.prod(axis=1)[boxes])[:, None] * weights[boxes]
+    slope = np.concatenate([slope, 0 * slope, -slope])
+    z = np.concatenate([(x[:, -1] + k * size[:, -1])[boxes] for k in (0.5, 0, -0.5)])
+    column = np.tile(column.ravel(), 3)
+    down = np.lexsort((-z, column))
+    starts = np.diff(column[down], prepend=-1) != 0
+    steps = -np.diff(z[down], prepend=0)[:, None] * np.roll(np.cumsum(slope[down], axis=0), 1, 0)
+    sums = np.cumsum(np.where(starts[:, None], 0, steps), axis=0)
+    at = np.empty_like(sums)
+    at[down] = sums - sums[np.maximum.accumulate(np.where(starts, np.arange(len(down)), 0))]
+    np.add.at(load, boxes, part[:, None] * at[len(boxes) : 2 * len(boxes)])
+    return load
+
+
+def _half(solid: Solid, rows: np.ndarray) -> np.ndarray:
+    return solid.half_size[rows]
 
 
 def _dry(solid: Solid, rows: np.ndarray) -> np.ndarray:
