@@ -81,7 +81,7 @@ def test_on_a_gpu(run_script):
     """Compiled, as hooks called by address are bound to loops then."""
     script = (
         ROCK.format(way="tlmpm, FLIP, linear, 1", water="").replace("100", "9")
-        + f"""
+        + """
     fix(v, initial_velocity_particles, all, x0^2)
     log_modify(custom, time, E, left_x, right_x)
     set_output(1)
