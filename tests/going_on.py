@@ -235,6 +235,30 @@ SWAYS = (
     "fix(v, initial_velocity_particles, all, 3*sin(9*x0), 1)", "set_output(1)",
     "log_modify(custom, step, dt, time)", "run(6)",
 )  # fmt: skip
+EDGES = (
+    "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
+    "fix(out, absorbing, low, rubber, ylo)", "fix(start, geostatic_stress, all, k0=0.4)",
+    "fix(v, initial_velocity_particles, all, sin(9*x0), -y0)", "set_output(1)",
+    "log_modify(custom, step, time, out_x, out_y)", "run(4)",
+)  # fmt: skip
+WET = """
+pore_water(rubber, n=0.4, permeability=0.1, K=1000, rho=1, kozeny=true)
+solid("""
+WATER = (
+    "region(top, block, -INF, INF, 0.39, INF)", "group(top, nodes, region, top, all)",
+    "fix(table, initial_pore_pressure, all, 9*(0.4 - y0))",
+    "fix(drain, pore_pressure, top, 3*time)", "compute(p, probe, all, pore_pressure)",
+    "fix(v, initial_velocity_particles, all, sin(9*x0), -y0)", "set_output(1)",
+    "dump(d, all, particle, 2, d.*.txt, wx, wy, pore_pressure, porosity)",
+    "log_modify(custom, step, time, p, drain_s)", "run(4)",
+)  # fmt: skip
+FREE = (
+    "region(above, block, 0.4, 0.6, 0.41, 0.61)", "material(steel, rigid, 6)",
+    f"solid(b, region, above, 1, steel, {H})",
+    "fix(b, rigid_body, b, velocity=(0.2, -0.9), spin=0.1, gravity=(0, -9*time))",
+    "fix(touch, contact/rigid_body, all, b, 0.4)", "set_output(1)", "set_dt(0.003)",
+    "log_modify(custom, step, b_x, b_vy, b_rz, b_wz, touch_x, touch_y)", "run(4)",
+)  # fmt: skip
 SERIAL = {  # scenes that one process takes
     "load steps": block(2, "scheme(quasi-static)", *IMPLICIT, size=SIZE),
     "large steps": block(2, "scheme(newmark)", *IMPLICIT, size=SIZE),
@@ -244,6 +268,10 @@ SERIAL = {  # scenes that one process takes
     "clay": block(2, *SWAYS, size=SIZE).replace(
         "rubber, linear, 2, 100, 0.3", "rubber, cam-clay, 2, 40, 1, 0.1, 0.02, 1"
     ),
+    "water in pores": block(2, *WATER, transfer="FLIP quadratic", size=SIZE).replace(
+        "\nsolid(", WET, 1
+    ),
+    "rigid body that moves freely": block(2, *FREE, size=SIZE),
     "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS, size=SIZE),
 }
 SCENES = {
@@ -299,6 +327,7 @@ SCENES = {
     ).replace("region(box", "spherical(true)\nregion(box"),
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
+    "ground": block(2, *EDGES, size=SIZE),
 }  # fmt: skip
 OUTPUTS = """\
 dump(d1, all, particle, 2, all.txt, x, y, s11)
