@@ -503,3 +503,26 @@ def test_named_faces_are_loaded_with_their_whole_area(run_interpreted, tmp_path)
     assert "edge_traction, ..., all, tx, ty" in run_interpreted(wrong, status=1).err
     wrong = script.replace("all, roof, SIDE", "all, body, all")
     assert "region 'body' is no set of faces" in run_interpreted(wrong, status=1).err
+
+
+def test_a_large_face_loads_all_points_behind_it(run_interpreted, tmp_path):
+    """One element, 64 points: each of the 16 at the roof takes a sixteenth, within its parts."""
+    (tmp_path / "deck.inp").write_text(SHEET.replace("1,1,2", "1,1,1").replace("0,1,2", "0,1,1"))
+    script = f"""
+        method(tlmpm, FLIP, linear, 1)
+        dimension(3, -1, 2, -1, 2, -1, 3, 0.5)
+        region(body, mesh, {tmp_path}/deck.inp, BODY)
+        region(roof, mesh, {tmp_path}/deck.inp, ROOF)
+        material(m, linear, 1000, 1e6, 0.3)
+        solid(s, region, body, 2, m, 0.5)
+        fix(q, edge_traction, all, roof, all, 0, 0, 16)
+        log_modify(custom, step, q_z)
+        dump(d, all, particle, 1, d.*.txt, z, vz)
+        set_dt(1e-3)
+        run(1)
+    """
+    done = run_interpreted(script)
+    assert done.log["q_z"][-1] == pytest.approx(16, rel=1e-9)
+    *_, z, vz = np.loadtxt(done.folder / "d.1.txt", skiprows=11).T
+    top = vz[z > 0.8]
+    assert len(top) == 16 and top.min() > 0.5 * top.mean() and top.max() < 2 * top.mean()

@@ -177,14 +177,15 @@ def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
         raise ScriptError(f"-on {options.on}", expected=WHERE)
     needed = "dask_jobqueue" if options.on in QUEUES else "distributed"
     if find_spec(needed) is None:
-        hint = "pip install '.[dask]' in the folder of karamelo-py"
+        extra = "pip install '.[dask]' in the folder of karamelo-py"
+        hint = "pip install dask-jobqueue" if options.on in QUEUES else extra
         raise ScriptError(f"-on {options.on} needs {needed.replace('_', '-')}", hint=hint)
     from distributed import Client, LocalCluster
 
     try:
         if options.on == "local":
             cluster: Any = ends.enter_context(
-                LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=None)
+                LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=":0")
             )
         elif options.on in QUEUES:
             import dask_jobqueue

@@ -113,7 +113,7 @@ def results_of(study: Study, found: Sequence[Random], fixed: dict[str, str]) -> 
 
 
 def add_options(parser: ArgumentParser) -> None:
-    variables.add_family(parser)
+    variables.add_family(parser, ", ".join(KINDS.values()) + "; or one value")
     parser.add_argument(
         "-record", action="append", required=True, metavar="COLUMNS",
         help="results: log columns as for sweep",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from karamelo_py.app.options import positive
 from karamelo_py.app.studies import sampling, uncertainty, variables
-from karamelo_py.app.studies.case import Row
+from karamelo_py.app.studies.case import COLUMNS, Row
 from karamelo_py.app.studies.records import recorded, write
 from karamelo_py.app.studies.study import Study, open_study, results_table, terminal
 from karamelo_py.script.errors import ScriptError, plural
@@ -46,6 +46,10 @@ def run(options: Namespace) -> int:
     plan = variables.family(options, timed=options.time, repeat=repeat)
     combinations = variables.cases(plan.values, variables.zipped(options), options.where)
     items = recorded(",".join(options.record), plan.script, plan.values)
+    if options.fails:
+        uncertainty.check(options.fails, [*plan.values, *(item.word for item in items), *COLUMNS])
+    if options.keep and not options.on:
+        raise ScriptError("-keep without -on", expected="-on WHERE: here, all files are kept")
     facts = {
         "record": [item.text for item in items], "computes": plan.script.computes(),
         "timed": options.time, "repeat": repeat, **drawn,

@@ -89,9 +89,14 @@ def _tell_of(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> 
         print(f"probability of {fails}: {probability(seen, len(done))}; {seen} of {len(done)} runs")
 
 
+def check(condition: str, names: Sequence[str]) -> None:
+    """Refuse a condition that is none, or of other names."""
+    variables.holds(condition, dict.fromkeys(names, "1"), option="-fails")
+
+
 def _happens(condition: str, row: Row, results: Sequence[str]) -> bool:
     cells = {n: shown_exactly(row[n]) for n in [*row] if row[n] is not None}
-    return variables.holds(condition, cells)
+    return variables.holds(condition, cells, option="-fails")
 
 
 def shown_exactly(cell: Any) -> str:

@@ -132,11 +132,13 @@ class NamesOfCase:
         raise ScriptError(f"{self.option}: unknown function '{node.name}'")
 
 
-def holds(condition: str, case: Mapping[str, str], words: Iterable[str] = ()) -> bool:
-    raw, node = parse_text(condition, "-where")
-    value = evaluate(node, raw, NamesOfCase("-where", case, words))
+def holds(
+    condition: str, case: Mapping[str, str], words: Iterable[str] = (), option: str = "-where"
+) -> bool:
+    raw, node = parse_text(condition, option)
+    value = evaluate(node, raw, NamesOfCase(option, case, words))
     if not isinstance(value, float):
-        raise ScriptError(f"-where {condition} is neither true nor false")
+        raise ScriptError(f"{option} {condition} is neither true nor false")
     return value != 0
 
 
@@ -221,12 +223,12 @@ def _style(family: str, name: str) -> Any:
     return None
 
 
-def add_family(parser: ArgumentParser) -> None:
+def add_family(parser: ArgumentParser, values: str = VALUES) -> None:
     parser.set_defaults(zip=[])
     parser.add_argument("script", type=Path, help="the script")
     parser.add_argument(
         *VARIABLE, action="append", default=[], metavar="NAME=VALUES",
-        help=f"values of a variable of the script: {VALUES}; again for each variable",
+        help=f"values of a variable of the script: {values}; again for each variable",
     )  # fmt: skip
     parser.add_argument(
         "-jobs", type=positive, help="runs at once (default: as many as there are cores)"

@@ -38,8 +38,7 @@ class Holzapfel(OfFibres, Fields):
     K
         Bulk modulus.
     fibre, fibre2
-        Directions of the two families at rest; fibre2 is fibre by default. In axisymmetry
-        (radius, axis, hoop).
+        Directions of one or two families at rest; in axisymmetry (radius, axis, hoop).
 
     Example
     -------
@@ -65,7 +64,8 @@ class Holzapfel(OfFibres, Fields):
         cls, rho: AboveZero, G: AboveZero, k1: FromZero, k2: AboveZero, K: AboveZero, *,
         fibre: Direction, fibre2: Direction | None = None,
     ) -> Any:  # fmt: skip
-        fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in ("I4", "I6")]
+        families = ("I4", "I6") if fibre2 else ("I4",)
+        fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in families]
         formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
         directions = (*fibre, *(fibre2 or fibre))
         return ready(rho, formula, directions, G=G, k1=k1, k2=k2, K=K)

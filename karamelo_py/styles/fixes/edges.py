@@ -167,18 +167,37 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
-    """Simplices (m, d, d) of a set of faces, each taken by the nearest point; in no direction."""
-    none = np.zeros(len(sheet), np.int64)
+    """Simplices (m, d, d) of a set of faces, in pieces that the nearest points take."""
+    none = np.zeros(0, np.int64)
     if not len(ids) or not len(sheet):
-        return Faces(ids[:0], none[:0], none[:0], np.empty(0), np.empty((0, d)))
-    middle, edges = sheet.mean(axis=1), sheet[:, 1:] - sheet[:, :1]
-    size = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0)) / max(d - 1, 1)
+        return Faces(ids[:0], none, none, np.empty(0), np.empty((0, d)))
     x0 = places_before(hub, ids)
+    size_of_part = from_solids(hub, ids, lambda solid, rows: solid.half_size[rows], d).min()
+    edges = sheet[:, 1:] - sheet[:, :1]
+    size = np.sqrt(np.maximum(np.linalg.det(edges @ edges.swapaxes(1, 2)), 0)) / max(d - 1, 1)
+    longest = np.linalg.norm(edges, axis=2).max(axis=1) if d > 1 else np.zeros(len(sheet))
+    counts, tables = np.ceil(longest / size_of_part - 1e-9).clip(1).astype(np.int64), []
+    for count in np.unique(counts):
+        parts, some = _parts_of_simplex(d, int(count)), counts == count
+        middles = sheet[some, 0][:, None] + parts @ edges[some]
+        tables.append((middles.reshape(-1, d), np.repeat(size[some] / len(parts), len(parts))))
+    middle, size = (np.concatenate(column) for column in zip(*tables, strict=True))
+    none = np.zeros(len(middle), np.int64)
     rows = [
         np.argmin(np.linalg.norm(part[:, None] - x0, axis=2), axis=1)
         for part in np.array_split(middle, len(middle) * len(ids) // AT_ONCE + 1)
     ]
     return Faces(ids[np.concatenate(rows)], none, none, size * hub.domain.depth(middle), middle)
+
+
+def _parts_of_simplex(d: int, count: int) -> np.ndarray:
+    """Centres (n, d - 1) of `count`^(d - 1) equal parts, in fractions of its edges."""
+    if d < 3:
+        return ((np.arange(count) + 0.5) / count)[:, None] if d == 2 else np.zeros((1, 0))
+    i, j = np.divmod(np.arange(count * count), count)
+    upright, turned = i + j < count, i + j < count - 1
+    corners = np.stack([i, j], axis=1)
+    return np.concatenate([corners[upright] + 1 / 3, corners[turned] + 2 / 3]) / count
 
 
 class OnEdge(Fix):
@@ -299,7 +318,7 @@ class EdgeTraction(EdgeFix):
     this direction are loaded too: for a plate with a hole, use the region without it. In
     axisymmetry, area and force are per radian.
 
-    Each face of a set in a mesh loads the nearest point of the group, with its whole area:
+    Faces of a set in a mesh load the points of the group that are nearest to their parts:
     ``region(top, mesh, deck.inp, TOP)`` with a surface, side set or boundary group, and
     ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
 
