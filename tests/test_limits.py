@@ -60,3 +60,22 @@ def test_implicit_schemes_are_refused_on_a_gpu(run_script):
         run(1)
     """
     assert "quasi-static" in run_script(script, "--gpu", status=1).err
+
+
+def test_computes_count_the_soil_alone(run_interpreted):
+    assert row_of("[water in pores]")
+    log = run_interpreted("""
+        method(ulmpm, FLIP, linear, 1)
+        dimension(1, 0, 3, 0.25)
+        region(layer, block, 1, 2)
+        material(clay, linear, 1590, 1e7, 0)
+        pore_water(clay, n=0.4, permeability=1e-3)
+        solid(clay, region, layer, 2, clay, 0.25)
+        fix(v, initial_velocity_particles, all, 0.1)
+        compute(p, linear_momentum, all)
+        compute(k, kinetic_energy, all)
+        log_modify(custom, p_x, k)
+        run(1)
+    """).log
+    assert log["p_x"] == pytest.approx([159, 159])
+    assert log["k"] == pytest.approx([7.95, 7.95])

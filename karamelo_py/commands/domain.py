@@ -136,10 +136,11 @@ def boundary(
 
     In a periodic direction the domain is one cell of an endless row of equal ones: what leaves at
     one end comes in at the other, and bodies at both ends touch. Its length is a multiple of the
-    cell size. Formulas of nodes should be equal a period apart. Positions in dumps may be outside
-    by what points move in 10 steps; then they return. For method ulmpm with linear or splines,
-    scheme musl, any transfer but XPIC, on one process without a GPU; not with the other styles of
-    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, pore_water.
+    cell size. Formulas of nodes should be equal a period apart. Points are moved back into the
+    domain every 10 steps: until then, dumps may show them outside it. For method ulmpm with linear
+    or splines, scheme musl, any transfer but XPIC, on one process without a GPU; not with the other
+    styles of boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies,
+    pore_water.
 
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 

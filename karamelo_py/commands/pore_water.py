@@ -60,11 +60,13 @@ def pore_water(
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
-    acts on both.
+    acts on both. Computes of mass, momentum and energy (linear_momentum, kinetic_energy, ...) count
+    the soil alone, without its water.
 
     The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
-    and never shortens it. Consolidation to Tv = 1 takes about L c/c_v cells of steps, with length L
-    of the drainage path: with 1e-9 m/s, scale density or time.
+    and never shortens it. With N cells over a drainage path of length L, consolidation to Tv = 1
+    takes about 2 N L c/c_v steps, too many at 1e-9 m/s: multiply the densities by a factor, as
+    inputs/in.terzaghi does.
 
     Before the solid of the material. Needs method ulmpm or tlmpm with FLIP or PIC and linear,
     quadratic-spline or cubic-spline, scheme musl, and bodies of 1D, plane strain or 3D on one

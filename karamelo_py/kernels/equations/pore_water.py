@@ -110,7 +110,11 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux at a node; what does not leave there, per volume, and what does; mean pressures."""
+    """Mass flux (d,); outflow through a closed node per volume; outflow of an open one; pressures.
+
+    The flux is per area. The first outflow stays in the points, the second is mass per time. The
+    pressures are the mean at the node and the mean of the unseen part.
+    """
 
     @staticmethod
     def shape(kin):

@@ -64,9 +64,9 @@ class Absorbing(Fix):
     the surface. Of a pulse of 20 cells at normal incidence, 0.2 % of the energy returns; oblique
     waves return more. In saturated ground, soil and water move as one at the edge.
 
-    In its first step the fix takes over the force that holds each node in balance. Ground that
-    begins with its stress (fix initial_stress) stays where it is; a later load, such as weight,
-    pushes the edge slowly away.
+    In its first step the fix measures the force on each node, and from then on applies the opposite
+    force. Ground that begins with its stress (fix initial_stress) therefore stays where it is; a
+    later load, such as weight, slowly pushes the edge outwards.
 
     Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
     move less than half a cell.

@@ -13,7 +13,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """The total is what the last step let out."""
+    """Give the pressure; publish the mass of water that left per time, known from the last step."""
     return values[0], flux[-3]
 
 
