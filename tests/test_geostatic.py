@@ -92,16 +92,19 @@ def test_columns_are_the_same_wherever_the_points_lie():
         assert load[:, 0] == pytest.approx(18000 * depth, rel=1e-9)
 
 
-def test_gauss_points_go_to_the_middles_of_their_boxes():
-    """In cells with a gap between them; points of a file stay."""
-    at, weight = np.polynomial.legendre.leggauss(3)
-    middle = np.array([weight[0] / 4, 0.5, 1 - weight[0] / 4])
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_gauss_points_go_to_the_middles_of_their_boxes(n):
+    """In cells with a gap between them; points of a file stay, also if few are not on lines."""
+    at, weight = np.polynomial.legendre.leggauss(n)
+    middle = np.cumsum(weight / 2) - weight / 4
     cells = np.array([0.0, 1, 2, 7, 8])
     x, to = ((cells[:, None] + one).reshape(-1, 1) for one in (at / 2 + 0.5, middle))
     size = np.tile(weight / 2, len(cells))[:, None]
     assert x + to_middles(x, size) == pytest.approx(to)
-    x = np.random.default_rng(1).random((50, 2))
-    assert not to_middles(x, np.full_like(x, 0.14)).any()
+    random = np.random.default_rng(1).random((50, 2))
+    lines = np.append(np.arange(20) + 0.5, [3.2, 3.8, 7.7, 11.1])[:, None]
+    for stay, long in ((random, 0.14), (lines, 1.0)):
+        assert np.abs(to_middles(stay, np.full_like(stay, long))).max() < 1e-9
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
