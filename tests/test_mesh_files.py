@@ -526,3 +526,16 @@ def test_a_large_face_loads_all_points_behind_it(run_interpreted, tmp_path):
     *_, z, vz = np.loadtxt(done.folder / "d.1.txt", skiprows=11).T
     top = vz[z > 0.8]
     assert len(top) == 16 and top.min() > 0.5 * top.mean() and top.max() < 2 * top.mean()
+
+
+def test_elements_larger_than_cells_are_reported(run_interpreted, tmp_path):
+    (tmp_path / "deck.inp").write_text(SHEET, "utf-8")
+    script = f"""
+        method(ulmpm, FLIP, linear, 1)
+        dimension(3, -1, 2, -1, 2, -1, 3, H)
+        material(m, linear, 1000, 1e6, 0.3)
+        solid(s, mesh, {tmp_path}/deck.inp, m, H)
+        run(0)
+    """
+    assert "2.3 cells wide, with one point each" in run_interpreted(script.replace("H", "0.5")).err
+    assert "cells wide" not in run_interpreted(script.replace("H", "1")).err
