@@ -89,3 +89,33 @@ def test_on_a_gpu(run_script):
     """
     )
     alike(run_script(script, folder="here"), run_script(script, "--gpu", folder="there"), 1e-11)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("right, rock, xhi", "right, rock, xlo"),
+        ("right, rock, xhi", "all, rock, xhi"),
+        ("left, rock, xlo", "left, rock, xhi"),
+    ],
+)
+def test_nodes_that_are_not_at_the_side_are_refused(run_interpreted, right, wrong):
+    script = ROCK.format(way="ulmpm, FLIP, linear, 1", water="").replace(right, wrong)
+    err = run_interpreted(script + "run(1)", status=1).err
+    assert f"on the side {wrong[-3:]} of the bodies" in err
+
+
+def test_an_edge_is_not_taken_for_another_direction(run_interpreted):
+    script = """
+        method(tlmpm, FLIP, linear, 1)
+        dimension(2, 0, 10, 0, 10, 1)
+        region(bar, block, 0, 10, 0, 10)
+        material(rock, linear, 2500, 50e9, 0.25)
+        solid(rock, region, bar, 2, rock, 1, 0)
+        region(right, block, 9.9, INF, INF, INF)
+        group(right, nodes, region, right, all)
+        fix(out, absorbing, right, rock, SIDE)
+        run(1)
+    """
+    assert "lie at y = 0 to 10" in run_interpreted(script.replace("SIDE", "yhi"), status=1).err
+    run_interpreted(script.replace("SIDE", "xhi"))

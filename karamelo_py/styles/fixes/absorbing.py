@@ -3,6 +3,8 @@
 from math import sqrt
 from typing import Literal
 
+import numpy as np
+
 from karamelo_py.compiler import where
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.kernels.equations.mass_momentum import Normal
@@ -10,11 +12,14 @@ from karamelo_py.points.kinematics import Space, total
 from karamelo_py.points.laws import initial_state, shear_part, specific_volume, wave_speed_squared
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.modify import LAST, Fix, vector_hook
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.edges import SIDES
+
+LAYERS = 3.5  # cells between the nodes of an edge, along its normal
 
 
 class Support(Field):
@@ -95,11 +100,32 @@ class Absorbing(Fix):
             message = f"the scene has no direction {side[0]}"
             expected = ", ".join(SIDES[: 2 * hub.domain.dimension])
             raise ScriptError(message, argument="side", expected=expected)
+        self.side = side
         self.formulas = tuple(map(Expression, (float(axis), *speeds(material))))
 
     def defined(self) -> None:
         if self.hub.domain.h is not None:
             self.group.refuse_past_domain()
+            for lattice in self.hub.lattices:
+                self._check_side(lattice)
+
+    def _check_side(self, lattice: Lattice) -> None:
+        nodes, axis = self.group.nodes, SIDES.index(self.side) // 2
+        here = nodes[(nodes >= lattice.first) & (nodes < lattice.first + lattice.node_count)]
+        solids = self.hub.solids.values()
+        if not len(here) or not solids:
+            return
+        x = lattice.positions(here)[:, axis]
+        middle = 0.5 * (min(s.lo[axis] for s in solids) + max(s.hi[axis] for s in solids))
+        outer = x.mean() < middle if self.side.endswith("lo") else x.mean() > middle
+        if np.ptp(x) <= LAYERS * self.hub.domain.h and outer:
+            return
+        raise ScriptError(
+            f"the nodes lie at {self.side[0]} = {x.min():.4g} to {x.max():.4g}: not at one edge, "
+            f"on the side {self.side} of the bodies",
+            argument="side",
+            expected="a group of nodes at an edge, and the side that it faces",
+        )
 
 
 def speeds(material: Material) -> tuple[float, float]:
