@@ -415,7 +415,12 @@ def _tried(lines, dimension, folder):
             else "particles"
         )
         if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
-            interpreter.run_text(f"group({words[3]}, {kind}, region, wall, all)")
+            place = "wall"
+            if words[2] == "absorbing":
+                place, x = "edge", {1: 9}.get(dimension, 0.3)
+                more = ", INF, INF" * (dimension - 1)
+                interpreter.run_text(f"region(edge, block, {x}, {x}{more})")
+            interpreter.run_text(f"group({words[3]}, {kind}, region, {place}, all)")
         if words[2] in ("union", "intersection", "difference"):
             for region in set(words[3:]) - {"disk", "wall"}:
                 interpreter.run_text(f"region({region}, {STAGES[dimension][2]})")

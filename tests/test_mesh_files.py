@@ -481,7 +481,7 @@ def test_named_faces_are_loaded_with_their_whole_area(run_interpreted, tmp_path)
     script = f"""
         method(tlmpm, FLIP, linear, 1, thermo-mechanical)
         dimension(3, -1, 2, -1, 2, -1, 3, 1)
-        region(body, mesh, {tmp_path}/deck.inp, BODY)
+        region(body, block, 0, 1, 0, 1, 0, 1)
         region(roof, mesh, {tmp_path}/deck.inp, ROOF)
         material(m, linear, 1000, 1e6, 0.3, 500, 1)
         solid(s, region, body, 2, m, 1, 300)
@@ -511,7 +511,7 @@ def test_a_large_face_loads_all_points_behind_it(run_interpreted, tmp_path):
     script = f"""
         method(tlmpm, FLIP, linear, 1)
         dimension(3, -1, 2, -1, 2, -1, 3, 0.5)
-        region(body, mesh, {tmp_path}/deck.inp, BODY)
+        region(body, block, 0, 1, 0, 1, 0, 1)
         region(roof, mesh, {tmp_path}/deck.inp, ROOF)
         material(m, linear, 1000, 1e6, 0.3)
         solid(s, region, body, 2, m, 0.5)
@@ -537,5 +537,6 @@ def test_elements_larger_than_cells_are_reported(run_interpreted, tmp_path):
         solid(s, mesh, {tmp_path}/deck.inp, m, H)
         run(0)
     """
-    assert "2.3 cells wide, with one point each" in run_interpreted(script.replace("H", "0.5")).err
-    assert "cells wide" not in run_interpreted(script.replace("H", "1")).err
+    said = run_interpreted(script.replace("H", "0.5")).err
+    assert "points far apart: points of solid 's' are 2 cells apart" in said
+    assert "far apart" not in run_interpreted(script.replace("H", "1")).err

@@ -29,7 +29,6 @@ UNITS = {
     1 / 0.0254: "a file in metres, a script in inches",
     1 / 25.4: "a file in millimetres, a script in inches",
 }
-WIDEST = 1.5  # cells between points that share nodes
 CURVED = 0.01  # of an edge's length: a circle of 80 elements
 
 
@@ -261,7 +260,6 @@ class MeshSolid(Solid):
             or [part.corners[:, 0] for part, _, _ in measures]
         )
         _tell_of_units(hub, file, reach.min(axis=0), reach.max(axis=0))
-        self._tell_of_gaps(hub, volume[kept] ** (1 / domain.dimension))
         self.volumes = float(volume[kept].sum()), float(volume.sum())
         in_file = Counter[str]()
         for cells in map(in_order, mesh.cells):
@@ -284,18 +282,6 @@ class MeshSolid(Solid):
                 shape="several shapes" if mixed else measures[0][0].shape.name,
                 corners=None if mixed else corners[0],
             ),
-        )
-
-    def _tell_of_gaps(self, hub: Hub, width: np.ndarray) -> None:
-        """Warn of points too far apart to share nodes, unless they have domains."""
-        basis, h = hub.update.method.basis, require_domain(hub).h
-        if not h or basis.traits.shape or not len(width) or np.median(width) <= WIDEST * h:
-            return
-        hub.warn(
-            f"elements of {self.file.name} are {np.median(width) / h:.2g} cells wide, with one "
-            "point each: points so far apart do not hold together",
-            hint="region(ID, mesh, FILE) and solid(ID, region, ...) fill it with points in cells; "
-            "or a finer mesh, or a basis cpdi",
         )
 
     def _tell_of_left_out(self, hub: Hub, mesh: Mesh) -> None:

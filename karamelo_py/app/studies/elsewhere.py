@@ -96,7 +96,7 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
     ]
     if differ:
         outcome = CaseOutcome(
-            "failed", f"{machine} has {', '.join(differ)}", {}, code="other-versions"
+            "failed", f"{machine} has {', '.join(differ)}", {}, code="busy"
         )
         return Returned(outcome, {}, machine)
     launch, _ = _unpacked(package)

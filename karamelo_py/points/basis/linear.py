@@ -1,6 +1,8 @@
 """Linear hat functions: two nodes per direction, 1 - |x - X_I| / h."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.basis import BasisTraits, mapped_again, without_moment
@@ -29,6 +31,18 @@ class Linear(NamedTuple):
     traits = BasisTraits(
         cells=1, least_nodes=2, steady_moment=False, steep_edge=True, gradient_jumps=True
     )
+
+
+WIDEST = 1.5  # cells between points that share nodes
+
+
+def _apart(scene: Any) -> dict[str, Any] | None:
+    for solid in scene.hub.solids.values():
+        if len(solid.half_size):
+            cells = 2 * float(np.median(solid.half_size)) / scene.hub.domain.h
+            if cells > WIDEST:
+                return {"solid": solid.id, "cells": cells}
+    return None
 
 
 known_failure(
@@ -88,6 +102,15 @@ known_failure(
     "{scene.driven.cells:.2g} cells; with a linear basis, stresses scatter where points cross "
     "cells (in a bar pulled by 0.3 cells by 30 %, by 0.5 cells more than 100 %)",
     cure="cpgimp instead of linear (within 1 %), or tlmpm",
+)
+known_failure(
+    Linear,
+    "points far apart",
+    when=lambda basis, scene: _apart(scene),
+    reason="points of solid '{solid}' are {cells:.2g} cells apart, such as one in each element of "
+    "a mesh: they share no nodes and do not hold together",
+    cure="region(ID, mesh, FILE) with solid(ID, region, ...), which puts points in cells; a finer "
+    "mesh, or a basis cpdi",
 )
 known_failure(
     Linear,
