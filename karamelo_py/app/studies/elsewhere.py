@@ -32,7 +32,7 @@ RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
 class Package(NamedTuple):
-    """All of a case but its variables."""
+    """Everything that the cases of a study have in common."""
 
     script: str  # path below a common folder
     files: tuple[tuple[str, bytes], ...]  # paths below it, and contents
@@ -57,7 +57,7 @@ def versions() -> tuple[tuple[str, str], ...]:
 def packed(
     script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str]
 ) -> Package:
-    """The script, its includes, and the files that arguments or variables name."""
+    """Collect the script, its includes, and the files that arguments or variables name."""
     paths = {Path(abspath(path)) for path in script.statements}
     words = {(script.path, word) for words in values.values() for word in words}
     for path, statements in script.statements.items():
@@ -87,7 +87,7 @@ def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
 
 
 def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
-    """On the machine of a worker."""
+    """Run a case on the machine of a worker."""
     machine = socket.gethostname()
     differ = [
         f"{name} {here} for {there}"
@@ -95,9 +95,7 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
         if here != there
     ]
     if differ:
-        outcome = CaseOutcome(
-            "failed", f"{machine} has {', '.join(differ)}", {}, code="busy"
-        )
+        outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
         return Returned(outcome, {}, machine)
     launch, _ = _unpacked(package)
     with TemporaryDirectory(prefix="karamelo-py-case-") as name:
@@ -113,7 +111,7 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
 
 
 class Elsewhere:
-    """By an executor; a case that is lost is tried again."""
+    """Runs cases by an executor, and tries a lost case again."""
 
     def __init__(self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack):
         """`send` makes the package known to the machines; its result goes with each case."""
@@ -124,7 +122,7 @@ class Elsewhere:
         self.machines: dict[Path, str] = {}  # of folders
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
-        """Its files are in `folder`."""
+        """Return a future of the outcome; the files of the case come into `folder`."""
         outer: Future = Future()
         self._try(case, folder, outer, 1)
         return outer
@@ -168,7 +166,7 @@ class Elsewhere:
 
 
 def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
-    """To the machines that -on names."""
+    """Connect to the machines that -on names."""
     ends = ExitStack()
     if options.on == "mpi":
         return _mpi(package, ends)

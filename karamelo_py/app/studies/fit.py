@@ -3,7 +3,6 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import command_of, folder_name, worded
 from karamelo_py.app.studies.records import recorded
+from karamelo_py.app.studies.sampling import needs_scipy
 from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError, plural, unknown
@@ -194,9 +194,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    if find_spec("scipy") is None:
-        hint = "pip install '.[implicit]' in the folder of karamelo-py"
-        raise ScriptError("karamelo-py fit needs SciPy", hint=hint)
+    needs_scipy("fit")
     out = variables.out_file(options.o, ".csv")
     plan = variables.family(options)
     measured = [Observation(text, plan.script, plan.values) for text in options.match]

@@ -35,6 +35,13 @@ def needs_scipy(word: str) -> None:
         raise ScriptError(f"karamelo-py {word} needs SciPy", hint=hint)
 
 
+def require_power_of_2(option: str, count: int) -> None:
+    """Refuse other sizes of a sample by Sobol', which lose its balance."""
+    if count & (count - 1):
+        expected = f"a power of 2 with sobol, such as {2 ** round(np.log2(count))}"
+        raise ScriptError(f"{option} {count}", expected=expected)
+
+
 def random_variables(words: Sequence[str]) -> tuple[list[Random], list[str]]:
     """Separate ``NAME=normal(1, 0.1)`` from other words of -var."""
     found, others = [], []
@@ -84,16 +91,15 @@ def _law(name: str, kind: str, text: str) -> Any:
 def samples(
     laws: Sequence[Any], count: int, sequence: str, seed: int, factor: np.ndarray | None = None
 ) -> np.ndarray:
-    """(count, variables); `factor`: Cholesky factor of the correlation of normal scores.
+    """Draw (count, variables) numbers; `factor`: Cholesky factor of the normal scores' correlation.
 
     A longer Sobol' or Halton sequence begins with the shorter one.
     """
     from scipy.stats import norm, qmc
 
     engines = {"latin": qmc.LatinHypercube, "sobol": qmc.Sobol, "halton": qmc.Halton}
-    if sequence == "sobol" and count & (count - 1):
-        power = 2 ** round(np.log2(count))
-        raise ScriptError(f"-sample {count}", expected=f"a power of 2 with sobol, such as {power}")
+    if sequence == "sobol":
+        require_power_of_2("-sample", count)
     parts = engines[sequence](len(laws), rng=np.random.default_rng(seed)).random(count)
     if factor is not None:
         parts = norm.cdf(norm.ppf(parts) @ factor.T)
@@ -132,18 +138,16 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("-seed", type=int, default=1, help="of -sample (1)")
     parser.add_argument(
-        "-correlation",
-        type=Path,
-        metavar="FILE",
+        "-correlation", type=Path, metavar="FILE",
         help="correlation matrix of the random variables; its columns have their names",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "-fails", metavar="CONDITION", help="print the probability of an event: 'factor < 1'"
     )
 
 
 def prepare(options: Namespace) -> dict[str, Any]:
-    """Random variables become lists of samples; facts for the record."""
+    """Replace random variables in the options by lists of samples; return facts for the record."""
     calls = (CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
     if not options.sample:
         if any(call and call[1] in KINDS for call in calls):
@@ -165,8 +169,7 @@ def prepare(options: Namespace) -> dict[str, Any]:
     ]
     options.var = [*lists, *others]
     options.zip = [*options.zip, ",".join(names)]
-    laws_given = {one.name: one.text for one in found}
-    return {"random": laws_given, "sequence": options.sequence, "seed": options.seed}
+    return {"random": described(found), "sequence": options.sequence, "seed": options.seed}
 
 
 def described(found: Sequence[Random]) -> Mapping[str, str]:

@@ -11,7 +11,14 @@ from karamelo_py.app.options import positive
 from karamelo_py.app.studies import variables
 from karamelo_py.app.studies.case import worded
 from karamelo_py.app.studies.records import recorded, value, write
-from karamelo_py.app.studies.sampling import KINDS, Random, described, needs_scipy, random_variables
+from karamelo_py.app.studies.sampling import (
+    KINDS,
+    Random,
+    described,
+    needs_scipy,
+    random_variables,
+    require_power_of_2,
+)
 from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.app.studies.uncertainty import RESAMPLED, SURE, Interval
 from karamelo_py.script.errors import ScriptError, plural
@@ -39,9 +46,7 @@ def sobol(
     """First and total indices, for each result and each variable."""
     from scipy.stats import sobol_indices
 
-    if n & (n - 1):
-        expected = f"a power of 2, such as {2 ** round(np.log2(n))}"
-        raise ScriptError(f"-n {n}", expected=expected)
+    require_power_of_2("-n", n)
     rng = np.random.default_rng(seed)
     found = sobol_indices(func=results, n=n, dists=list(laws), rng=rng)
     sure = found.bootstrap(confidence_level=SURE, n_resamples=RESAMPLED // 4)
@@ -77,14 +82,9 @@ def morris(
     made = []
     for one in numbers:
         found = analyzer.analyze(
-            problem,
-            parts,
-            one,
-            num_levels=LEVELS,
-            conf_level=SURE,
-            seed=seed,
+            problem, parts, one, num_levels=LEVELS, conf_level=SURE, seed=seed,
             print_to_console=False,
-        )
+        )  # fmt: skip
         half = np.asarray(found["mu_star_conf"], float)
         mu, sigma = (np.asarray(found[word], float) for word in ("mu_star", "sigma"))
         made.append(

@@ -85,7 +85,7 @@ def _tell_of(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> 
     if lost := len(rows) - len(done):
         print(f"{plural(lost, 'run')} without results are left out")
     if fails and done:
-        seen = sum(_happens(fails, row, results) for row in done)
+        seen = sum(_happens(fails, row) for row in done)
         print(f"probability of {fails}: {probability(seen, len(done))}; {seen} of {len(done)} runs")
 
 
@@ -94,7 +94,7 @@ def check(condition: str, names: Sequence[str]) -> None:
     variables.holds(condition, dict.fromkeys(names, "1"), option="-fails")
 
 
-def _happens(condition: str, row: Row, results: Sequence[str]) -> bool:
+def _happens(condition: str, row: Row) -> bool:
     cells = {n: shown_exactly(row[n]) for n in [*row] if row[n] is not None}
     return variables.holds(condition, cells, option="-fails")
 
