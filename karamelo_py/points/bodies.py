@@ -1,4 +1,4 @@
-"""Points as bodies: size, and forces between two points that touch as spheres."""
+"""Size of points as bodies, and the force between two points that touch as spheres."""
 
 from math import pi, sqrt
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import dot, product
 
-NEW = 0.05  # weight of a step in the running mean of the load
+NEW = 0.05  # weight of the latest step in the running mean of the load
 
 
 class Hertz(NamedTuple):
@@ -17,13 +17,13 @@ class Hertz(NamedTuple):
 
 
 class MinimizePenetration(NamedTuple):
-    """Removes the overlap of two free points within a step, with friction."""
+    """Remove the overlap of two free points within one step, with Coulomb friction."""
 
-    friction: float  # Coulomb's
+    friction: float
 
 
 def face(kin, volume, x):
-    """Area of a point as a cube: per unit thickness in 2D, per angle around an axis or centre."""
+    """Face area of a cubic point: per unit thickness in 2D, per angle around an axis or centre."""
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:
@@ -44,7 +44,7 @@ def radius(kin, volume, x):
 
 
 class TouchingPair(NamedTuple):
-    dx: Any  # x2 - x1
+    dx: Any
     r: Any  # |dx|, below the sum of the radii
     radii: tuple
     masses: tuple
@@ -54,7 +54,7 @@ class TouchingPair(NamedTuple):
 
 @point_function()
 def force_between(law, kin, pair):
-    """Force on point 1 of a `TouchingPair`."""
+    pass
 
 
 @force_between.on(Hertz)
@@ -81,26 +81,25 @@ class FrictionMemory(NamedTuple):
 
 
 def rub(mu, load, memory, stop):
-    """Coulomb friction with memory: the force, and the memory after the step.
+    """Coulomb friction with memory: return the force and the memory after the step.
 
-    `stop` = m v/dt stops a free point. Alone, it would let loaded points creep. So slip stretches a
-    spring along the surface, as stiff as the normal contact; its force `hold` is returned to the
-    friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Points bounce on a
-    stiff contact, so the load pulses: a step may use friction `unused` in earlier steps, up to mu
-    times the `mean` load. A point that always slides has mu times the load of each step.
+    `stop` = m v/dt would stop a free point, but lets loaded points creep. So slip also stretches a
+    tangential spring as stiff as the normal contact, whose force `hold` is returned to the friction
+    cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Points bounce on a stiff
+    contact and the load pulses: a step may spend friction `unused` in earlier steps, up to mu times
+    the `mean` load. A point that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)
     unused = (1 - NEW) * unused + mu * load
     bound = mu * max(mean, load)
     force = _shortened(hold + stop, min(bound, unused))
-    # At least 0: negative by rounding, friction would accelerate the slip.
+    # Rounding must not make friction negative: it would accelerate the slip.
     left = max(unused - sqrt(force.squared()), 0.0)
     return force, FrictionMemory(_shortened(hold, bound), mean, left)
 
 
 def along(v, normal):
-    """Tangential part; all of it if the normal is 0."""
     square = normal.squared()
     return v + -(dot(v, normal) / square if square > 0 else 0.0) * normal
 

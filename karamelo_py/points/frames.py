@@ -1,7 +1,7 @@
-"""Frames: present positions (``Updated``) or reference positions (``Total``).
+"""Frames: present (``Updated``) or reference positions (``Total``).
 
-``Updated``: spatial gradients and Kirchhoff stress. ``Total``: reference gradients, first
-Piola-Kirchhoff stress and deformation gradient F.
+``Updated`` uses spatial gradients and Kirchhoff stress, ``Total`` reference gradients, the first
+Piola-Kirchhoff stress and the deformation gradient F.
 """
 
 from typing import Any, NamedTuple
@@ -34,14 +34,14 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """Spatial dt grad v from `dl` of the frame and the old F."""
-    # F + dt Fdot = (I + dt Fdot F^-1) F exactly
+    """Convert `dl` of the frame to the spatial increment dt grad v, with F before the step."""
+    # F + dt Fdot = (I + dt Fdot F^-1) F (exact)
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
-    """`dl` at the positions before a motion, from `dl` after it."""
-    # grad v there is grad v (I - dl)^-1, so F grows by (I - dl)^-1 exactly; accurate for small dl.
+    """Convert `dl` after a motion to the positions before it."""
+    # grad v changes by (I - dl)^-1, so F grows by (I - dl)^-1 exactly; accurate for small dl.
     # Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
 
@@ -51,22 +51,22 @@ def strained(frame, kin, f, dl):
 
 
 def force_stress(frame, kin, tau, f):
-    """Stress that gives nodal forces, per reference volume."""
     return tau if frame.moves else tau.nominal(f)
 
 
 def pulled_back(frame, kin, g, f):
-    """Flux direction C^-1 g = F^-1 F^-T g at reference positions; the gradient g in space."""
+    """Pull the gradient g back to the flux direction C^-1 g = F^-1 F^-T g in the reference frame.
+    """
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 
 def scaled_increment(frame, kin, dl, f, ratio):
-    """`dl` scaled to `ratio` times the volume."""
-    # (I + dl) s - I in space, (F + dl) s - F for reference positions
+    """Scale `dl` so that the volume changes by `ratio`."""
+    # updated: (I + dl) s - I; total: (F + dl) s - F
     s = power(ratio, 1 / len(dl.axes))
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
 def inverse_stretch_squared(frame, kin, f, like):
-    """Bound of (h / size of a deformed cell)^2, the inverse smallest stretch squared."""
+    """Bound (h / size of the deformed cell)^2, the inverse smallest stretch squared."""
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

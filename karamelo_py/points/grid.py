@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
-Length = Any  # of one grid; in the setup of a scene, arrays of all grids
+Length = Any  # of one grid; of all grids, as arrays, in the setup of a scene
 Count = Any
 
 
 class Grid(NamedTuple):
-    """One grid of a scene. Lengths in units of the scene, counts in cells."""
+    """One grid of a scene; lengths in units of the scene, counts in cells."""
 
     x0: Length  # lower corner
     y0: Length
@@ -21,13 +21,13 @@ class Grid(NamedTuple):
     nx: Count  # cells
     ny: Count
     nz: Count
-    lx: Length  # size in cells, not always an integer
+    lx: Length  # in cells, may be fractional
     ly: Length
     lz: Length
-    slack: Length  # distance outside at which points count as inside, in cells
-    step_x: Count  # difference of node numbers
+    slack: Length  # points this far outside (in cells) count as inside
+    step_x: Count  # stride of node numbers
     step_y: Count
-    first: Count  # number of the first node
+    first: Count  # first node number
     first_cell: Count
 
 
@@ -36,7 +36,6 @@ def renumbered(grid, first, step_x, step_y):
 
 
 def pick(direction, a, b, c):
-    """Select by direction; at compile time if it is a literal."""
     return a if direction == 0 else (b if direction == 1 else c)
 
 
@@ -53,7 +52,7 @@ def inside(grid, kin, x):
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
-        # NaN lies outside in this form.
+        # False for NaN.
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
 
@@ -66,7 +65,7 @@ def node_position(grid, n):
 
 
 class Bounces(Field):
-    """Number of reflections of a point at the edge of the domain, per direction."""
+    """Reflections of a point at the edge of the domain, per direction."""
 
     shape = vector
 
@@ -78,7 +77,7 @@ class ReflectingGrid(Grid):
 
 @point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
-    """Position, velocity, moment after reflection; 1 for each reflecting direction."""
+    """Return position, velocity and moment after reflection, and 1 per reflecting direction."""
     return y, v, moment, ()
 
 
@@ -92,14 +91,14 @@ def _reflected_reflecting_grid(grid, kin, y, v, moment):
 
 
 def beyond(grid, direction, y):
-    """-1 below the lower edge, 1 above the upper one, else 0."""
+    """Return -1 below the lower edge, 1 above the upper edge, else 0."""
     a = in_cells(grid, direction, y)
     end = pick(direction, grid.lx, grid.ly, grid.lz)
     return where(a < 0, real(-1, y), where(a > end, real(1, y), real(0, y)))
 
 
 def turn(grid, direction, y, v):
-    """-1 if a point outside the edge moves further out, else 1."""
+    """Return -1 if a point outside the edge moves further out, else 1."""
     return where(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
 
 
@@ -112,7 +111,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """R L R of a tensor L (or nothing), R = diag(signs): velocities and positions are mirrored."""
+    """Return R L R with R = diag(signs), the mirrored tensor L (which may be empty)."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

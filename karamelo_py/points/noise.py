@@ -1,6 +1,6 @@
 """Limits of drift and rotation through the grid, which amplify null-space noise.
 
-From disks of rubber and metal, 4 to 16 cells across the radius, vibrating with 0.01 to 2 % of
+Measured on rubber and metal disks, 4 to 16 cells across the radius, vibrating with 0.01 to 2 % of
 strain (docs/energy-measurements.md).
 """
 
@@ -11,12 +11,12 @@ from karamelo_py.language.rules import known_failure
 
 
 class DriftLimits(NamedTuple):
-    """Bounds of cells crossed times c dt/h for conserved energy, two points per cell or one."""
+    """Limits of (cells crossed) x c dt/h for conserved energy, as (two points per cell, one)."""
 
-    drift: tuple[float, float]  # of the centre of mass, in 2D and 3D, musl and usf
-    line: float  # in 1D
+    drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
+    line: float  # 1D
     averaged: tuple[float, float]  # as `drift`, with usavg
-    rim: tuple[float, float]  # of the rim of a rotating body, musl and usf
+    rim: tuple[float, float]  # rim of a rotating body, musl and usf
     rim_averaged: tuple[float, float]  # with usavg
     fastest: float = inf  # times the wave speed; a faster drift adds no noise
     damps: bool = False  # a faster drift damps vibrations in 3D

@@ -24,11 +24,11 @@ def _damping(scheme: "Newmark") -> str:
 
 
 class Newmark(NamedTuple):
-    """Implicit time steps with inertia, not limited by waves (Newmark 1959).
+    """Implicit time steps with inertia, longer than waves allow (Newmark 1959).
 
-    `set_dt` sets the step. Unresolved vibrations are undamped, unless `gamma` is above 1/2, `rho`
-    below 1, or the rule euler. The acceleration at the beginning of a step follows from the forces
-    there; with `rho` from the rule.
+    `set_dt` sets the step. Unresolved vibrations are undamped unless `gamma` is above 1/2, `rho`
+    below 1, or the rule euler. The initial acceleration of a step comes from the forces, with `rho`
+    from the rule.
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ class Newmark(NamedTuple):
     rule
         ``newmark``, or ``euler``: backward Euler, which damps all vibrations.
     rho
-        Spectral radius at high frequency: fraction of vibrations much faster than the step that
-        remains after a step, by generalized-alpha (Chung & Hulbert 1993). Slow vibrations are
-        hardly damped. 1: no damping; 0: fast ones vanish in one step.
+        High-frequency spectral radius of generalized-alpha (Chung & Hulbert 1993): the fraction of
+        vibrations much faster than the step that remains after it. Slow vibrations are hardly
+        damped. 1: no damping; 0: fast ones vanish in one step.
     tolerance, iterations, solver, stabilisation
         As in quasi-static.
 
@@ -75,7 +75,7 @@ class Newmark(NamedTuple):
 
     @property
     def alphas(self) -> tuple[float, float]:
-        """Fractions of the old accelerations and of the old forces in a step."""
+        """Fractions of the old accelerations and forces in a step."""
         # At radius 1 both are 1/2: balance at the end follows from balance at the start.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 

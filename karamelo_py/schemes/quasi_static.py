@@ -7,7 +7,7 @@ from karamelo_py.kernels.equations.strain import StrainOfLoadStep
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
 from karamelo_py.schemes.traits import SchemeTraits
 
-# Stages: loads on nodes from the present stress, constraints, motion of the points.
+# stages: nodal loads from the present stress, constraints, motion of the points
 BEGIN = (
     table.AtPoints(arrays.INITIAL_INTEGRATE, 0),
     table.SUMS,
@@ -22,20 +22,19 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# Of the last step: corrections, residual fraction of forces, substeps.
+# of the last step: corrections, residual fraction of forces, substeps
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# Above, the first correction would pass without equilibrium; below is rounding.
+# A larger one passes the first correction without equilibrium; a smaller one is rounding.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
-    Each step of the run is a load step; loads are formulas of `time`, which is only a load
-    parameter. The tangent is exact for every law and basis, so convergence is quadratic. A step
-    that does not converge is subdivided.
+    `time` is only a load parameter: loads are formulas of it. The tangent is exact for every law
+    and basis, so convergence is quadratic. A step that does not converge is subdivided.
 
     Parameters
     ----------
@@ -50,9 +49,9 @@ class QuasiStatic(NamedTuple):
         Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body with
         this fraction of Young's modulus, for nodes that overlap only a sliver of it. 0: none.
     limit
-        Without equilibrium even in 1/1024 of a step: raise an ``error``, or end the run (``stop``).
-        After ``stop`` the script continues, with `time` of the last equilibrium: loads as formulas
-        of it are the limit load.
+        Action without equilibrium even in 1/1024 of a step: raise an ``error``, or end the run
+        (``stop``). After ``stop`` the script continues with `time` of the last equilibrium, which
+        gives the limit load.
 
     Example
     -------
@@ -62,7 +61,7 @@ class QuasiStatic(NamedTuple):
 
     Notes
     -----
-    Velocities and kinetic energies are zero after a step. A script can show `iterations`
+    Velocities and kinetic energies are zero after a step. Scripts can use `iterations`
     (corrections), `residual` (fraction of the forces) and `parts` (substeps) of the last step.
 
     A step is also subdivided if points would move more than half a cell towards nodes that move

@@ -8,9 +8,9 @@ from karamelo_py.schemes.traits import SchemeTraits
 
 
 class USAVG(NamedTuple):
-    """Half of the stress update before the forces, and half after them as in musl.
+    """Do half of the stress update before the forces, and half after them as in musl.
 
-    Best energy conservation, for two stress updates per step (Nairn 2003, "Material point method
+    Conserves energy best, with two stress updates per step (Nairn 2003, "Material point method
     calculations with explicit cracks"). The halves add up to the whole increment of F.
 
     Example

@@ -10,12 +10,12 @@ from karamelo_py.schemes.traits import SchemeTraits
 class USF(NamedTuple):
     """Update the stress before the forces, with the nodal velocity at the start of the step.
 
-    This velocity has already moved the points, so with weights at present positions F grows by (I -
-    dt grad v)^-1. The published increment I + dt grad v gains energy and shrinks rotating bodies.
+    That velocity has already moved the points, so F grows by (I - dt grad v)^-1 at present
+    positions. The published I + dt grad v gains energy and shrinks rotating bodies.
 
-    The log shows stress, volume and strain of the positions at the beginning of a step (with usavg,
-    half of the increment). With a law in rate form, a rotation by w dt in a step compresses by
-    (w dt)^2/2, as with musl. usavg has half of this error.
+    The log shows stress, volume and strain at the beginning of a step (with usavg, half of the
+    increment). With rate-form laws, a rotation by w dt in a step compresses by (w dt)^2/2, as with
+    musl; usavg halves this error.
 
     Example
     -------

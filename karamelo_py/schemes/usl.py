@@ -19,14 +19,14 @@ class USL(NamedTuple):
     The fastest scheme: one pass over the points per step. Slightly dissipative.
 
     The stable step is 0.65 h/c, 0.4 h/c with one point per cell, and 0.7 times that with
-    bernstein-quadratic. The points average some nodal modes away; only the strain of such a mode
+    bernstein-quadratic. Points average some nodal modes away. Only the strain of such a mode
     responds to forces: e <- (1 - (w dt)^2) e, stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. Below a mass limit, the mean mass of the
+    A node with almost no mass gets a large velocity. If its mass is below the mean mass of the
     points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
     scaled by mass / limit. Momentum is conserved.
 
-    With fix velocity_particles on points that deform, steps are those of musl.
+    With fix velocity_particles on deformable points, usl runs as musl.
 
     Example
     -------
@@ -81,10 +81,10 @@ any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defin
 
 
 class USLUnlimited(NamedTuple):
-    """usl as first published, without the limit at nodes with very little mass.
+    """usl as first published, without the limit at light nodes.
 
-    A point that has just entered a cell gives the node ahead little mass and much force, and gets
-    the strain f dt / m from there. This scheme shows the effect of the limit.
+    A point that has just entered a cell gives the node ahead little mass but much force f, and so
+    receives the strain f dt / m. For comparison with usl.
 
     Example
     -------

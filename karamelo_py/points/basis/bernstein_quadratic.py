@@ -1,5 +1,3 @@
-"""Quadratic Bernstein polynomials: nodes every h/2, three per cell in each direction."""
-
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
@@ -43,7 +41,7 @@ known_failure(
 @along.on(BernsteinQuadratic)
 def _along_bernstein_quadratic(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
-    i = min(int(a), cells_along(grid, direction) - 1)  # the last face is in the last cell
+    i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     s = a - i
     t = 1 - s
     twice = grid.inv_h + grid.inv_h

@@ -15,7 +15,7 @@ from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
 
 LEAST = 1e-3
 MOST = 1.0
-STRETCHED = "half_size", "half_size", "deformation"  # present and initial, F
+STRETCHED = "half_size", "half_size", "deformation"  # half size now and at first, F
 
 
 class _Box(NamedTuple):
@@ -45,7 +45,7 @@ class _Following(_Box):
 class CPGIMPDet(_Following):
     """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
-    Unchanged by rotation; a stretch in one direction is spread over all.
+    Rotation does not change them; a stretch in one direction is spread over all.
 
     Example
     -------
@@ -83,7 +83,7 @@ known_failure(
 class CPGIMPStretch(_Following):
     """Boxes with half sizes l0 U_ii, U = sqrt(F^T F) the right stretch.
 
-    Unchanged by rotation (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit generalised
+    Rotation does not change them (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit generalised
     interpolation material point method for large deformations").
 
     Example
@@ -112,14 +112,14 @@ class CPGIMPCorners(_Following):
 
 
 class CPGIMP(_Box):
-    """Contiguous-particle GIMP: ugimp with boxes that deform (Bardenhagen & Kober 2004).
+    """Contiguous-particle GIMP: ugimp boxes that deform (Bardenhagen & Kober 2004).
 
     The box follows ``det`` (the volume), ``diagonal`` (F_ii; vanishes when rotated by 90 degrees),
     ``stretch`` (U_ii of the right stretch, the default) or ``corners`` (moved by the grid). Boxes
     stay aligned with the axes; for large shear use a cpdi method.
 
-    Half sizes are limited to 0.001 to 1 cell; beyond, the body fractures numerically. In total
-    Lagrangian methods no box deforms: cpgimp equals ugimp.
+    Half sizes stay between 0.001 and 1 cell; more stretch causes numerical fracture. In total
+    Lagrangian methods cpgimp equals ugimp.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, place, direction, halves):
-    """Centre and ends of a box in one direction, in cells, uncut; `halves` bound its half size."""
+    """Centre and ends of an uncut box in one direction, in cells, its half size within `halves`."""
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -152,7 +152,7 @@ def box(grid, kin, place, direction, halves):
 
 
 def in_cell(lo, hi, j):
-    """Integrals of 1 and of node j + 1's hat over [lo, hi], in the cell from node j."""
+    """Integrals of 1 and of node j + 1's hat over [lo, hi] within the cell after node j."""
     p = max(lo - j, 0)
     q = min(hi - j, 1)
     length = max(q - p, 0)
@@ -160,7 +160,7 @@ def in_cell(lo, hi, j):
 
 
 def averaged_hats(cells, grid, first, lo, hi):
-    """Hats from node `first`, averaged over [lo, hi] (in cells from it, within `cells`)."""
+    """Hats from node `first`, averaged over [lo, hi] in cells from that node."""
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - part for length, part in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
@@ -202,7 +202,7 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """Cell of a box's end, from node `first`, and the position in it; at most the `top`-th cell."""
+    """Cell of a box's end counted from node `first`, at most `top`, and the position in it."""
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i
@@ -212,7 +212,7 @@ def _end(at, first, top):
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
-# F in 2D is enough: axisymmetric points need no part around the axis.
+# F in 2D suffices for axisymmetric points.
 
 
 @bases.deformed.on(CPGIMPDet)
@@ -232,8 +232,7 @@ def _deformed_cpgimp_stretch(basis, kin, place, dl):
     return (*place[:d], *half, *start, *F)
 
 
-# Bit k of a corner's number is its side in direction k; of a carrying node's number, its side of
-# the cell.
+# Bit k of a corner's number is its side in direction k; of a node's number, its side of the cell.
 
 
 @bases.carried.on(CPGIMPCorners)

@@ -1,5 +1,3 @@
-"""Linear hat functions: two nodes per direction, 1 - |x - X_I| / h."""
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,9 +8,9 @@ from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.transfers import flip_coefficient
 
-STRETCH = 0.3  # strain beyond which points a cell apart separate
+STRETCH = 0.3  # strain at which points a cell apart separate
 SMALL = 0.3  # fraction of the stable step at which impacts conserve energy
-PER_CELL = 0.17  # P falls by about exp(-0.17 N) if stressed material moves through N cells
+PER_CELL = 0.17  # P falls by about exp(-0.17 N) if stressed material crosses N cells
 TOLD = 0.03  # loss of stress that gives a warning
 
 
@@ -33,7 +31,7 @@ class Linear(NamedTuple):
     )
 
 
-WIDEST = 1.5  # cells between points that share nodes
+WIDEST = 1.5  # cells between points with common nodes
 
 
 def _apart(scene: Any) -> dict[str, Any] | None:
@@ -135,7 +133,7 @@ known_failure(
 @along.on(Linear)
 def _along_linear(basis, kin, grid, place, direction):
     a = in_cells(grid, direction, place[direction])
-    i = min(int(a), cells_along(grid, direction) - 1)  # the last face is in the last cell
+    i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     r = a - i
     gradients = (-grid.inv_h, grid.inv_h)
     # D = r (1 - r) h^2 vanishes at nodes; N D^-1 (X - x) is the gradient (Jiang, Schroeder & Teran

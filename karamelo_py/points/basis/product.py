@@ -11,12 +11,12 @@ from karamelo_py.points.kinematics import gradient, product, vector
 
 
 class Along(NamedTuple):
-    first: int  # number of the first node
+    first: int  # node number
     r: float  # distance from it, in cells
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
-    affine: tuple[float, ...]  # N D^-1 (X_I - x), D the mean of (X_I - x)^2 under N
-    ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, position in it
+    affine: tuple[float, ...]  # N D^-1 (X_I - x), with D = sum N (X_I - x)^2
+    ends: tuple[tuple[int, float], ...] = ()  # of a box: cell from `first`, position in it
 
 
 class Stencil(NamedTuple):
@@ -38,12 +38,12 @@ def with_one_node(stencil):
 
 @point_function()
 def along(basis, kin, grid, place, direction):
-    """The :class:`Along` of a stencil in one direction."""
+    pass
 
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """N D^-1 (X_I - x) of a line's nodes, if `along` does not compute it."""
+    """N D^-1 (X_I - x) of a line's nodes, if `along` leaves it out."""
     return line.affine
 
 
@@ -55,30 +55,30 @@ def spacing(basis):
 
 @point_function(otherwise=True)
 def inverse_spread(basis, grid):
-    """(D^-1,) if it is constant away from walls (`evenly`); otherwise ()."""
+    """(D^-1,) if D is constant away from walls (`evenly`), else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def evenly(basis, grid, stencil):
-    """Check whether D^-1 of a point is `inverse_spread`."""
+    """True if a point's D^-1 is `inverse_spread`."""
     return True
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """Gradient of a weight; around an axis or centre followed by N / r, at r = 0 by dN/dr."""
+    """Gradient of a weight, followed by N / r (dN/dr at r = 0) per hoop direction."""
     if kin.hoops:
         slopes = (*slopes, *[where(inv_r > 0, weight * inv_r, slopes[0])] * kin.hoops)
     return gradient(kin, slopes)
 
 
 def inverse_radius(r):
-    """1 / r, or 0 where 1 / r would overflow."""
+    """1 / r, or 0 where it would overflow."""
     return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
 def radius(basis, grid, line):
-    """Radius reproduced by the weights: the point's, unless a wall cuts its domain."""
+    """Radius that the weights reproduce: the point's, unless a wall cuts its domain."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)
@@ -114,7 +114,7 @@ def item(values, k):
 
 
 def with_each_replaced(weights, others):
-    """Products of weights with one direction's factor replaced by `others`, per direction."""
+    """Products of the weights with one direction's factor replaced by `others`, per direction."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 

@@ -1,6 +1,6 @@
 """B-splines, modified at walls: three or four nodes per direction.
 
-Walls inside the grid have separate classes (:class:`AtWalls`): a scene without them pays nothing.
+Walls inside the grid have separate classes (:class:`AtWalls`), so other scenes pay nothing.
 """
 
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from karamelo_py.points.basis import BasisTraits, first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
 
-BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls of a cell in a direction
+BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls at faces of a cell
 
 
 class AtWalls(NamedTuple):
@@ -23,7 +23,7 @@ class AtWalls(NamedTuple):
 
 @point_function(otherwise=True)
 def walls_of_cell(basis, kin, grid, place, direction):
-    """(the lower face of the point's cell is a wall, the upper face is), or ()."""
+    """(lower face of the point's cell is a wall, upper face is), or ()."""
     return ()
 
 
@@ -33,7 +33,7 @@ def _walls_of_cell_at_walls(basis, kin, grid, place, direction):
 
 
 def hats(grid, a, cell, first, count):
-    """Hat functions of a cell, for `count` nodes from `first`."""
+    """Hat functions of a cell for `count` nodes from `first`."""
     t, number = a - cell, cell - first
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
@@ -54,7 +54,7 @@ class QuadraticSpline(NamedTuple):
 
     in_lanes = True
     # courant_still, from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5
-    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios to 0.49.
+    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
     traits = BasisTraits(
         cells=3,
         least_nodes=3,
@@ -83,7 +83,7 @@ def _along_quadratic_spline(basis, kin, grid, place, direction):
     line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
     if all_lanes(bulk):
         return line
-    # At a wall the third node, on the material's side, has no weight.
+    # At a wall the third node, inside the material, has no weight.
     first = max(min(where(behind, cell - 1, cell), last - 2), 0)
     return where(bulk, line, hats(grid, a, cell, first, 3))
 
@@ -128,7 +128,7 @@ class QuadraticSplineAtWalls(AtWalls):
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give `of`, for walls inside the grid, the functions of `basis`."""
+    """Give `of`, the class for walls inside the grid, the functions of `basis`."""
     of.traits = basis.traits
 
     @walled.on(basis)
@@ -160,11 +160,11 @@ class CubicSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_total: the shortest waves are nearly averaged away; a shaken block is stable up to 2.1
-    # to 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's
-    # ratio 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to
-    # 2.7. courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the
-    # longer step, 1 % with 0.9 h/c; strains then lacked (dt grad v)^2. Not measured since.
+    # courant_total: the shortest waves nearly average out; a shaken block is stable up to 2.1 to
+    # 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's ratio
+    # 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to 2.7.
+    # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
+    # step, 1 % with 0.9 h/c, when strains lacked (dt grad v)^2. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -219,9 +219,9 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
 
 
 def at_wall(grid, direction, a, cell, walls, *, inside):
-    """Without walls `inside` the grid, only a grid of one cell is between two.
+    """Line of a cell next to a wall; the fourth node has no weight.
 
-    Unused nodes of the four have no weight.
+    Without walls `inside` the grid, only a one-cell grid is between two walls.
     """
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
@@ -234,7 +234,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     n = where(below, n, (n[2], n[1], n[0]))
     g = where(below, g, (-g[2], -g[1], -g[0]))
     c = where(below, c, (-c[2], -c[1], -c[0]))
-    behind = where(below, cell, cell - 1) > first  # the last three of the four
+    behind = where(below, cell, cell - 1) > first  # the last three nodes of the four
     n, g, c = [
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)
@@ -244,7 +244,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
 
 
 def next_to_wall(grid, t):
-    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall, `t` cells away.
+    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall `t` cells away.
 
     The ghost node changes D to h^2 t (1 - t + t^2/3); t cancels out of N D^-1 (X - x).
     """

@@ -8,14 +8,14 @@ from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
-CELLS = 16  # sampled along a line
+CELLS = 16  # samples along a line
 ENTRIES = 256  # of a table, per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions in cells from a node, and its weights there, averaged over point domains if any.
+    """Positions in cells from a node, and weights there averaged over the point domains, if any.
 
-    `half`: half a point's size in cells.
+    `half` is half the size of a point in cells.
     """
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
@@ -36,8 +36,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Distance of a plane surface from a node, by the mean position of the body's points at the
-    node.
+    """Tabulate the distance of a plane surface from a node over the mean position of the points.
 
     Points of equal mass lie in layers below the surface, the first at half their size; distances
     are in cells along the outward normal. Row k: a mean of k / ENTRIES - 3 (after Nairn 2013,
@@ -46,7 +45,7 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:
-        # Basis functions differ between nodes: the gap is unknown, fields touch on contact.
+        # Basis functions differ between nodes: the gap is unknown, so fields touch on contact.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
@@ -56,6 +55,6 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     near = seen.sum(axis=1) > 0
     mean = (seen * places).sum(axis=1)[near] / seen.sum(axis=1)[near]
     mean = np.maximum.accumulate(mean)
-    # Once a body fills a node's reach the mean is constant: the first such surface.
+    # The mean is constant once a body fills a node's support: take the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)
     return np.interp(means, mean, surfaces[near][first])

@@ -1,10 +1,8 @@
-"""Weighted rows of node arrays."""
-
 from typing import NamedTuple
 
 
 class Weighted(NamedTuple):
-    """Rows of an array used as one: reading sums them by weight, writing distributes."""
+    """Rows of an array used as one: reads are weighted sums, writes are distributed by weight."""
 
     rows: tuple[int, ...]
     weights: tuple[float, ...]

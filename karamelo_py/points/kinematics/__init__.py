@@ -1,19 +1,19 @@
-"""Kinematics: which components of vectors and tensors exist, and the algebra on them.
+"""Kinematics: the components of vectors and tensors, and the algebra on them.
 
 ================  ==============  =============================  =================================
 tag               vector          velocity gradient, F           symmetric tensor (stress, strain)
 ================  ==============  =============================  =================================
-``Line``          x               xx                             xx yy zz ``PlaneStrain``   x y
-xx xy yx yy                    xx yy zz xy ``Axisymmetric``  r z             rr rz zr zz tt
-rr zz tt rz ``Cylindrical``   r               rr tt                          rr tt zz ``Spherical``
-r               rr tt pp                       rr tt pp ``Space``         x y z           xx xy xz
-yx yy yz zx zy zz     xx yy zz xy xz yz ================  ==============
-=============================  =================================
+``Line``          x               xx                             xx yy zz
+``PlaneStrain``   x y             xx xy yx yy                    xx yy zz xy
+``Axisymmetric``  r z             rr rz zr zz tt                 rr zz tt rz
+``Cylindrical``   r               rr tt                          rr tt zz
+``Spherical``     r               rr tt pp                       rr tt pp
+``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
+================  ==============  =============================  =================================
 
-The gradient of a basis function has the components of a vector, and N/r for each direction around
-an axis or centre (hoop strain and force). Tags are empty NamedTuples with classes of vectors and
-tensors; kernels are compiled for each tag. They are traced, so loops, classes and operators here
-cost nothing at run time. a + dt * b of tensors is rounded once (`fma`).
+The gradient of a basis function has N/r for each direction around an axis or centre (hoop strain
+and force) after the components of a vector. Kernels are compiled for each tag and traced, so loops,
+classes and operators here cost nothing at run time. a + dt * b of tensors rounds once (`fma`).
 """
 
 from collections import namedtuple
@@ -24,13 +24,13 @@ from numba import config
 
 from karamelo_py.compiler import algebra, fma, real
 
-COMPILED = not config.DISABLE_JIT  # interpreted, `fma` rounds twice
+COMPILED = not config.DISABLE_JIT  # interpreted code rounds `fma` twice
 
 
 class Line(NamedTuple):
     word = "1D"
     per = ""  # unit of forces, masses and energies
-    hoops = 0  # around an axis or centre; x is the distance from it
+    hoops = 0  # directions around an axis or centre; x is the distance from it
     dimension = 1
     tensor_size = 1
     tensor_names = ("11",)
@@ -38,7 +38,7 @@ class Line(NamedTuple):
 
 
 class PlaneStrain(NamedTuple):
-    """2D, unit thickness, no strain out of the plane."""
+    """2D plane strain, unit thickness."""
 
     word = "plane-strain"
     per = " per thickness"
@@ -50,7 +50,7 @@ class PlaneStrain(NamedTuple):
 
 
 class Axisymmetric(NamedTuple):
-    """2D, x the radius and y the axis: a body of revolution without torsion."""
+    """A body of revolution without torsion; x is the radius, y the axis."""
 
     word = "axisymmetric"
     per = " per radian"
@@ -62,7 +62,7 @@ class Axisymmetric(NamedTuple):
 
 
 class Cylindrical(NamedTuple):
-    """1D, x the distance from an axis, unit length and no strain along it."""
+    """1D plane strain: x is the distance from an axis, unit length along it."""
 
     word = "cylindrical"
     per = " per radian and length"
@@ -74,8 +74,6 @@ class Cylindrical(NamedTuple):
 
 
 class Spherical(NamedTuple):
-    """1D, x the distance from a centre."""
-
     word = "spherical"
     per = " per steradian"
     hoops = 2
@@ -100,17 +98,16 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 def free_from(kin):
-    """A direction in which a body may translate: not the radius."""
+    """A direction in which a body can translate, which the radius is not."""
     return 1 if kin.hoops else 0
 
 
 def planar(kin):
-    """Matrices over the same vectors, without hoop components."""
     return kin.plane
 
 
 def total(terms):
-    """Sum from the first term on; `sum` rounds differently from Python 3.12 on."""
+    """Sum left to right; `sum` rounds differently from Python 3.12 on."""
     made = terms[0]
     for term in terms[1:]:
         made = made + term
@@ -125,21 +122,21 @@ def product(factors):
 
 
 def dot(*vectors):
-    """sum_k a_k b_k, or sum_k a_k b_k c_k."""
+    """sum_k a_k b_k (c_k ...)"""
     return total([product(components) for components in zip(*vectors, strict=True)])
 
 
 class Elements(tuple):
     """Components that exist in a kinematics.
 
-    `places`: row and column of each (of vectors: the direction, twice), from 0. `axes`: indices of
-    rows. Of tensors also `acting` (`places` with the direction in which a row acts, the radius for
-    hoop components) and `rows` (per direction, index and column of the components that act along
-    it, the last first).
+    `places`: (row, column) of each, from 0 (of vectors, the direction twice). `axes`: row indices.
+    Tensors also have `acting` (`places` with the direction in which a row acts: the radius for hoop
+    components) and `rows` (per direction, index and column of the components acting along it, the
+    last first).
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # leave products with NumPy numbers to these classes
+    __array_ufunc__ = None  # these classes handle products with NumPy numbers
     origin = None  # of a product: the function that adds it with one rounding, and its factors
 
     def __add__(self, other):
@@ -172,7 +169,7 @@ class Elements(tuple):
         return self._make([-a for a in self])
 
     def with_diagonal(self, p):
-        """Add p I; nothing is compiled for p = 0."""
+        """Add p I; p = 0 compiles to nothing."""
         pairs = zip(self, self.places, strict=True)
         return self._make([a + p if i == j else a for a, (i, j) in pairs])
 
@@ -225,7 +222,7 @@ I = Isotropic(1)  # noqa: E741
 
 
 class Vector(Elements):
-    """A vector, or the gradient of a basis function (with N/r around an axis or centre)."""
+    """A vector, or the gradient of a basis function."""
 
     __slots__ = ()
 
@@ -243,7 +240,7 @@ class Matrix(Elements):
     __slots__ = ()
 
     def dot(self, gradient):
-        """s_ij g_j, each term rounded once; hoop parts act radially."""
+        """s_ij g_j, rounded once per term; hoop components act radially."""
         made = []
         for (k, j), *rest in self.rows:
             made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
@@ -264,7 +261,7 @@ class Tensor(Matrix):
     __slots__ = ()
 
     def __matmul__(self, other):
-        """a_ik b_kj, or a_ij b_j of a vector."""
+        """a_ik b_kj, or a_ij b_j for a vector."""
         if isinstance(other, Vector):
             d = self.kin.dimension
             rows = [zip(self[d * i : d * i + d], other, strict=False) for i in range(d)]
@@ -286,11 +283,10 @@ class Tensor(Matrix):
         return self if made is type(self) else made._make(self[: len(made.places)])
 
     def generator(self):
-        """dt grad v: strain and rotation."""
         return self
 
     def strain_at_end(self):
-        """Its stress is added after the old stress is rotated, for small increments."""
+        """Strain whose stress is added after the old stress is rotated, for small increments."""
         return sym(self)
 
     def after(self, dl):
@@ -303,7 +299,7 @@ class Tensor(Matrix):
             ]
         )
 
-    # Without a component F_ii, F_ii is 1.
+    # An absent F_ii is 1.
 
     def left_cauchy_green(self):
         a = self.at()
@@ -314,12 +310,12 @@ class Tensor(Matrix):
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
     def stretch(self):
-        """U = sqrt(F^T F), for det F not 0.
+        """U = sqrt(F^T F) for det F != 0.
 
-        In 2D U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
-        1984, J. Elasticity 14). In 3D Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
+        2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
+        1984, J. Elasticity 14). 3D: Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
         rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius
-        norms): accurate to round-off for equal stretches too.
+        norms), to round-off even for equal stretches.
         """
         if self.kin.dimension == 3:
             r = self
@@ -356,11 +352,11 @@ class Tensor(Matrix):
 
 
 def further_terms(squared):
-    """tan(x) / x - 1 - x^2 / 3 of x^2, with an error of x^8/46."""
+    """tan(x) / x - 1 - x^2 / 3 as a function of x^2, with error x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Four steps reach round-off for ratios of principal stretches to 2, seven for any invertible F.
+# Round-off takes four steps for ratios of principal stretches up to 2, seven for any invertible F.
 POLAR_STEPS = 7
 
 
@@ -378,13 +374,13 @@ def determinant(a, d):
 
 
 def squares(a, axes, i, j):
-    """a_ik a_jk; 1 without such a component."""
+    """a_ik a_jk, or 1 if the component is absent."""
     terms = [a[i, k] * a[j, k] for k in axes if (i, k) in a and (j, k) in a]
     return total(terms) if len(terms) else 1
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a step with a large rotation; strain and rotation are the logarithm of I + dl."""
+    """dl of a large rotation; its strain and rotation come from ln(I + dl)."""
 
     __slots__ = ()
 
@@ -398,7 +394,7 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.logarithm
 
     def strain_at_end(self):
-        """In the axes at the end: the added stress is rotated by half the angle."""
+        """Strain in the axes at the end: the added stress rotates by half the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
@@ -408,8 +404,8 @@ algebra(LargeIncrement)
 def large(dl):
     """ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1.
 
-    For a pure rotation G and its odd powers are skew (Hughes & Winget 1980): no strain for any
-    truncation. The error is G^7/448.
+    Odd powers of G are skew for a pure rotation (Hughes & Winget 1980), so truncation causes no
+    strain. The error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -429,11 +425,11 @@ class SymmetricTensor(Matrix):
         return total([self[i] for i in axes]) / len(axes)
 
     def turned(self, dl):
-        """R s R^T with the rotation R of the increment, objective (Jaumann).
+        """R s R^T with the rotation R of the increment (Jaumann, objective).
 
         R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
-        |w|^2/12): orthogonal to round-off, angle error |w|^5/120 (Hughes & Winget 1980 use
-        tan(|w|/2) ~ |w|/2, error |w|^3/12). A `LargeIncrement` uses two more terms.
+        |w|^2/12): orthogonal to round-off, angle error |w|^5/120 (without the second term, as
+        Hughes & Winget 1980, |w|^3/12). A `LargeIncrement` has two more terms.
         """
         if self.kin.dimension == 1:
             return self
@@ -450,8 +446,8 @@ class SymmetricTensor(Matrix):
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
         sine = (t + t) * scale
-        # The in-plane deviator rotates by twice the angle; as a change, exactly zero without
-        # rotation.
+        # The in-plane deviator rotates by twice the angle; adding the change makes no rotation
+        # exact.
         double_sine = 2 * sine * cosine
         double_versine = -2 * sine * sine
         apart = 0.5 * (xx - yy)
@@ -460,7 +456,7 @@ class SymmetricTensor(Matrix):
         return self._make([xx + change, yy - change, zz, xy + shear])
 
     def rotated_in_3d(self, dl):
-        # R = I + k (T + T T), T the cross product with the scaled w / 2
+        # R = I + k (T + T T), where T is the cross product with the scaled w / 2
         turn, s, axes = dl.generator().at(), self.at(), range(3)
         w = [0.25 * (turn[(i + 2) % 3, (i + 1) % 3] - turn[(i + 1) % 3, (i + 2) % 3]) for i in axes]
         squared = total([x * x for x in w])
@@ -494,19 +490,18 @@ class SymmetricTensor(Matrix):
         return self._make([component(i, j) for i, j in self.places])
 
     def largest_row_sum(self):
-        """max_i sum_j |s_ij|: bounds the largest eigenvalue (Gershgorin)."""
+        """max_i sum_j |s_ij|, a bound of the largest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
         return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
 
     def smallest_row_difference(self):
-        """min_i (s_ii - sum_j |s_ij|), j not i: bounds the smallest eigenvalue (Gershgorin)."""
+        """min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
 
     def nominal(self, F):
-        """First Piola-Kirchhoff stress P = tau F^-T."""
         if self.kin.dimension == 1:
             return type(F)._make([s / f for s, f in zip(self, F, strict=False)])
         a, back = self.at(), inv(F).at()
@@ -601,7 +596,7 @@ def det(f):
 
 
 def inv(f):
-    """F^-1 by transposed cofactors over the determinant (Cramer), det F not 0."""
+    """F^-1 by Cramer's rule, for det F != 0."""
     a, d = f.at(), f.kin.dimension
     k = 1 / determinant(a, d)
     return f._make(
@@ -626,19 +621,18 @@ def dev(s):
 
 
 def inner(s, e):
-    """s_ij e_ij."""
     normal = s[0] * e[0] + s[1] * e[1] + s[2] * e[2]
     shears = [a * b for a, b in zip(s[3:], e[3:], strict=True)]
     return normal + 2 * total(shears) if len(shears) else normal
 
 
 def von_mises(s):
-    """sqrt(3/2 s:s) of a deviator: |s_xx - s_yy| in uniaxial stress."""
+    """sqrt(3/2 s:s) of a deviator s: |s_xx - s_yy| in uniaxial stress."""
     return sqrt(1.5 * inner(s, s))
 
 
 def outer(a, b):
-    """a_i b_j; for a gradient with N/r also the hoop component a_r N/r."""
+    """a_i b_j, with the hoop component a_r N/r if b has N/r."""
     out = b.tensor._make([a[i] * b[j] for i, j in b.tensor.acting])
     if COMPILED:
         out.origin = add_outer, a, b

@@ -1,4 +1,4 @@
-"""Principal values and directions of symmetric tensors, and back."""
+"""Principal values and directions of symmetric tensors, and tensors from them."""
 
 from math import sqrt
 from typing import Any, NamedTuple
@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Principal values (3,), unordered, and directions of a symmetric tensor."""
+    """Return the unordered principal values (3,) and directions of a symmetric tensor."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -19,10 +19,10 @@ def principal(s):
 
 @shared
 def from_principal(s, values, directions, slopes=None):
-    """Symmetric tensor of the class of `s` from principal values and directions.
+    """Build a tensor of the class of `s` from principal values and directions.
 
-    `slopes` (3,): derivatives of values that are functions of another tensor's, for derivatives at
-    equal values.
+    `slopes` (3,): derivatives of the values as functions of another tensor's; they give the limit
+    for equal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -30,7 +30,7 @@ def from_principal(s, values, directions, slopes=None):
         a, b, c = values
         mean = 0.5 * (a + b)
         radius = 0.5 * (a - b)
-        cosine, sine = directions  # of twice the angle to the first
+        cosine, sine = directions  # of twice the angle of the first direction
         change = radius * cosine
         return s._make([mean + change, mean - change, c, radius * sine])
 
@@ -52,7 +52,7 @@ def principal_in_plane(s):
 
 
 def jacobi_rotation(a, b, c):
-    """Cosine, sine and tangent of the rotation that makes c vanish in [[a, c], [c, b]]."""
+    """Cosine, sine and tangent of the rotation that diagonalises [[a, c], [c, b]]."""
     cotangent = (b - a) / where(c == 0, 1, c + c)
     t = 1 / (abs(cotangent) + sqrt(cotangent * cotangent + 1))
     t = where(c == 0, 0, where(cotangent < 0, -t, t))
@@ -65,8 +65,8 @@ _SWEEPS = 8
 
 
 def principal_in_space(s):
-    # Jacobi rotations (Golub & Van Loan 2013, section 8.5): accurate to round-off for equal values
-    # too, unlike closed forms.
+    # Jacobi rotations (Golub & Van Loan 2013, section 8.5), unlike closed forms, are accurate to
+    # round-off for equal values.
     a, b, c, d, e, f = s
     u, v, w = Space.Vector(1, 0, 0), Space.Vector(0, 1, 0), Space.Vector(0, 0, 1)
     enough = 1e-3 * round_off(a)
@@ -89,11 +89,11 @@ def principal_in_space(s):
 
 
 def rotated(k, g, u, v):
-    return k * u - g * v, k * v - (-g) * u  # differences, because a sum would be rounded once
+    return k * u - g * v, k * v - (-g) * u  # differences, because a sum would round once
 
 
 def real_principal(s):
-    """`principal`, with real numbers for values that are integers without strain."""
+    """`principal` with real values where they are integers without strain."""
     values, directions = principal(s)
     return [1.0 * x for x in values], directions
 
@@ -110,8 +110,8 @@ def exponential_of(s):
     return from_principal(s, exponentials, directions, exponentials)
 
 
-# Jacobi rotations stop when a tensor is diagonal; its slopes need not be. With S' in the frame of
-# principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S'
+# Jacobi rotations stop at a diagonal tensor, whose slopes may not be diagonal. With S' in the frame
+# of principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S'
 # n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section 6.1).
 
 PAIRS = (0, 1), (0, 2), (1, 2)
@@ -119,12 +119,12 @@ PAIRS = (0, 1), (0, 2), (1, 2)
 
 class TurningFrame(NamedTuple):
     directions: Any
-    shears: tuple  # n_a . S' n_b of the pairs, for each slope
-    apart: tuple  # s_a - s_b of the pairs
+    shears: tuple  # n_a . S' n_b of each pair, for each slope
+    apart: tuple  # s_a - s_b of each pair
 
 
 def in_frame(s, directions):
-    """Components in a frame: (3,) of the diagonal, and of the pairs."""
+    """Components in a frame: (3,) diagonal, and off-diagonal ones of the pairs."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
@@ -169,14 +169,14 @@ def _principal_slopes(s):
 
 
 class PairLimits(NamedTuple):
-    """(f_a - f_b) / (s_a - s_b) of pairs of equal principal values."""
+    """Limits of (f_a - f_b) / (s_a - s_b) for pairs of equal principal values."""
 
     first: Any
     second: Any
     third: Any
 
 
-# Relative difference below which mean slopes are more accurate than difference quotients.
+# relative difference below which mean slopes beat difference quotients
 ALIKE = 1e-5
 
 
@@ -186,7 +186,7 @@ def turning_ratios(values, directions, slopes):
         if isinstance(slopes, PairLimits):
             limit = slopes[k]
             alike = abs(apart) < ALIKE
-        elif slopes is None:  # equal principal values stay equal, at an edge or the apex
+        elif slopes is None:  # at an edge or the apex, equal principal values stay equal
             alike, limit = apart == 0, 0
         else:
             limit = 0.5 * (slopes[a] + slopes[b])

@@ -1,10 +1,10 @@
 """Transfers: mapping of velocity from points to nodes and back. One file per family.
 
-A transfer is a NamedTuple of parameters (its class is the tag). It defines what a point stores with
-its velocity (`point_fields`: nothing, or a tensor such as the affine moment B), and updates the
-velocity from v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get a
-view: N, grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin`
-(:mod:`karamelo_py.kernels.views`). Default: PIC.
+A transfer is a NamedTuple of parameters. It declares what a point stores with its velocity
+(`point_fields`: nothing, or a tensor such as the affine moment B), and updates the velocity from
+v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get a view with N,
+grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin` (:mod:`karamelo_py.kernels.views`).
+The defaults are PIC.
 """
 
 from typing import NamedTuple
@@ -16,14 +16,14 @@ from karamelo_py.points import noise
 
 
 class TransferTraits(NamedTuple):
-    inverts_spread: bool = False  # by D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
-    retains: bool = False  # points retain the fraction `alpha` of their velocity
-    per_time: bool = False  # alpha is for a stable step, not each step
-    keeps_gradient: bool = False  # a point's `Moment` is its velocity gradient
+    inverts_spread: bool = False  # inverts D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
+    retains: bool = False  # points retain a fraction `alpha` of their velocity
+    per_time: bool = False  # alpha refers to a stable step
+    keeps_gradient: bool = False  # `Moment` is the velocity gradient
 
 
 class Moment(Field):
-    """Tensor stored by points with the velocity: moment B or gradient L."""
+    """Moment B or velocity gradient L stored by a point."""
 
     shape = planar
 
@@ -39,18 +39,18 @@ def stores_moment(transfer) -> bool:
 
 @point_function()
 def updated_velocity(transfer, v, v_pic, dv):
-    """Velocity of a point after the step."""
+    pass
 
 
 @point_function(otherwise=True)
 def in_step(transfer, kept):
-    """The transfer with coefficients for the present step, with the fraction `kept`."""
+    """The transfer for a step in which points retain the fraction `kept`."""
     return transfer
 
 
 @point_function()
 def lost_fractions(transfer, like):
-    """Fractions of the kinetic energy removed by mapping to the nodes and back that are lost: (2,).
+    """Fractions (2,) of the kinetic energy removed by mapping to the nodes and back that are lost.
 
     The rest returns with the data stored by points. If undefined, the loss is not recorded.
     """
@@ -58,78 +58,72 @@ def lost_fractions(transfer, like):
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """Velocity that moves a point; `v`: after the step, `j`: `known_volume`."""
+    """Velocity that moves a point; `v` is its velocity after the step, `j` its `known_volume`."""
     return v_pic
 
 
 @point_function(otherwise=True)
 def known_volume(transfer, law, kin, state):
-    """det F of a point for transfers that need it; otherwise ()."""
+    """det F of a point if the transfer needs it, else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def nodal_momentum(transfer, pt, node):
-    """Momentum that a point gives to a node. `pt` has `mass`, `v`, `moment`."""
+    """Momentum that a point `pt` (`mass`, `v`, `moment`) gives to a node."""
     return node.N * pt.mass * pt.v
 
 
 @point_function(otherwise=True)
 def affine_velocity(transfer, moment, inverse_d):
-    """C, if a point gives node X the velocity v + C (X - x) with its weight; otherwise ().
+    """C if a point gives a node at X the velocity v + C (X - x), else ().
 
-    `inverse_d` is (D^-1,), or () if D is not constant.
+    `inverse_d` is (D^-1,), or () if D varies.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """Moment of a point at rest, as a tuple: empty if none is stored."""
+    """Moment of a point at rest; empty if none is stored."""
     return ()
 
 
 @point_function(otherwise=True)
 def add_moment(transfer, node, v, moment):
-    """The moment plus a node's contribution, with its velocity `v`."""
     return moment
 
 
 @point_function(otherwise=True)
 def by_arms(transfer, inverse_d):
-    """(a,), if the stored tensor is a sum_I N_I v*_I (X_I - x)^T; otherwise ().
-
-    `inverse_d` as in `affine_velocity`.
-    """
+    """(a,) if the stored tensor is a sum_I N_I v*_I (X_I - x)^T, else (); `inverse_d` as above."""
     return ()
 
 
 @point_function(otherwise=True)
 def gradient_weight(transfer, node):
-    """Weight of a node in strains and forces."""
     return node.grad_N
 
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Check whether `gradient_weight` is N_I D^-1 (X_I - x); constant when compiled."""
+    """True if `gradient_weight` is N_I D^-1 (X_I - x); constant when compiled."""
     return False
 
 
 @point_function(otherwise=True)
 def straining(transfer, kin, gradient):
-    """The strain's term in a gather of velocity and gradient; () if points store the gradient."""
+    """Gradient gathered for the strain with the velocity; () if points store it."""
     return gradient
 
 
 @point_function(otherwise=True)
 def terms(transfer):
-    """Number of terms of XPIC's series on the nodes."""
     return 1
 
 
 def _inside_out(moment, scene):
-    # strains by moments, as MLS has them
+    # strains computed from moments, as in MLS
     by_moments = gradient_weight.defined(type(scene.transfer))
     growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing

@@ -1,8 +1,8 @@
 """Affine transfers: the point stores the moment B = sum_I N_I v*_I (X_I - x_p)^T of velocity.
 
-It gives the node m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). B instead of C = B D^-1 conserves
-angular momentum to round-off, also if D varies within the cell (Jiang, Schroeder & Teran 2017, "An
-angular momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
+It gives a node m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Unlike C = B D^-1, B conserves angular
+momentum to round-off even if D varies within the cell (Jiang, Schroeder & Teran 2017, "An angular
+momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 """
 
 from typing import Annotated, NamedTuple
@@ -17,17 +17,17 @@ from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity, warn_of_vibrations
 
 COMPRESSED = 1e-3  # volume fraction lost by a point that moves with the grid
-SEPARATE = 0.1  # strength of separation that elastic bodies tolerate
+SEPARATE = 0.1  # separation that elastic bodies tolerate
 
 
 class APIC(NamedTuple):
-    """v_p = v_pic, and the point stores B_p = sum N_I v*_I (X_I - x_p)^T.
+    """APIC: v_p = v_pic, and the point stores B_p = sum N_I v*_I (X_I - x_p)^T.
 
     Conserves linear and angular momentum to round-off; damps motion below the cell size (Jiang et
     al. 2015).
 
-    With bases whose D vanishes at nodes (linear, Bernstein-quadratic) in the updated frame, the
-    velocity that deforms points omits the moments. This needs musl; usl and usf are refused.
+    In the updated frame, with bases whose D vanishes at nodes (linear, Bernstein-quadratic), the
+    velocity that deforms points omits the moments, which needs musl.
 
     Example
     -------
@@ -63,10 +63,10 @@ class AFLIP(NamedTuple):
 
 
 class ASFLIP(NamedTuple):
-    """AFLIP with point velocities that differ from the grid where the material separates.
+    """AFLIP in which points may leave the grid velocity where the material separates.
 
     For granular flow and splashes (Fei et al. 2021, section 5). Points compressed by more than 0.1
-    % of their volume move with the grid and retain their order.
+    % of their volume move with the grid.
 
     Parameters
     ----------

@@ -12,14 +12,14 @@ from karamelo_py.points.transfers import TransferTraits, in_step, lost_fractions
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
 SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
-LAG = 0.03  # of a free body's angular velocity
-BRAKED = 0.05  # of its rotational energy
+LAG = 0.03  # fraction of a free body's angular velocity
+BRAKED = 0.05  # fraction of its rotational energy
 BARELY = 0.01  # revolutions without relevant energy
-TURNS = 1.5  # revolutions of a free body with a relevant loss by FLIP
+TURNS = 1.5  # revolutions of a free body with a relevant FLIP loss
 
 
 class PIC(NamedTuple):
-    """v_p = v_pic, the updated nodal velocity at the point.
+    """PIC: v_p = v_pic, the updated nodal velocity at the point.
 
     Very stable and dissipative: each step smooths the velocity over a cell and loses angular
     momentum (Harlow 1964).
@@ -34,7 +34,7 @@ class PIC(NamedTuple):
 
 
 class FLIP(NamedTuple):
-    """v_p = (1 - alpha) v_pic + alpha (v_p + dv): alpha = 1 is pure FLIP, alpha = 0 is PIC.
+    """FLIP: v_p = (1 - alpha) v_pic + alpha (v_p + dv); alpha = 0 is PIC.
 
     Conserves energy well, but retains noise in the null space of the grid, which a little PIC
     (alpha = 0.99) damps (Brackbill & Ruppel 1986).
@@ -59,7 +59,7 @@ class FLIP(NamedTuple):
 
 
 class FLIPPerTime(NamedTuple):
-    """FLIP with damping per time: alpha applies to a stable step.
+    """FLIP with damping per time, not per step: alpha applies to a stable step.
 
     A shorter step uses alpha^(dt / stable dt). Plain FLIP removes 1 - alpha per step: half the step
     doubles the damping per time.
@@ -119,7 +119,7 @@ def _lost_fractions_flip(transfer, like):
 
 
 def warn_of_vibrations(transfer: type) -> None:
-    """Only usl is safe, which damps."""
+    """usl damps vibrations and needs no warning."""
     known_failure(
         transfer,
         "large vibrations",
@@ -139,16 +139,16 @@ def warn_of_vibrations(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """The loss per revolution adds up over many."""
+    """The loss per revolution accumulates."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
 def warn_of_lost_angular_momentum(transfer: type) -> None:
-    """Of bodies that rotate many times.
+    """Warn about bodies that rotate freely many times.
 
-    Points move with the grid velocity u, and store v: each step changes the angular momentum by the
-    sum of m u x v dt (disks in 2D, E 100 times the rotational energy, 4 and 8 cells across the
-    radius; R4, splines and linear basis).
+    Points move with the grid velocity u but store v: each step changes the angular momentum by the
+    sum of m u x v dt. Measured on disks in 2D with E 100 times the rotational energy, 4 and 8 cells
+    across the radius; R4, splines and linear basis.
     """
     known_failure(
         transfer,
@@ -170,13 +170,13 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Lag of 3 % or more, over a radian or more."""
+    """True for a lag of 3 % or more, over a radian or more."""
     lag = scene.lag
     return lag.fraction > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
-    """Energy loss of a free rotation: (1 - alpha) of the lag per step, twice."""
+    """Energy loss of a free rotation: twice (1 - alpha) of the lag per step."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.turns > BARELY:
         return None
@@ -186,9 +186,9 @@ def _brakes(transfer, scene):
 
 
 def warn_of_slow_rotation(transfer: type) -> None:
-    """Free rotations in the total frame.
+    """Warn about free rotations in the total frame.
 
-    Points store another velocity than they move with: a square of n cells rotates too slowly by
+    Points move with another velocity than they store: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(

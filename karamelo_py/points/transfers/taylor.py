@@ -1,9 +1,8 @@
 """Taylor transfers: the point stores the velocity gradient L_p = sum_I v*_I (x) grad N_I.
 
-It gives the node m_p N_I (v_p + L_p (X_I - x_p)), without inverting D, so any basis will do. Where
-D^-1 N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC. Angular momentum
-is then conserved as far as D is constant; with splines, as far as velocity is linear over their
-support.
+It gives a node m_p N_I (v_p + L_p (X_I - x_p)) without inverting D, so any basis will do. If D^-1
+N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC. Otherwise angular
+momentum is conserved as far as velocity is linear over the support.
 """
 
 from typing import Annotated, NamedTuple
@@ -17,12 +16,12 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 
 
 class TPIC(NamedTuple):
-    """v_p = v_pic, and the point stores the velocity gradient L_p.
+    """TPIC: v_p = v_pic, and the point stores the velocity gradient L_p.
 
-    A Taylor expansion that damps less than PIC and inverts no D (Nakamura, Matsumura & Mizutani
-    2023, "Taylor particle-in-cell transfer and kernel correction for material point method"). With
-    bases whose D vanishes at nodes (linear, Bernstein-quadratic), a drifting body in the updated
-    frame gains energy without bounds.
+    Damps less than PIC and needs no D (Nakamura, Matsumura & Mizutani 2023, "Taylor
+    particle-in-cell transfer and kernel correction for material point method"). With bases whose D
+    vanishes at nodes (linear, Bernstein-quadratic), a drifting body in the updated frame gains
+    energy without bounds.
 
     Example
     -------
@@ -35,7 +34,7 @@ class TPIC(NamedTuple):
 
 
 class TFLIP(NamedTuple):
-    """FLIP's velocity, mapped to the nodes as N_I (v_p + L_p (X_I - x_p)): Karamelo's projection.
+    """FLIP whose points give nodes N_I (v_p + L_p (X_I - x_p)), as in Karamelo.
 
     ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is equivalent.
 
@@ -60,9 +59,8 @@ class MLS(NamedTuple):
     """APIC with N_I D^-1 (X_I - x), a moving least squares fit, instead of the gradient.
 
     The point stores the velocity gradient C = B D^-1. Its force on a node is -V sigma N_I D^-1 (X_I
-    - x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). Angular
-    momentum is conserved to round-off if D is constant: with splines, more than a cell away from
-    the walls.
+    - x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). Conserves
+    angular momentum to round-off if D is constant (splines more than a cell from walls).
 
     Example
     -------
@@ -99,7 +97,7 @@ take_nodal_velocity(MLS)
 
 @transfers.gradient_weight.on(MLS)
 def _gradient_weight_mls(transfer, node):
-    # The hoop part N / r in axisymmetry is unchanged.
+    # The hoop part N / r is unchanged.
     moved = node.affine_N
     return as_gradient(node.kin, [*moved, *node.grad_N[len(moved) :]])
 
@@ -109,7 +107,7 @@ def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
-# C is the velocity gradient (but for the hoop part): gathered once if both come from v*.
+# C is the velocity gradient (except for the hoop part): gathered once if both come from v*.
 
 
 @transfers.forces_by_arms.on(MLS)

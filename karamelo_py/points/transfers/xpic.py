@@ -14,7 +14,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass removed by XPIC from a point; velocity not yet in the series."""
+    """Energy per mass that XPIC removes from a point, and velocity not yet in the series."""
 
     @staticmethod
     def shape(kin: Any) -> int:
@@ -26,7 +26,7 @@ class Reflected(StepField):
 
 
 class Series(SummedField):
-    """Term of the series at a node, and the sum for the next term."""
+    """Term of the series at a node, and the sum that becomes the next term."""
 
     @staticmethod
     def shape(kin: Any) -> int:
@@ -34,10 +34,10 @@ class Series(SummedField):
 
 
 class XPIC(NamedTuple):
-    """v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I): m = 1 is PIC, infinite m is FLIP.
+    """XPIC: v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I), from PIC (m = 1) towards FLIP.
 
-    S maps nodes to points and S+ points to nodes by mass. A low order removes null-space noise and
-    retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for material point
+    S maps nodes to points and S+ points to nodes by mass. A low order m removes null-space noise
+    and retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for material point
     method particle updates that reduces noise and enhances stability", eq. 24). The nodes sum w_0 =
     S+ v, w_k = w_(k-1) - S+ S w_(k-1). Each order costs one more pass over the points per step.
 

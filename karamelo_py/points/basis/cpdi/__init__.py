@@ -1,14 +1,13 @@
 """Convected particle domain interpolation: the nodes around the corners x_c of a point's domain.
 
-Over the domain, a simple interpolation of each basis function between the corners replaces it
+Each basis function is replaced over the domain by a simple interpolation between the corners
 (Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
 
      N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
 w_c and g_c are domain means of corner c's function and gradient. Domains tile the body at any
-stretch, so there is no numerical fracture. A family derives from `ConvectedDomain` and defines
-:func:`domain`; with stored corners moved by the grid, from `CarriedDomain` and also defines
-`upright`.
+stretch, so nothing fractures numerically. A family derives from `ConvectedDomain` and defines
+:func:`domain`; if the grid moves its corners, from `CarriedDomain`, and defines `upright` too.
 """
 
 from math import inf
@@ -29,7 +28,7 @@ from karamelo_py.points.kinematics import cofactor, determinant, gradient, produ
 class Element(NamedTuple):
     kind: str
     corners: int
-    edges: tuple[tuple[int, int], ...]  # pairs of corners, with positive determinant
+    edges: tuple[tuple[int, int], ...]  # pairs of corners with positive determinant
     mirrored: tuple[int, ...]  # order of corners if the determinant is negative
     box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if it is one
 
@@ -37,10 +36,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Arms of the affine transfers start at the weighted centre x = sum_I N_I X_I, which differs from
-    the point if corners lie beyond the grid or the domain is no parallelogram or parallelepiped.
-    Linear momentum is exact; angular momentum is exact about the centres, and varies about the
-    points by 0.1 % of its variation with FLIP (a spinning square, Q4).
+    Affine transfers measure arms from the weighted centre x = sum_I N_I X_I, which differs from the
+    point if corners are beyond the grid or the domain is no parallelogram or parallelepiped. Linear
+    momentum is exact; angular momentum is exact about the centres, and about the points varies by
+    0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -50,7 +49,7 @@ class ConvectedDomain(NamedTuple):
 
 
 class CarriedDomain(ConvectedDomain):
-    """Domains with stored corners that the grid moves; subclasses add `element`."""
+    """Base of domains whose corners move with the grid; subclasses add `element`."""
 
     __slots__ = ()
     traits = ConvectedDomain.traits._replace(shape=("corners",))
@@ -77,26 +76,26 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# Least extent of domains in cells, by dimension: in 2D points scatter to all adjacent nodes.
+# Least extent of a domain in cells by dimension; in 2D points scatter to all adjacent nodes.
 LEAST = (0.0, 0.0, 0.5, 0.0)
-# In mesh order: around the square; around the cube's lower face, then the upper
+# In mesh order: around the square; around the cube's lower face, then its upper.
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 
 @point_function()
 def domain(basis, kin, place):
-    """Corners x_c, weights w_c and gradients g_c, a tuple each."""
+    """Corners x_c, weights w_c and gradients g_c."""
 
 
 @point_function()
 def upright(basis, kin, place):
-    """A positive Jacobian at every corner: the domain is not folded."""
+    """True if the Jacobian is positive at every corner, so that the domain is not folded."""
 
 
 class Corner(NamedTuple):
     cell: tuple[int, ...]  # per direction
-    fractions: tuple[float, ...]  # of the cell
+    fractions: tuple[float, ...]
     at: Any  # cell + fractions, a vector
 
 
@@ -106,12 +105,12 @@ class CornerStencil(NamedTuple):
     gradients: tuple[Any, ...]
     point: tuple[float, ...]  # in cells
     centre: Any  # sum_I N_I X_I in cells, a vector
-    spread: tuple[float, ...]  # D of the affine transfers: xx yy (zz) xy (xz yz)
-    inv_r: float  # 1 / r in axisymmetry
+    spread: tuple[float, ...]  # D of affine transfers: xx yy (zz) xy (xz yz)
+    inv_r: float
 
 
 class AtCorners(NamedTuple):
-    """For code that uses a node's weight or gradient once, as a factor: corners as nodes.
+    """Treats corners as nodes, for code that uses a node's weight or gradient once, as a factor.
 
     A node number is then a `Weighted`.
     """
@@ -122,11 +121,11 @@ class AtCorners(NamedTuple):
 def along_cell(grid, direction, x):
     """Cell of a corner in one direction, position in it (0 to 1), and their sum.
 
-    Corners beyond the grid move to its face, so weights sum to one.
+    Corners beyond the grid move to its face, so that weights sum to one.
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
+    a = min(max(real(0, a), a), real(cells, a))  # this order turns NaN into 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 
@@ -161,7 +160,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """A corner's part of D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """Contribution of a corner to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):

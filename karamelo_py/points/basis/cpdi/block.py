@@ -1,7 +1,6 @@
-"""The nodes around a domain in 2D, each once: three by three.
+"""The nodes around a 2D domain, each once: three by three, summed over the corners.
 
-Contributions are summed over the corners first. In 3D (27 nodes, eight corners) this costs more
-than it saves.
+In 3D (27 nodes, eight corners) this costs more than it saves.
 """
 
 from collections.abc import Iterable
@@ -19,10 +18,10 @@ WIDTH = 3  # nodes per direction
 
 
 class NodeBlock(NamedTuple):
-    first: tuple[int, ...]  # number of the first node, per direction
+    first: tuple[int, ...]  # node number per direction
     weights: tuple[float, ...]
     gradients: tuple[Any, ...]  # of the corners, without N / r
-    holds: bool  # contains the corners, with no node missing at a wall
+    holds: bool  # all corners are inside and no node is missing at a wall
     seen: CornerStencil
 
 

@@ -1,5 +1,4 @@
-"""CPDI domains: parallelograms that deform with the point, and elements with corners moved by the
-grid."""
+"""CPDI domains: parallelograms that deform with the point, and elements whose corners move."""
 
 from karamelo_py.compiler import real
 from karamelo_py.points import basis as bases
@@ -45,7 +44,7 @@ def half_edges(kin, place):
 
 
 def reciprocals(kin, edges, factor):
-    """Cofactors of the edges by rows, times a factor."""
+    """Cofactors of the edges by rows, times `factor`."""
     d = kin.dimension
     a = {(e, i): edges[e][i] for e in range(d) for i in range(d)}
     return [vector(kin, [factor * cofactor(a, d, e, i) for i in range(d)]) for e in range(d)]
@@ -99,7 +98,7 @@ class _Simplex(cpdi.CarriedDomain):
 
 
 class T3(_Simplex):
-    """Triangles of a mesh: three corners, each with a weight of 1/3.
+    """Triangles of a mesh: three corners of weight 1/3.
 
     Example
     -------
@@ -112,9 +111,7 @@ class T3(_Simplex):
 
 
 class Tet4(_Simplex):
-    """Tetrahedra of a mesh: four corners, each with a weight of 1/4.
-
-    As used by Sinaie et al. 2017.
+    """Tetrahedra of a mesh: four corners of weight 1/4 (Sinaie et al. 2017).
 
     Example
     -------
@@ -171,7 +168,7 @@ class Q4(cpdi.CarriedDomain):
 @cpdi.domain.on(Q4)
 def _domain_q4(basis, kin, place):
     x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
-    # Diagonals; their cross product is twice the area V.
+    # diagonals, whose cross product is twice the area V
     px, py = x3 - x1, y3 - y1
     qx, qy = x4 - x2, y4 - y2
     double = px * qy - qx * py
@@ -200,7 +197,7 @@ def _upright_q4(basis, kin, place):
     return least > 0
 
 
-# Weights of an edge's ends at its nearer and farther Gauss point.
+# weights of an edge's ends at its near and far Gauss point
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
@@ -208,8 +205,8 @@ PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 class H8(cpdi.CarriedDomain):
     """Trilinear hexahedra whose corners move with the grid.
 
-    Weights and gradients are exact means over the hexahedron: 2 x 2 x 2 Gauss points integrate N
-    det J, a cubic in each direction, and grad N det J, of lower order.
+    Weights and gradients are exact means: 2 x 2 x 2 Gauss points integrate N det J, a cubic in each
+    direction, and grad N det J, of lower order.
 
     Example
     -------
@@ -228,9 +225,9 @@ def _cross(a, b):
 
 
 def _at_gauss(a, b, c, d):
-    """Bilinear interpolation of values at (-,-), (+,-), (-,+), (+,+) to the Gauss points.
+    """Interpolate bilinearly from (-,-), (+,-), (-,+), (+,+) to the Gauss points.
 
-    By symmetry, also the distribution from Gauss points to corners.
+    By symmetry this also distributes from Gauss points to corners.
     """
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
@@ -256,7 +253,7 @@ def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
 
 
 def _edges(place):
-    """Half edges along each direction; the other two directions as in `_at_gauss`."""
+    """Half edges in each direction, ordered in the other two as in `_at_gauss`."""
     at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):
@@ -268,16 +265,15 @@ def _edges(place):
 
 @cpdi.domain.on(H8)
 def _domain_h8(basis, kin, place):
-    # Rows of the Jacobian: u is independent of xi, v of eta, w of zeta; keys are Gauss points of
+    # Rows of the Jacobian: u does not depend on xi, v on eta, w on zeta; keys are Gauss points of
     # the other two directions.
     u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(place)]
-    # Cofactors along xi by xi, eta, zeta, summed over the Gauss points of xi; likewise for the
-    # rest.
+    # Cofactors along xi by xi, eta, zeta, summed over the Gauss points of xi, and so on.
     first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}
     p = _at_gauss(*[_add(first[0, b, c], first[1, b, c]) for b, c in PAIRS])
     q = _at_gauss(*[_add(_cross(w[a, 0], u[0, c]), _cross(w[a, 1], u[1, c])) for a, c in PAIRS])
     r = _at_gauss(*[_add(_cross(u[b, 0], v[a, 0]), _cross(u[b, 1], v[a, 1])) for a, b in PAIRS])
-    # det J, two Gauss points of xi per tuple; spread over the corners.
+    # det J, two Gauss points of xi per tuple, distributed to the corners.
     d = _at_gauss(*[tuple([dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
     return _means(place, d, p, q, r)
 
