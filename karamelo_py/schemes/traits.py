@@ -1,3 +1,5 @@
+"""Traits of a scheme."""
+
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,3 +1,5 @@
+"""Basis Bernstein-quadratic: nodes every h/2."""
+
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure

@@ -1,3 +1,5 @@
+"""Basis linear: hat functions on the nodes."""
+
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Weighted rows of node arrays."""
+
 from typing import NamedTuple
 
 
