@@ -55,8 +55,7 @@ def force_stress(frame, kin, tau, f):
 
 
 def pulled_back(frame, kin, g, f):
-    """Pull the gradient g back to the flux direction C^-1 g = F^-1 F^-T g in the reference frame.
-    """
+    """Pull the gradient g back to the flux direction C^-1 g = F^-1 F^-T g."""
     return g if frame.moves else inv(f.planar()).left_cauchy_green().dot(g)
 
 

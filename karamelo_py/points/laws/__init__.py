@@ -1,16 +1,15 @@
 """Constitutive laws of a point, one file each: the script style and its point functions.
 
-A law is a NamedTuple of parameters (its class is the tag); some are NamedTuples, its parts
-(`eos_strength`). Its state is a NamedTuple of numbers and tensors in the kinematics `kin`. `j` =
-det F is the volume over the reference volume.
+A law is a NamedTuple of parameters, some of them NamedTuples (parts, as in `eos_strength`). Its
+state is a NamedTuple of numbers and tensors in the kinematics `kin`; `j` = det F.
 
-The class docstring is the manual. Arguments of the style are the annotated fields, or the
-parameters of a classmethod `given`, which returns the law. `checked` refuses values that
-annotations cannot, and returns the law or an equivalent simpler one. ``traits``
-(:class:`LawTraits`) are a class attribute; `column` declares output columns.
+The class docstring is the manual. The arguments of the style are the annotated fields, or the
+parameters of a classmethod `given` that returns the law. `checked` refuses values that annotations
+cannot, and returns the law or an equivalent simpler one. ``traits`` (:class:`LawTraits`) is a class
+attribute; `column` declares output columns.
 
-A law with ``in_lanes`` (all its parts need it) is computed for several points at once: its point
-functions branch only with `where`, except those listed in ``scalarised``.
+If a law and all its parts have ``in_lanes``, several points are computed at once: point functions
+branch only with `where`, except those in ``scalarised``.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from karamelo_py.compiler import point_function, real
 class LawTraits(NamedTuple):
     rebounds: bool = False  # sustains tension and returns all work done on it
     flows: bool = False  # holds no shape: liquids, soils
-    rings: bool = True  # vibrates, unless it has no shear modulus
+    rings: bool = True  # vibrates if it has a shear modulus
     any_speed: bool = False  # may move many times faster than its waves: gases
-    least_density: float = 10.0  # kg/m^3; lower values suggest wrong units
-    wraps: bool = False  # supports what the inner law does
+    least_density: float = 10.0  # kg/m^3; a lower density suggests wrong units
+    wraps: bool = False  # supports what the wrapped law does
 
 
 def law_traits(part: Any) -> LawTraits:
@@ -45,7 +44,7 @@ class Absent(NamedTuple):
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """Classes of a law (or table of laws) and its parts, which select kernels and arrays."""
+    """Classes of a law (or table of laws) and its parts; they select kernels and arrays."""
     parts = [law_kind(part) for part in law if isinstance(part, tuple)]
     return type(law), *(kind for part in parts for kind in part)
 
@@ -58,15 +57,15 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """The point function is defined for the law or one of its parts."""
+    """True if the point function is defined for the law or one of its parts."""
     kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
     return any(function.defined(kind) for kind in kinds)
 
 
 def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Let the law in the field `part` of `outer`, with the state `kept`, answer functions.
+    """Let the law in the field `part` of `outer`, with the state `kept`, answer `functions`.
 
-    Their arguments: (law), (law, like), or law, kinematics (or `kin` instead), state and more.
+    These take (law), (law, like), or law, kinematics (replaced by `kin`), state and more.
     """
 
     def register(function: Callable, changes: bool) -> None:
@@ -93,12 +92,12 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(part: type, name: str, source: Callable | NamedTuple) -> None:
-    """Declare an output column, by a `number` or a tag of `shown`."""
+    """Declare an output column by a `number` or a tag of `shown`."""
     _columns.setdefault(part, {})[name] = source if isinstance(source, tuple) else source.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """Columns, the parts' first: name, and tag for `shown`."""
+    """Map names of columns, those of the parts first, to tags for `shown`."""
     kinds = reversed(law_kind(law)[1:])
     tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
     return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
@@ -111,7 +110,7 @@ def of_part(law, tag):
 
 @point_function()
 def shown(tag, law, kin, state):
-    """Value of an output column."""
+    pass
 
 
 @point_function(otherwise=True)
@@ -132,7 +131,7 @@ def _shown_within(tag, law, kin, state):
 def number(function: Callable) -> Callable:
     """Make a point function of (law, kin, state) an output column.
 
-    Its module stores the tag's class: cached kernels import it.
+    The tag's class goes into its module, because cached kernels import it.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)
@@ -148,7 +147,7 @@ def number(function: Callable) -> Callable:
 
 @point_function()
 def initial_state(law, kin, like):
-    """State of an undeformed, unstressed point."""
+    pass
 
 
 @point_function()
@@ -159,62 +158,63 @@ def advance(law, kin, state, dl, dt):
 class FbarStep(NamedTuple):
     dl: Any
     dt: Any
-    extra: Any  # pressure in forces beyond the point's (F-bar)
+    extra: Any  # pressure in the nodal forces minus the point's (F-bar)
 
 
 @point_function(otherwise=True)
 def advance_fbar(law, kin, state, step):
-    """As `advance`, for an `FbarStep`."""
     return advance(law, kin, state, step.dl, step.dt)
 
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """det F times the Cauchy stress; times the reference volume: nodal forces."""
+    """det F times the Cauchy stress; nodal forces are its product with the reference volume."""
 
 
 @point_function()
 def cauchy_stress(law, kin, state):
-    """Cauchy stress, for output."""
+    pass
 
 
 @point_function(otherwise=True)
 def jacobian(law, kin, state):
-    """det F; by default `state.J`."""
+    """det F."""
     return state.J
 
 
 @point_function()
 def deformation(law, kin, state):
-    """F, for laws whose state has it."""
+    """F, if the state has it."""
 
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """The law sums strains, so load steps need their logarithm; a constant."""
+    """True if the law sums strains, so that load steps need their logarithm; constant when
+    compiled.
+    """
     return True
 
 
 @point_function()
 def wave_speed_squared(law, kin, state):
-    """Speed of the fastest small disturbance, for the stable step."""
+    """Squared speed of the fastest small disturbance, for the stable step."""
 
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Upper bound of `wave_speed_squared`, if cheaper: most points are slower."""
+    """Upper bound of `wave_speed_squared`, if cheaper."""
     return wave_speed_squared(law, kin, state)
 
 
 @point_function(otherwise=True)
 def stretch_across(law, state):
-    """Thickness over the initial one; 1 for other laws."""
+    """Thickness over the initial thickness."""
     return 1
 
 
 @point_function(otherwise=True)
 def is_round(law):
-    """A bar pulled along x contracts equally in y and z."""
+    """True if a bar pulled along x contracts equally in y and z."""
     return True
 
 
@@ -232,7 +232,7 @@ def energy_density(law, kin, state):
 
 @point_function(otherwise=True)
 def constrained_velocity(law, v, v_grid):
-    """Velocity after a step: `v_grid`; rigid bodies retain v."""
+    """Velocity after a step: `v_grid`, or v for rigid bodies."""
     return v_grid
 
 
@@ -243,73 +243,71 @@ def is_rigid(law: tuple) -> bool:
 @number
 @point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
-    """Per reference volume; undefined for laws without."""
+    """Dissipated energy per reference volume; undefined if the law dissipates none."""
     return specific_volume(law) - specific_volume(law)
 
 
 @number
 @point_function()
 def damage(law, kin, state):
-    """0 intact to 1 broken; undefined for laws without damage."""
+    """Damage from 0 (intact) to 1 (broken)."""
 
 
 @number
 @point_function()
 def damage_initiation(law, kin, state):
-    """Grows from 0; damage begins at 1. Undefined for laws without damage."""
+    """Damage initiation, which grows from 0; damage begins at 1."""
 
 
 @number
 @point_function(otherwise=True)
 def temperature(law, kin, state):
-    """0 for laws without one."""
     return specific_volume(law) - specific_volume(law)
 
 
 @point_function(otherwise=True)
 def with_temperature(law, kin, state, T):
-    """Unchanged for laws without temperature."""
     return state
 
 
 @point_function(otherwise=True)
 def heat_capacity(law, like):
-    """Per mass and kelvin; 0 for laws without temperature."""
+    """Heat capacity per mass and kelvin; 0 for laws without temperature."""
     return real(0, like)
 
 
 @point_function(otherwise=True)
 def lit(law, kin, state, since):
-    """State of an explosive lit `since` this time; unchanged for other laws."""
+    """State of an explosive a time `since` after lighting."""
     return state
 
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """State with `heat` more internal energy per reference volume, if any."""
+    """State with `heat` more internal energy per reference volume, if it stores any."""
     return state
 
 
 @point_function(otherwise=True)
 def conductivity(law, like):
-    """Heat flux per gradient; 0 for laws without temperature."""
+    """Conductivity: heat flux per gradient."""
     return real(0, like)
 
 
 @point_function()
 def elastic_strain(law, kin, state):
-    """For output."""
+    pass
 
 
 @number
 @point_function()
 def plastic_strain(law, kin, state):
-    """Equivalent, for output; undefined for laws without."""
+    """Equivalent plastic strain."""
 
 
 @point_function()
 def with_stress(law, kin, state, stress):
-    """With this Cauchy stress (initial_stress); undefined for laws without."""
+    """State with this Cauchy stress (fix initial_stress)."""
 
 
 @point_function(otherwise=True)

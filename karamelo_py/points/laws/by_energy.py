@@ -1,9 +1,9 @@
-"""Hyperelastic laws given by a formula of their stored energy.
+"""Hyperelastic laws from a formula of the stored energy, differentiated when the law is defined.
 
-The formula is differentiated when the material is defined. Its structure is in the class of the
-law, so kernels contain it as code; its numbers are parameters. Laws that differ only in numbers
-have common kernels, unless some are equal or small whole exponents. Formulas of invariants are
-computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by point.
+The class of the law holds the structure of the formula, so kernels contain it as code; its numbers
+are parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
+whole exponents. Formulas of invariants are computed in lanes; of principal stretches, or with
+`ONE_BY_ONE`, point by point.
 """
 
 from collections import namedtuple
@@ -44,18 +44,16 @@ WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
 ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not in lanes
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min", ">=")
 
-Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
+Code = tuple[tuple[str, Any], ...]  # a stack program: (operation, operand)
 
 
 class _ProgramWriter:
-    """Writes formulas of `names` with common `numbers`."""
-
     def __init__(self, names: Sequence[str]):
         self.names = names
         self.numbers: dict[float, int] = {}
 
     def code(self, root: Term) -> Code:
-        """Stack program of a formula; () if it is 0."""
+        """Stack program of a formula; () for 0."""
         if is_number(root, 0):
             return ()
         made: list[tuple[str, Any]] = []
@@ -104,7 +102,7 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """Value at `arguments`; 0 without a program."""
+    """Value of a program at `arguments`; 0 without a program."""
     if not len(code):
         return 0
     stack = ()
@@ -131,7 +129,7 @@ class ByEnergy(OfDeformation):
     traits = LawTraits(rebounds=True)
     in_lanes = True
     directions: ClassVar[tuple[str, ...]] = ()  # fields with components of fibres at rest
-    start: ClassVar[int]  # index of the first number of the formula
+    start: ClassVar[int]  # index of the formula's first number
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
     second: ClassVar[tuple[Code, ...]]  # by aa, ab, ac, bb, bc, cc
@@ -142,13 +140,13 @@ class OfInvariants(ByEnergy):
 
 
 class OfFibres(OfInvariants):
-    """Also of I4 = a0.C a0 and I6 = b0.C b0, for the unit vectors a0 and b0 of two families."""
+    """Adds I4 = a0.C a0 and I6 = b0.C b0 for the unit vectors a0, b0 of two families."""
 
     __slots__ = ()
     directions = ("a1", "a2", "a3", "b1", "b2", "b3")
     along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
     twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
-    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # of `along` by I1, I2, J
+    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
 
 
 class OfStretches(ByEnergy):
@@ -164,16 +162,16 @@ IN_STRETCHES = {
     "I1": plus(plus(_A, _B), _C),
     "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
     "J": times(times(_L[0], _L[1]), _L[2]),
-    **dict.fromkeys(FIBRES, constant(1.0)),  # the matrix alone
+    **dict.fromkeys(FIBRES, constant(1.0)),  # matrix only
 }
 
 
 def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> NamedTuple:
-    """From a stored energy per reference volume.
+    """Build the law with this stored energy per reference volume.
 
-    `directions`: unit vectors a0 and b0, if the formula contains I4 or I6. ScriptError for
-    operations without a derivative, stress or no stiffness at rest, and formulas that distinguish
-    principal directions.
+    `directions` holds unit vectors a0 and b0 if the formula contains I4 or I6. Raise ScriptError
+    for operations without a derivative, stress or no stiffness at rest, and formulas that
+    distinguish principal directions.
     """
     term = energy._term
     for one in terms.in_order(term):
@@ -244,7 +242,7 @@ def value_at(root: Term, stretches: Sequence[float]) -> float:
 
 
 def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float, float, float]:
-    """Lame's parameters and energy at rest; refuse anisotropic and unstable energies."""
+    """Return Lame's parameters and the energy at rest; refuse anisotropic and unstable energies."""
     rest = (1.0, 1.0, 1.0)
     at_rest, stress = value_at(energy, rest), value_at(slopes[0], rest)
     stiffness, lam = (value_at(curve, rest) for curve in curves)
@@ -297,7 +295,8 @@ SCANNED = 0.5, 3.0  # stretches
 
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Nearest to rest: path and stretch at which a principal direction loses its stiffness."""
+    """Return the path and stretch nearest to rest where a principal direction loses its stiffness.
+    """
     unstable = []
     for path, stretches in PATHS.items():
         for end in SCANNED:
@@ -325,7 +324,7 @@ def squared(s):
 
 @point_function()
 def variables(law, F, b):
-    """I1, I2, J, then I4 and I6 of fibres."""
+    """I1, I2, J, and with fibres I4 and I6."""
 
 
 @variables.on(OfInvariants)
@@ -366,7 +365,7 @@ def _wave_speed_squared_of_invariants(law, kin, state):
 
 def stiffness_of_matrix(law, b, at):
     # Bounds of l^2 d2W/dl^2 (`along_direction`) and of shear, 2 x_a (W_1 + x_c W_2), term by term:
-    # the squares x of principal stretches lie between the bounds of Gershgorin, and above J^2/I2.
+    # squared principal stretches x lie between Gershgorin's bounds, and above J^2/I2.
     I1, I2, J, *_ = at
     high = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
@@ -378,7 +377,7 @@ def stiffness_of_matrix(law, b, at):
         along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
         along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
     if len(second):
-        most = min(0.25 * I1 * I1, high * (I1 - low))  # of x (I1 - x)
+        most = min(0.25 * I1 * I1, high * (I1 - low))  # max of x (I1 - x)
         least = max(min(low * (I1 - low), high * (I1 - high)), 0)
         along += 2 * most * max(W2, 0) + 2 * least * min(W2, 0)
         along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0)
@@ -388,7 +387,7 @@ def stiffness_of_matrix(law, b, at):
 
 
 def along_direction(law, at, x, rest):
-    """l^2 d2W/dl^2 of a stretch l = sqrt(x); the squares of the other two sum to `rest`."""
+    """l^2 d2W/dl^2 of a stretch l = sqrt(x) if the squares of the other two sum to `rest`."""
     J, at = at[2], (*at, 1, 1)
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
@@ -427,11 +426,11 @@ def _kirchhoff_stress_of_stretches(law, kin, state):
 
 
 PAIRS = tuple(combinations(range(3), 2))
-CLOSE = 1e-5  # squares of stretches that count as equal
+CLOSE = 1e-5  # squared stretches this close count as equal
 
 
 def limits_of(law, at, slopes):
-    """(tau_a - tau_b) / (l_a^2 - l_b^2) of pairs of equal stretches."""
+    """Limits of (tau_a - tau_b) / (l_a^2 - l_b^2) for equal stretches."""
     W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
     twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
     each = zip(PAIRS, twice, strict=True)
@@ -460,7 +459,7 @@ def _shear_part_of_stretches(law, kin, state):
 
 
 def shear_between(law, at):
-    """Largest rho c^2 of shear waves: l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
+    """Largest rho c^2 of shear waves, l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
     slopes = [evaluated(code, law, at) for code in law.first]
     limits = limits_of(law, at, slopes)
     squares = []

@@ -1,4 +1,4 @@
-"""material cam-clay: modified Cam-clay in logarithmic strains."""
+"""Material cam-clay, in logarithmic strains."""
 
 from math import sqrt
 from typing import Any, NamedTuple
@@ -25,7 +25,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class CamClay(NamedTuple):
-    """Modified Cam-clay: consolidation, elliptic yield surface, flow at the critical state.
+    """Modified Cam-clay with consolidation, an elliptic yield surface and a critical state.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class CamClay(NamedTuple):
     kappa
         The same slope in swelling, below lam.
     p0
-        Initial pressure, without any load.
+        Initial pressure.
     pc
         Initial preconsolidation pressure, at least p0; default p0.
 
@@ -51,23 +51,23 @@ class CamClay(NamedTuple):
 
     Notes
     -----
-    Stresses are Kirchhoff stresses, J times Cauchy: p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with
-    the logarithmic elastic strain e. Yield surface: q^2/M^2 + p (p - pc) = 0, with associated flow.
-    pc grows with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in
-    logarithmic strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III", Comput.
-    Methods Appl. Mech. Eng. 155). Steps of any size end on the surface.
+    Kirchhoff stress (J times Cauchy): p = p0 exp(-tr(e)/kappa), s = 2 G dev(e), with the
+    logarithmic elastic strain e. Yield surface: q^2/M^2 + p (p - pc) = 0, with associated flow. pc
+    grows with plastic compression v as exp(v/(lam - kappa)) (Roscoe & Burland 1968; in logarithmic
+    strains and volumes Borja & Tamagnini 1998, "Cam-Clay plasticity part III", Comput. Methods
+    Appl. Mech. Eng. 155).
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
     q/p. At the critical state: p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic strain ep,
-    and pc. A stress outside the surface from fix initial_stress raises pc. There is no tension.
+    and pc. There is no tension. A stress of fix initial_stress outside the surface raises pc.
 
-    At a free surface a load must balance p0, or the first step releases it. Hold the other sides
-    and use ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top, or ``fix(cell,
-    edge_pressure, all, b, 100e3)`` all around, with the solid's region b. With fix initial_stress,
-    the load is its normal component.
+    At a free surface a load must balance p0, or the first step releases it: ``fix(cover,
+    edge_traction, all, b, yhi, 0, -100e3)`` at the top of the solid's region b with the other sides
+    held, or ``fix(cell, edge_pressure, all, b, 100e3)`` all around. With fix initial_stress, the
+    load is its normal component.
 
-    With anti_volumetric_locking, overconsolidated clay has the same peak strength and softens more
-    after it: by 4 % with an overconsolidation ratio of 8, and by 13 % with 16 (biaxial tests).
+    With anti_volumetric_locking, overconsolidated clay has the same peak strength but softens more:
+    by 4 % with an overconsolidation ratio of 8, by 13 % with 16 (biaxial tests).
 
     See Also
     --------
@@ -147,8 +147,8 @@ def _advance_cam_clay(law, kin, state, dl, dt):
     )
 
 
-# Return to the surface with plastic compression y and w = 6 G / M^2 of the plastic multiplier: q
-# becomes q / (1 + w), p becomes p exp(-y / kappa), pc becomes pc exp(y / (lam - kappa)).
+# Returns to the surface with plastic compression y and w = 6 G / M^2 times the plastic multiplier:
+# q becomes q / (1 + w), p p exp(-y / kappa), pc pc exp(y / (lam - kappa)).
 
 
 class ClayStress(NamedTuple):
@@ -163,7 +163,7 @@ def after_flow(law, trial, y, w):
 
 
 def residuals(law, trial, y, w):
-    """Residuals of the yield function and the flow rule y = w M^2/6G (2 p - pc)."""
+    """Residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
     q, p, pc = after_flow(law, trial, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
@@ -181,16 +181,16 @@ def newton_step(law, trial, y, w, errors):
     return k * (fw * g - gw * f), k * (gy * f - fy * g)
 
 
-_BISECTIONS = 14  # after which Newton's method squares the error
+_BISECTIONS = 14  # then Newton's method squares the error
 _NEWTON = 4
 
 
 @shared
 def plastic_flow(law, q, p, pc):
-    """y and w that return a trial with q and p to the surface; 0 inside it.
+    """Return the y and w that bring a trial with q and p back to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains, with its solution
-    between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
+    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution is between
+    y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # outside the surface, for unused lanes
@@ -221,7 +221,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # Newton correction with the slopes of the residual.
+    # One Newton correction carries the slopes of the residual.
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0
@@ -278,7 +278,7 @@ laws.column(CamClay, "dissipated", laws.dissipated_energy)
 
 @laws.wave_speed_squared.on(CamClay)
 def _wave_speed_squared_cam_clay(law, kin, state):
-    # (K + 4/3 G - tau) / rho_0 along a principal direction: plastic waves are slower.
+    # (K + 4/3 G - tau) / rho_0 along a principal direction; plastic waves are slower
     modulus = pressure(law, state.e) / law.kappa + 4 / 3 * law.G
     tau = laws.kirchhoff_stress(law, kin, state)
     return (modulus + tau.largest_row_sum()) * law.specific_volume

@@ -1,8 +1,7 @@
-"""Damages: the lost fraction D of a point's strength.
+"""Damages: the lost fraction D of a point's strength, a part of `eos_strength`.
 
-A damage is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). It scales stress and tension, not compression, by 1 - D;
-equation of state and strength do not depend on it. Its memory is a tuple.
+A damage is a NamedTuple of parameters; its memory is a tuple. Stress and tension, not compression,
+are scaled by 1 - D; equation of state and strength do not depend on it.
 """
 
 from typing import Any, NamedTuple
@@ -17,12 +16,12 @@ from karamelo_py.script.errors import ScriptError
 
 @point_function(otherwise=True)
 def initial_damage(damage, like):
-    """Memory of an intact point; () without damage."""
+    """Memory of an intact point."""
     return ()
 
 
 class FlowStep(NamedTuple):
-    strain: Any  # increment of the equivalent plastic strain
+    strain: Any  # increment of equivalent plastic strain
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
@@ -31,20 +30,20 @@ class FlowStep(NamedTuple):
 
 @point_function()
 def damage_after(damage, memory, step):
-    """Memory after a `FlowStep`."""
+    pass
 
 
 @point_function()
 def integrity(damage, memory):
-    """1 - D."""
+    pass
 
 
 @point_function()
 def initiation(damage, memory):
-    """Grows from 0; damage begins at 1."""
+    """Damage initiation, which grows from 0; damage begins at 1."""
 
 
-# Below this triaxiality, most metals have no finite failure strain.
+# lower triaxiality: most metals have no finite failure strain
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
 # Damage grows from 0 to 1 while sum(strain over failure strain) grows from 1 to 1 + 1/this.
@@ -57,7 +56,7 @@ class JohnsonCookDamage(NamedTuple):
     Parameters
     ----------
     d1, d2, d3
-        Failure strain at the reference rate: d1 + d2 exp(d3 t), with t the mean stress over the von
+        Failure strain d1 + d2 exp(d3 t) at the reference rate, with t the mean stress over the von
         Mises stress.
     d4
         Rate coefficient; 0 for none.
@@ -80,8 +79,7 @@ class JohnsonCookDamage(NamedTuple):
     strain. From w = 1, D (dump column damage) grows to 1 as 10 (w - 1). Nothing fails for t below
     -3. d1 may be negative; failure strains are at least 1e-6.
 
-    sigma = (1 - D) s - p I, with p times 1 - D in tension. The intact material still flows
-    plastically. Lost stored energy counts as dissipated.
+    sigma = (1 - D) s - p I, with p times 1 - D in tension. Lost stored energy counts as dissipated.
 
     See Also
     --------

@@ -1,4 +1,4 @@
-"""Material constants that are possible but implausible: likely mistakes."""
+"""Warnings about material constants that are possible but likely mistakes."""
 
 from collections.abc import Iterator
 from math import asin, degrees, inf, radians, sin, sqrt
@@ -18,14 +18,14 @@ from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
 
-SLOW = 0.01  # wave speed with density and modulus exchanged, in m/s or mm/ms
-SMALL = 2.0  # degrees; smaller friction angles are likely radians
+SLOW = 0.01  # wave speed in m/s or mm/ms if density and modulus are exchanged
+SMALL = 2.0  # degrees; a smaller friction angle is likely in radians
 EXPANSION = 1e-10, 1e-3  # per kelvin, far beyond quartz and polymers
-TOUGH = 50.0  # failure strain in shear, if in percent
+TOUGH = 50.0  # failure strain in shear; a larger one is likely in percent
 APART = 100.0  # kelvin between reference temperatures on the same scale
 MELTS = 0.1  # plastic strain whose heat melts no real metal
-COEFFICIENT = 2.0  # friction between grains, far above real values
-STEEP, THICK = 10.0, 20.0  # Hugoniot slopes, viscosity coefficients: far above real values
+COEFFICIENT = 2.0  # friction between grains; real values are far smaller
+STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; real values are far smaller
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
@@ -33,7 +33,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if hasattr(parameter(law, "strength"), "cell_size"):
-        # Viscosity damps waves by the cell size, which is set later.
+        # The cell size is set later, and viscosity damps waves by it.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

@@ -1,4 +1,4 @@
-"""Bases: isotropic elastic laws, and laws of the deformation gradient."""
+"""Base classes of isotropic elastic laws and of laws of the deformation gradient."""
 
 from typing import Any, NamedTuple
 

@@ -1,9 +1,8 @@
-"""Material eos-strength: a law of parts, named in the script.
+"""Material eos-strength: a law composed of parts named in the script.
 
-Pressure comes from an equation of state, deviatoric stress from a strength; viscosity, damage and
-temperature are optional. Parts are NamedTuples, so their types select their point functions;
-`Absent` marks missing parts, without numbers in the state. Parts of other kinds, from plug-ins, are
-chained (`karamelo_py.points.laws.further`).
+An equation of state gives pressure, a strength deviatoric stress; viscosity, damage and temperature
+are optional (`Absent`, without numbers in the state). Plug-ins may chain further parts
+(`karamelo_py.points.laws.further`).
 """
 
 from math import log, sqrt
@@ -52,7 +51,7 @@ from karamelo_py.points.laws.temperatures import (
 from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, unknown
 
-WARMER = 1.0, 100.0, 1000.0  # than a test point
+WARMER = 1.0, 100.0, 1000.0  # kelvin above a test point
 
 
 class Eos:
@@ -106,7 +105,7 @@ class EosStrength(NamedTuple):
         ID of a damage, ID of a temperature, in either order; both optional.
     strain
         ``rate``: the symmetric part of dt grad v strains, the skew part rotates s. ``logarithmic``:
-        s follows the logarithm of the elastic stretch, updated exactly for steps of any size.
+        s follows from the logarithmic elastic stretch, exact for steps of any size.
 
     Example
     -------
@@ -118,10 +117,10 @@ class EosStrength(NamedTuple):
     Notes
     -----
     sigma = s - p I. The deviatoric stress s rotates with the point (Jaumann rate; Hughes & Winget
-    1980), or is 2 G times the deviator of the logarithmic elastic strain (Simo 1992). For small
-    steps both agree, except at large elastic shear. The elastic strain is the strain of s plus ln J
-    / 3 (for soils, of the elastic part of J). The strain energy excludes plastic work (compute
-    dissipated_energy). Fix initial_stress changes the volume of points by its pressure.
+    1980), or is 2 G dev of the logarithmic elastic strain (Simo 1992); in small steps they differ
+    only at large elastic shear. The elastic strain is the strain of s plus ln J / 3 (for soils, of
+    the elastic part of J). The strain energy excludes plastic work (compute dissipated_energy). Fix
+    initial_stress changes the volume of points by its pressure.
 
     See Also
     --------
@@ -172,7 +171,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Without effect on strength, pressure and damage, and never read."""
+    """True if the temperature affects no strength, pressure or damage, and is never read."""
     pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -233,17 +232,17 @@ known_failure(
 )
 
 
-FAST = 0.02  # of the wave speed: metals yield in impacts above it
+FAST = 0.02  # of the wave speed; metals yield in faster impacts
 
 
 def _locks(law, scene):
-    """Flow at constant volume in load steps, which linear cells cannot represent."""
+    """True if flow in load steps conserves volume, which linear cells cannot represent."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"place": scene.method.place}
 
 
 def _locks_at_impact(law, scene):
-    """In the total frame points never leave their linear cells."""
+    """True at impact in the total frame, where points never leave their linear cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"place": scene.method.place}
 
@@ -274,9 +273,7 @@ known_failure(
 
 
 class Memory(NamedTuple):
-    """States of the parts; () for parts without a state."""
-
-    energy: Any  # of the equation of state
+    energy: Any  # memory of the equation of state
     viscous: Any
     damage: Any
     heat: Any
@@ -339,12 +336,12 @@ def _advance_fbar_eos_strength(law, kin, state, step):
 
 
 def rotated_with_point(law, kin, s, dl):
-    """Rotated deviatoric stress, and the strain that adds to it."""
+    """Return the rotated deviatoric stress, and the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
-    # The difference contains the rotation of the old strain.
+    # the difference contains the rotation of the old strain
     e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
     return s, elastic_trial(law.strain, e, dl) - e
 
@@ -358,20 +355,20 @@ def intact_pressure(law, j, m):
 
 
 def volume_energy(law, j, m):
-    """Of the intact material, at its temperature."""
+    """Volumetric energy of the intact material at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = eos.compression_energy(law.eos, elastic, m.energy)
     energy += strengths.added_energy(law.strength, law, elastic, m)
     energy -= eos.stored_heat(law.eos, sum(m.loss))
     warm = sum(thermal_pressure(law.temperature, m.heat))
-    if len(m.heat):  # thermal pressure of the equation of state
+    if len(m.heat):  # the equation of state's thermal pressure
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
     return energy + warm * (1 - j)
 
 
 def full_pressure(law, j, m):
-    """In the stress: damage reduces tension, not compression."""
+    """Pressure in the stress; damage reduces tension only."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * integrity_of(law, m.damage), p) + sum(m.viscous)
 
@@ -383,10 +380,10 @@ def sound(law, j, m):
 
 
 def sound_lost_to_damage(law, j, m):
-    """In the square.
+    """Squared wave speed lost to damage.
 
-    A broken point in tension has no waves. Closed again, at its initial volume, it has the waves of
-    rubble; these always count, as it may close soon.
+    A broken point in tension has no waves. Closed again at its initial volume it has the waves of
+    rubble; these always count, because it may close soon.
     """
     if isinstance(law.damage, Absent):
         return 0
@@ -407,7 +404,6 @@ def viscous_after(law, j, m, rate):
 
 
 def integrity_of(law, memory):
-    """1 - D."""
     return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
 
 
@@ -469,7 +465,7 @@ laws.hand_on(EosStrength, "temperature", "", (laws.heat_capacity, laws.conductiv
 
 @laws.wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
-    # (K + 4/3 G) / rho, with the elastic moduli: plastic waves are slower.
+    # (K + 4/3 G) / rho with elastic moduli; plastic waves are slower
     J, _, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
@@ -491,7 +487,7 @@ def _shear_part_eos_strength(law, kin, state):
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Released by unloading at this temperature, without plastic work."""
+    """Energy released by unloading at this temperature, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0
@@ -519,7 +515,7 @@ def _shown_remembered(tag, law, kin, state):
 
 @laws.with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
-    # Pressure follows from volume, so the point gets the volume with this pressure.
+    # Pressure follows from volume, so the volume is set to match the pressure.
     J, _, m = state
     stress = symmetric_tensor(kin, stress)
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)

@@ -1,4 +1,4 @@
-"""Fibres in hyperelastic laws: their stress and stiffness, and material holzapfel."""
+"""Stress and stiffness of fibres in hyperelastic laws, and material holzapfel."""
 
 from typing import Any
 
@@ -19,11 +19,11 @@ from karamelo_py.points.laws.hyperelastic import VOLUME, Direction, Fields, read
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 LEANS = 1e-9
-FIRST = len(FIELDS)  # index of the first component of a direction
+FIRST = len(FIELDS)  # index of a direction's first component
 
 
 class Holzapfel(OfFibres, Fields):
-    """Artery or other soft tissue with two families of fibres (Holzapfel, Gasser, Ogden).
+    """Soft tissue such as arteries, with two families of fibres (Holzapfel, Gasser, Ogden).
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Holzapfel(OfFibres, Fields):
     k1
         Stiffness of the fibres, a stress.
     k2
-        Exponent by which they stiffen.
+        Exponent of their stiffening.
     K
         Bulk modulus.
     fibre, fibre2
@@ -115,12 +115,12 @@ def _kirchhoff_stress_of_fibres(law, kin, state):
 
 
 def stiffness_of_fibres(law, b, at):
-    """|a n|^2 is at most I4 for a unit vector n."""
-    # Slack fibres have their stiffness at rest: the next step may stretch them.
+    """Stiffness of fibres, from |a n|^2 <= I4 for a unit vector n."""
+    # Slack fibres count with their stiffness at rest: the next step may stretch them.
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at
     high = b.largest_row_sum()
-    most = min(0.25 * at[0] * at[0], high * at[0])  # of x (I1 - x)
+    most = min(0.25 * at[0] * at[0], high * at[0])  # max of x (I1 - x)
     both = 8 * squares[0] * squares[1] * max(evaluated(law.twice_along[2], law, at), 0)
     for family in (0, 1):
         x = squares[family]

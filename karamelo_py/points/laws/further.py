@@ -1,7 +1,7 @@
 """Further parts of a composed law, of kinds that plug-ins may define.
 
-A part is a NamedTuple of parameters (its class is the tag); it may have a memory and add a
-pressure. Lowering adds one on request: the plastic strain rate, for output.
+A part is a NamedTuple of parameters; it may have a memory and add a pressure. The plastic strain
+rate is one, added if an output requests it.
 """
 
 from functools import reduce
@@ -33,16 +33,13 @@ def initial_part(part, like):
 
 @point_function(otherwise=True)
 def part_after(part, memory, law, step, memories):
-    """The memory after a `StrainStep`, with its s after the step.
-
-    `memories` are the other parts' memories.
-    """
+    """Memory after a `StrainStep` that contains the updated s; `memories` are the other parts'."""
     return memory
 
 
 @point_function(otherwise=True)
 def part_pressure(part, memory):
-    """(p,), the pressure that the part adds, or ()."""
+    """(p,), the added pressure, or ()."""
     return ()
 
 
@@ -67,7 +64,7 @@ def further_pressure(parts, memory, p):
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, first)))
 
 
-# Karamelo smooths over the sound crossing time of this many cells.
+# Karamelo smooths the rate over the sound crossing time of this many cells.
 CELLS = 1000
 
 
@@ -78,7 +75,7 @@ class PlasticRate(NamedTuple):
 
 
 class Smoothed(NamedTuple):
-    """Tag of the smoothed rate."""
+    pass
 
 
 laws.column(PlasticRate, "epdot", Smoothed())
@@ -117,7 +114,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """A law that also stores its rate, after its other memory; `h`: cell size."""
+    """Extend a law, for cells of size `h`, to store its plastic strain rate last."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

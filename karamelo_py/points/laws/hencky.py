@@ -1,4 +1,4 @@
-"""material hencky: elasticity in logarithmic strain."""
+"""Material hencky."""
 
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.points import laws
@@ -8,7 +8,7 @@ from karamelo_py.points.laws.elastic import Hyperelastic
 
 
 class Hencky(Hyperelastic):
-    """Elastic solid with a stress linear in logarithmic strain, for any strain and rotation.
+    """Elastic solid with stress linear in logarithmic strain, for any strain and rotation.
 
     Parameters
     ----------
@@ -32,8 +32,8 @@ class Hencky(Hyperelastic):
     -----
     Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I, with ln V = 1/2 ln F F^T of the left
     stretch V. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
-    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46).
-    Additive strains; the elastic part of most soil plasticity at large strain.
+    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). Its
+    strains are additive, hence the elastic part of most soil plasticity at large strain.
 
     A temperature T adds the stress -3 K alpha (T - T0) (bulk modulus K, initial temperature T0).
     The elastic strain excludes alpha (T - T0).
@@ -59,8 +59,8 @@ def _kirchhoff_stress_hencky(law, kin, state):
 
 @laws.wave_speed_squared.on(Hencky)
 def _wave_speed_squared_hencky(law, kin, state):
-    # Along a principal direction rho_0 c^2 = lam + 2 G - tau; slides between two stretches a and b,
-    # 2 G ln(a/b) a^2 / (a^2 - b^2), stay below while a/b is below 4.
+    # Along a principal direction rho_0 c^2 = lam + 2 G - tau; shear waves, 2 G ln(a/b) a^2 / (a^2 -
+    # b^2) for stretches a and b, are slower while a/b is below 4.
     tau = laws.kirchhoff_stress(law, kin, state)
     return (law.lam + 2 * law.G + tau.largest_row_sum()) * law.specific_volume
 

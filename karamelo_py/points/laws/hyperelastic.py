@@ -1,4 +1,4 @@
-"""Materials by their stored energy: hyperelastic, and ready formulas for rubber and tissue."""
+"""Materials given by a stored energy: hyperelastic, and ready formulas for rubber and tissue."""
 
 from collections import namedtuple
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ SEEDS = (*INVARIANTS, *FIBRES, *STRETCHES)
 
 
 class Direction:
-    """For signatures: a unit vector from ``(x, y, z)``."""
+    """Script argument: a unit vector from ``(x, y, z)``."""
 
     script_kind: ClassVar[str] = "a direction (x, y, z)"
 
@@ -40,7 +40,7 @@ class Direction:
 
 
 class EnergyFormula:
-    """For signatures: a stored energy as a formula of invariants or principal stretches."""
+    """Script argument: a stored energy of invariants or principal stretches."""
 
     script_kind: ClassVar[str] = "a formula of I1, I2, J, I4 and I6, or of l1, l2, l3 and J"
 
@@ -71,7 +71,7 @@ Fields = namedtuple("Fields", FIELDS)
 
 
 class HyperelasticFormula(OfInvariants, Fields):
-    """Elastic solid given by its stored energy, a formula.
+    """Elastic solid given by a formula of its stored energy.
 
     Parameters
     ----------
@@ -80,8 +80,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     energy
         Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, J = det
         F, with C = F^T F, and of I4 and I6, the squared stretches of two families of fibres; or of
-        the principal stretches l1, l2, l3 and J. Variables of the script are numbers. At rest, I1 =
-        I2 = 3, the others are 1.
+        the principal stretches l1, l2, l3 and J. Script variables are numbers. At rest I1 = I2 = 3,
+        the others 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6.
 
@@ -96,8 +96,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
     I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. Tangent and wave speed are second
     derivatives. The stored energy is 0 at rest; stress or no stiffness at rest is refused. A
-    warning names the stretch beyond which the energy is not convex along a principal direction: the
-    body would localize. Formulas of stretches cost more.
+    warning names the stretch beyond which the energy is not convex along a principal direction, so
+    that the body would localize. Formulas of stretches cost more.
 
     See Also
     --------
@@ -128,7 +128,7 @@ class HyperelasticFormula(OfInvariants, Fields):
 
 
 class _Numbers:
-    """Names of a ready formula: its constants; the rest are seeds."""
+    """Names in a ready formula: constants, or else seeds."""
 
     def __init__(self, numbers: dict[str, float]):
         self.numbers = numbers
@@ -227,7 +227,7 @@ class Yeoh(OfInvariants, Fields):
 
 
 class Gent(OfInvariants, Fields):
-    """Rubber of Gent (1996), whose chains have a limit of extension; slightly compressible.
+    """Rubber of Gent (1996) with limited chain extension, slightly compressible.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ class Gent(OfInvariants, Fields):
 
 
 class ArrudaBoyce(OfInvariants, Fields):
-    """Rubber as a network of eight chains, which have a limit of extension; slightly compressible.
+    """Rubber as a network of eight chains with limited extension, slightly compressible.
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ class SaintVenantKirchhoff(OfInvariants, Fields):
 
     Notes
     -----
-    W = lam/2 (tr E)^2 + G E:E. For large rotations and small strains: shortened to 0.58 of its
+    W = lam/2 (tr E)^2 + G E:E. For large rotations but small strains: compressed to 0.58 of its
     length, a body loses its stiffness.
 
     See Also

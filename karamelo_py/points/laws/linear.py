@@ -1,4 +1,4 @@
-"""material linear: isotropic linear elasticity for large rotations."""
+"""Material linear."""
 
 from typing import Any, Literal, NamedTuple
 
@@ -69,7 +69,7 @@ class LinearElastic(ElasticLaw):
 
 
 class FixedFrame(LinearElastic):
-    """The stress does not rotate with the point, as in Karamelo."""
+    """Hooke's law whose stress does not rotate with the point, as in Karamelo."""
 
     __slots__ = ()
     traits = LawTraits()
@@ -78,7 +78,7 @@ class FixedFrame(LinearElastic):
 
 class State(NamedTuple):
     J: Any
-    sigma: Any  # Cauchy stress
+    sigma: Any  # Cauchy
 
 
 gain(
@@ -115,7 +115,7 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho: constant moduli; volume per mass has grown by det F
+    # (lam + 2 G) / rho: constant moduli; the volume per mass has grown by det F
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 
@@ -126,7 +126,7 @@ def _shear_part_linear_elastic(law, kin, state):
 
 @laws.elastic_strain.on(LinearElastic)
 def _elastic_strain_linear_elastic(law, kin, state):
-    # Hooke's law is isotropic and rotates with the point: strain follows from stress.
+    # Hooke's law is isotropic and rotates with the point, so strain follows from stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
 

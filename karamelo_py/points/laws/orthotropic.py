@@ -1,4 +1,4 @@
-"""Materials orthotropic and transverse: directional elasticity of wood, plies and slate."""
+"""Orthotropic and transversely isotropic elasticity: wood, plies, slate."""
 
 from collections import namedtuple
 from itertools import combinations_with_replacement
@@ -15,14 +15,14 @@ from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-# Voigt's order.
+# Voigt's order
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
-INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of a component in Voigt's order
+INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # index in Voigt's order
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
 )
-COUPLED = 1e-9  # of the largest stiffness: shear out of plane
+COUPLED = 1e-9  # out-of-plane shear, over the largest stiffness
 
 _Fields = namedtuple(
     "_Fields", ("specific_volume", "fastest", *(f"c{a + 1}{b + 1}" for a, b in PAIRS))
@@ -62,7 +62,7 @@ class Orthotropic(NamedTuple):
     The second Piola-Kirchhoff stress is linear in the Green-Lagrange strain, S = C:E, with the
     stiffness C of Lekhnitskii (1963, section 5). The axes rotate with the body. In axisymmetry, x,
     y and z are the radial, axial and hoop directions. In 2D, one axis should be z (`tilt` 0 or 90
-    with `spin` 0), or the body shears out of plane.
+    with `spin` 0); otherwise the body shears out of plane.
 
     See Also
     --------
@@ -169,7 +169,7 @@ def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
 
 
 def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Stiffness (3, 3, 3, 3) from a matrix (6, 6), by the axes R."""
+    """Stiffness (3, 3, 3, 3) from a matrix (6, 6), rotated by R."""
     full = np.array(
         [[[[C[INDEX[i][j], INDEX[k][m]] for m in range(3)] for k in range(3)] for j in range(3)]
          for i in range(3)]
@@ -183,12 +183,12 @@ def fastest(C: np.ndarray) -> float:
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
     acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
-    # Directions tried are 3 degrees apart; between them it may be a little larger.
+    # A factor for directions between those tried, 3 degrees apart.
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """Check whether a body in 2D or 1D would shear out of its plane or line."""
+    """True if a body in 2D or 1D would shear out of its plane or line."""
     inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
     shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
     return max(shears, default=0) > COUPLED * law.fastest

@@ -1,4 +1,4 @@
-"""Checks and conversions of parameters, and sequences of numbers."""
+"""Checks and conversions of parameters."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,7 +14,7 @@ LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 
 
 def lame_parameters(E: float, nu: float) -> tuple[float, float]:
-    """Lame's parameters lambda and G; ScriptError unless -1 < nu < 0.5."""
+    """Return Lame's parameters lambda and G; ScriptError unless -1 < nu < 0.5."""
     if not -1 < nu < 0.5:
         raise ScriptError(
             f"Poisson's ratio {nu:g} is impossible",
@@ -25,7 +25,7 @@ def lame_parameters(E: float, nu: float) -> tuple[float, float]:
 
 
 def warn_of_locking(law: type) -> None:
-    """Warn of a nearly incompressible `law`, with fields ``lam`` and ``G``."""
+    """Warn of a nearly incompressible `law` with fields ``lam`` and ``G``."""
 
     def keeps_volume(law, scene):
         nu = law.lam / (2 * (law.lam + law.G))
@@ -52,7 +52,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """Reference rate in 1 + `factor` ln(rate/epsdot0), not 0; arbitrary if `factor` is 0."""
+    """Reference rate in 1 + `factor` ln(rate/epsdot0), which must not be 0 unless `factor` is."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -66,9 +66,9 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 
 @dataclass(frozen=True)
 class Numbers:
-    """Constant sequence of numbers, a curve or a formula; an array in kernels.
+    """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    In tables of laws padded with its last number: a law that needs the length stores it separately.
+    Tables of laws pad it with its last number: a law that needs the length stores it separately.
     """
 
     values: tuple[float, ...]

@@ -1,9 +1,8 @@
-"""Saturated soil: any law as the skeleton, and water in its pores.
+"""Saturated soil: any law as the skeleton, with effective stress, and water in its pores.
 
-Stresses are effective. The state has two numbers more, per volume before deformation: the volume of
-the water at no pressure, and of the pores. p = K ln(content / pores). `advance` alone is undrained;
-in a run the flux through the nodes changes the content
-(:mod:`karamelo_py.kernels.equations.pore_water`).
+The state adds the volume of the water at zero pressure and of the pores, per volume before
+deformation: p = K ln(content / pores). `advance` alone is undrained; in a run the flux through the
+nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from math import sqrt
@@ -14,14 +13,14 @@ from karamelo_py.points import laws
 
 
 class Saturated(NamedTuple):
-    """A law whose pores are full of water; `law` is the skeleton."""
+    """The skeleton `law` with water in its pores."""
 
     law: Any
     n: float  # porosity before deformation
-    drag: float  # force per volume of pores and velocity of the water: rho g / permeability
+    drag: float  # force per pore volume and water velocity: rho g / permeability
     K: float  # bulk modulus of the water
-    rho: float  # density of the water at no pressure
-    kozeny: float  # 1: the permeability follows the porosity, 0: it does not
+    rho: float  # density of the water at zero pressure
+    kozeny: float  # 1: permeability follows the porosity; 0: constant
 
     in_lanes = True
     traits = laws.LawTraits(wraps=True)
@@ -66,7 +65,7 @@ def _with_stress_saturated(law, kin, state, stress):
 
 
 def _terms(law, kin, state, of_skeleton):
-    """Squared speed of the skeleton, and trace and determinant of both phases without drag."""
+    """Squared skeleton speed, and trace and determinant of the undrained two-phase problem."""
     dry = 1 / (laws.specific_volume(law) * laws.jacobian(law, kin, state))
     n = porosity(law, kin, state)
     slow, water = of_skeleton(law.law, kin, state.skeleton), law.K / n
@@ -76,7 +75,7 @@ def _terms(law, kin, state, of_skeleton):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # Larger eigenvalue of the two phases: no drag makes a wave faster.
+    # The larger eigenvalue of the two phases; without drag it is fastest.
     trace, product = _terms(law, kin, state, laws.wave_speed_squared)
     return 0.5 * (trace + sqrt(max(trace * trace - 4 * product, 0)))
 
@@ -89,7 +88,7 @@ def _wave_speed_bound_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def pore_pressure(law, kin, state):
-    """Undefined for dry laws."""
+    pass
 
 
 @pore_pressure.on(Saturated)
@@ -100,7 +99,7 @@ def _pore_pressure_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def porosity(law, kin, state):
-    """Over the present volume; undefined for dry laws."""
+    """Porosity over the present volume."""
 
 
 @porosity.on(Saturated)
@@ -120,12 +119,12 @@ def _water_content_saturated(law, kin, state):
 
 
 def with_pore_pressure(law, kin, state, p):
-    """State with the pressure `p` of the water."""
+    """State with the water pressure `p`."""
     return state._replace(content=state.pores * exponential(p / law.K))
 
 
 def drag_per_volume(law, kin, state):
-    """Force per volume and relative velocity: n^2 rho g / k, with the present k."""
+    """Drag per volume and relative velocity: n^2 rho g / k with the present permeability k."""
     n = porosity(law, kin, state)
     k = n * n * n / ((1 - n) * (1 - n)) * ((1 - law.n) * (1 - law.n) / (law.n * law.n * law.n))
     return law.drag * n * n / (1 + law.kozeny * (k - 1))

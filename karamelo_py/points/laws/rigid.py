@@ -1,4 +1,4 @@
-"""Material rigid: prescribed velocity, empty state."""
+"""Material rigid."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from karamelo_py.points.laws.parameters import AboveZero
 
 
 class Rigid(NamedTuple):
-    """A body that nothing can deform, moved as prescribed or by the forces on it.
+    """Rigid body that moves as prescribed or by the forces on it.
 
     Parameters
     ----------
@@ -21,9 +21,9 @@ class Rigid(NamedTuple):
 
     Notes
     -----
-    Points retain the velocity set by fix initial_velocity_particles or fix velocity_particles
-    whatever forces act, without stress, unless fix rigid_body moves them. The step is limited only
-    to a cell of travel.
+    Whatever forces act, points retain the velocity set by fix initial_velocity_particles or fix
+    velocity_particles, unless fix rigid_body moves them. They have no stress and limit the step
+    only to a cell of travel.
 
     In ulmpm and ulcpdi, nodes around its points have its velocity at any density; in
     ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as

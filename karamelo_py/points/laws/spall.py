@@ -1,4 +1,4 @@
-"""Damage tuler-butcher: spall by tension over time."""
+"""Damage tuler-butcher."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 
 class TulerButcher(NamedTuple):
-    """Failure by a tension that lasts: spall.
+    """Spall: failure by sustained tension.
 
     Parameters
     ----------
@@ -28,10 +28,9 @@ class TulerButcher(NamedTuple):
 
     Notes
     -----
-    A point fails when the integral of (s1 - sigma0)^exponent over time reaches K, with s1 the
-    largest principal stress of intact material (Tuler & Butcher 1968, Int. J. Fract. Mech. 4,
-    431-437). It then sustains pressure only. Dump columns: damage, and damage_init, the integral
-    over K.
+    Fails when the integral of (s1 - sigma0)^exponent over time reaches K, with the largest
+    principal stress s1 of intact material (Tuler & Butcher 1968, Int. J. Fract. Mech. 4, 431-437).
+    It then sustains pressure only. Dump columns: damage, and damage_init, the integral over K.
 
     See Also
     --------

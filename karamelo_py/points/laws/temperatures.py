@@ -1,8 +1,6 @@
-"""Temperature of a point, as changed by the law itself.
+"""Temperature of a point as changed by its law, a part of `eos_strength`.
 
-A temperature is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). Its memory is the temperature (`Warm`), other parts'
-`heat`; or ().
+A temperature is a NamedTuple of parameters. Its memory is `Warm`, the `heat` of other parts, or ().
 """
 
 from typing import Annotated, NamedTuple
@@ -19,7 +17,6 @@ class Warm(NamedTuple):
 
 @point_function(otherwise=True)
 def initial_heat(temperature, like):
-    """Initial Warm(T), or ()."""
     return ()
 
 
@@ -44,7 +41,7 @@ def at_temperature(heat, T):
 
 
 def homologous(heat, Tr, Tm):
-    """(T - Tr) / (Tm - Tr), between 0 and 1."""
+    """(T - Tr) / (Tm - Tr), limited to 0 to 1."""
     return min(max((heat.T - Tr) / (Tm - Tr), 0), 1)
 
 
@@ -58,11 +55,11 @@ class PlasticWork(NamedTuple):
     cp
         Heat capacity per mass.
     kappa
-        Conductivity, for ``method(..., thermo-mechanical)``; otherwise heat stays in place.
+        Conductivity, used with ``method(..., thermo-mechanical)`` only.
     alpha
-        Pressure per kelvin: 3 K times the coefficient of linear expansion, with the bulk modulus K.
+        Pressure per kelvin: 3 K times the linear expansion coefficient, with the bulk modulus K.
     T0
-        Temperature without thermal pressure, and initial temperature unless the solid sets it.
+        Temperature without thermal pressure; also the initial one unless the solid sets it.
     Tm
         Melting temperature; no heating above.
 

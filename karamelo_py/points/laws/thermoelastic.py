@@ -11,19 +11,19 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Expansion(NamedTuple):
-    """Temperature of an elastic law: stress -3 K alpha (T - T0)."""
+    """Heat constants of an elastic law; its stress is -3 K alpha (T - T0)."""
 
     in_lanes = True
 
     cp: float
     kappa: float
-    alpha: float  # coefficient of linear expansion
-    pressure: float  # 3 K alpha, pressure per kelvin
+    alpha: float  # of linear expansion
+    pressure: float  # 3 K alpha, per kelvin
     initial_temperature: float  # T0 of the solid, set when the scene is lowered
 
 
 class Thermoelastic(NamedTuple):
-    """An elastic law and its temperature; state: the elastic law's, then T."""
+    """An elastic law with a temperature; T follows the elastic state."""
 
     in_lanes = True
     traits = LawTraits(rebounds=True)

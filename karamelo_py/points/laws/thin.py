@@ -1,9 +1,8 @@
 """Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
 
-The wrapped law has the tensors of `Axisymmetric`: xx, xy, yx, yy and zz. A secant method with a
-fixed number of trials (no branches in lanes) finds the strain increment q across the body, in 1D in
-y and z, without stress across. The remaining stress enters the next step (de Borst 1991; Klinkel &
-Govindjee 2002).
+The wrapped law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (no
+branches in lanes) finds the strain increment q across the body (in 1D in y and z) without stress
+across; the rest enters the next step (de Borst 1991; Klinkel & Govindjee 2002).
 """
 
 from typing import Any, NamedTuple
@@ -14,13 +13,13 @@ from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, n
 
 WHOLE = Axisymmetric()
 ENOUGH = 10  # trials of q for increments of any size
-UNROLLED = 9  # for laws of F, whose trials are short enough to be code without a loop
+UNROLLED = 9  # laws of F have short trials, which are code without a loop
 FURTHEST = 0.3  # change of the stretch across in a trial
-FLATTEST, STEEPEST = 0.02, 4.0  # slopes of the stress across that count, over rho c^2
+FLATTEST, STEEPEST = 0.02, 4.0  # accepted slopes of the stress across, over rho c^2
 
 
 class Thin(NamedTuple):
-    """No stress on its faces; `law` is the law in three dimensions."""
+    """The three-dimensional `law` without stress on the faces of a body."""
 
     law: Any
 
@@ -36,11 +35,11 @@ class ThinInLargeIncrements(Thin):
 
 class State(NamedTuple):
     whole: Any  # of the wrapped law
-    across: Any  # stretch across the body: thickness over initial thickness
+    across: Any  # thickness over initial thickness
 
 
 def with_strain_across(law, kin, dl, q):
-    """The increment `dl` in the body, with q across it, for the wrapped law."""
+    """The body's increment `dl` with q across it, for the wrapped law."""
     if isinstance(dl, LargeIncrement):
         step = with_strain_across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
@@ -108,10 +107,10 @@ def _wave_speed_bound_thin(law, kin, state):
 
 
 def _slower(law, kin, state, squared):
-    """Squared speed in a body that is free across.
+    """Squared wave speed of a body that is free across.
 
-    Hooke's law has 2 G + lambda without strain across; a plate 2 G + 2 G lambda / (2 G + lambda) =
-    E / (1 - nu^2), a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
+    Without strain across, Hooke's law has 2 G + lambda; a plate has 2 G + 2 G lambda / (2 G +
+    lambda) = E / (1 - nu^2), a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
     """
     shear = min(laws.shear_part(law.law, WHOLE, state.whole), squared)
     rest = squared - shear
@@ -139,7 +138,7 @@ def _with_stress_thin(law, kin, state, stress):
 @laws.number
 @laws.point_function()
 def thickness(law, kin, state):
-    """Over its initial thickness."""
+    """Thickness over the initial thickness."""
 
 
 @thickness.on(Thin)

@@ -1,4 +1,4 @@
-"""Material viscoelastic: an elastic law whose deviatoric stress partly relaxes (Prony series)."""
+"""Material viscoelastic."""
 
 from typing import Any, ClassVar, NamedTuple
 
@@ -27,7 +27,7 @@ from karamelo_py.points.laws import Absent, LawTraits, law_traits
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-SMALL = 0.01  # step over relaxation time, below which series are exact
+SMALL = 0.01  # step over relaxation time, below which a series is exact
 
 
 class ElasticMaterial:
@@ -57,7 +57,7 @@ def is_isotropic(law: Any) -> bool:
     along = [strained(law, 4 * k)[k] for k in range(3)]
     shears = [strained(law, component)[k] for k, component in ((3, 1), (4, 2), (5, 5))]
     across = strained(law, 0)[1]
-    # 2 G from a shear strain, and the difference of the stresses along and across for an axial one.
+    # 2 G from shear, and from the stresses along and across an axial strain
     even = [2 * shears[0] / (along[0] - across), 1.0]
     return max(map(np.ptp, (along, shears, max(along) * np.array(even)))) < 1e-3 * max(along)
 
@@ -65,7 +65,7 @@ def is_isotropic(law: Any) -> bool:
 class Branch(NamedTuple):
     in_lanes = True
 
-    g: float  # fraction of the stiffness that relaxes
+    g: float  # relaxing fraction of the stiffness
     tau: float
     softness: float  # 1/(4 g G): stored energy over stress squared
     rest: Any
@@ -91,13 +91,13 @@ class Viscoelastic(NamedTuple):
     -----
     Finite linear viscoelasticity (Simo 1987; Simo & Hughes 1998, section 10.4): tau = tau_e - sum
     (g s - h), with the Kirchhoff stress tau_e of the elastic law, s = dev tau_e, and internal
-    stresses h that follow s and decay: h' = g s' - h/tau. The rate is convected with the body. A
-    step of any size is exact for a constant rate of s. The relaxation modulus is G(t) = G (1 - sum
-    g (1 - exp(-t/tau))); the volume response is elastic.
+    stresses h that follow s and decay: h' = g s' - h/tau. The rate is convected with the body.
+    Steps are exact for a constant rate of s. The relaxation modulus is G(t) = G (1 - sum g (1 -
+    exp(-t/tau))); the volume response is elastic.
 
-    The strain energy contains |h|^2/(4 g G) of each branch. Column ``dissipated``: the energy lost
-    at the rate |h|^2/(2 g G tau), with the shear modulus G at rest. A relaxed body has 1 - sum g of
-    the stiffness; fix initial_stress starts from one.
+    With the shear modulus G at rest, each branch adds |h|^2/(4 g G) to the strain energy and
+    dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``). Fix initial_stress starts from
+    a relaxed body, with 1 - sum g of the stiffness.
 
     See Also
     --------
@@ -139,7 +139,7 @@ class State(NamedTuple):
     elastic: Any
     branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
-    gone: Any  # elastic law's energy that is not stored, per reference volume
+    gone: Any  # energy of the elastic law that is not stored, per reference volume
 
 
 def at_rest(branches, kin):
@@ -160,22 +160,22 @@ def lost_stress(law, kin, s, branches):
 
 
 def mean_decay(x):
-    """(1 - exp(-x))/x."""
     few = 1 + x * (-1 / 2 + x * (1 / 6 + x * (-1 / 24 + x * (1 / 120))))
     return where(x < SMALL, few, (1 - exponential(-x)) / max(x, SMALL))
 
 
 def weight_before(x):
-    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, x - a after; exact in decay."""
+    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, exact in decay; the new has x - a.
+    """
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))
 
 
 def decayed(branches, memory, dl, added, dt):
-    """Internal stresses after a step, and the energy they lose.
+    """Return internal stresses after a step, and the energy they lose.
 
-    `added`: s after the step minus the convected s before.
+    `added` is s after the step minus the convected s before.
     """
     if isinstance(branches, Absent):
         return (), 0
@@ -189,7 +189,7 @@ def decayed(branches, memory, dl, added, dt):
 
 
 def strain_of(dl):
-    """Almansi's strain of I + dl: works with Kirchhoff stresses at the end of the step."""
+    """Almansi's strain of I + dl, conjugate to Kirchhoff stress at the end of the step."""
     back = dl @ inv(I + dl)
     return sym(back) - 0.5 * sym(back.transposed() @ back)
 
@@ -206,7 +206,7 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     before = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
     after = dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
     branches, loss = decayed(law.branches, state.branches, plain, after - before.carried(plain), dt)
-    # Work that the relaxed stress does not do.
+    # work that the relaxed stress does not do
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
     gone = state.gone + loss + 0.5 * inner(lost, strain_of(plain))
@@ -241,7 +241,7 @@ laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)
 def _with_lost_stress(function):
     @function.on(Viscoelastic)
     def _speed_viscoelastic(law, kin, state):
-        # Elastic stiffness, and the stress that the elastic law has and the body has not.
+        # elastic stiffness, plus the elastic stress that the body lacks
         s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
         lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
         return function(law.elastic, kin, state.elastic) + 2 * lost * laws.specific_volume(law)

@@ -1,7 +1,6 @@
-"""Artificial viscosity of a point: spreads shocks over a few cells.
+"""Artificial viscosity, which spreads shocks over a few cells.
 
-A part of a composed law (`karamelo_py.points.laws.eos_strength`), added by an equation of state;
-its memory is (q,), the viscous pressure.
+A part of `eos_strength` added by an equation of state; its memory is (q,), the viscous pressure.
 """
 
 from math import sqrt
@@ -19,7 +18,7 @@ class ArtificialViscosity(NamedTuple):
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
-    """The part with these coefficients; none if both are 0."""
+    """The part with these coefficients, unless both are 0."""
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 
@@ -30,13 +29,12 @@ def viscous_pressure(viscosity, rate, density, sound):
 
 
 def viscous_speed(viscosity, q, density, sound):
-    """nu / h, with the kinematic viscosity nu against compression."""
-    # nu / h = Q1 h |d| + Q2 c, and q / rho >= Q1 (h d)^2
+    """nu / h = Q1 h |d| + Q2 c with the kinematic viscosity nu, from q / rho >= Q1 (h d)^2."""
     return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
 
 
 def damped(squared, a):
-    """Square of c' = sqrt(c^2 + a^2) + a, from c^2 and a = nu / h.
+    """Square of c' = sqrt(c^2 + a^2) + a with a = nu / h.
 
     Viscosity nu damps the shortest wave of a cell by xi = nu / (c h): c dt / h falls to sqrt(1 +
     xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10), as if c were c'.

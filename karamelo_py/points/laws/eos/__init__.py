@@ -1,8 +1,8 @@
 """Equations of state: pressure of a point from its volume, positive in compression.
 
-An equation of state is a NamedTuple of parameters (its class is the tag) with a `specific_volume`,
-a part of a composed law (`karamelo_py.points.laws.eos_strength`). `j` = det F is the volume over
-the reference volume, `heat` the temperature (`Warm`) or (). The memory is a tuple, empty for most.
+An equation of state is a NamedTuple of parameters with a `specific_volume`, a part of
+`eos_strength`. `j` = det F, `heat` is the temperature (`Warm`) or (). The memory is a tuple, empty
+for most.
 """
 
 from typing import Any, NamedTuple
@@ -18,43 +18,43 @@ def initial_energy(eos, like):
 
 class VolumeStep(NamedTuple):
     before: Any  # volume ratio
-    j: Any  # after the step
+    j: Any  # volume ratio after the step
     dt: Any
 
 
 @point_function(otherwise=True)
 def compressed(eos, memory, step, heating):
-    """After a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
+    """Memory after a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
     return memory
 
 
 @point_function(otherwise=True)
 def initial_loss(eos, like):
-    """(0,) for an eos that dissipates energy, or ()."""
+    """(0,) if the equation of state dissipates energy, or ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def crush_work(eos, before, after, step):
-    """Dissipated by crushed pores in a `VolumeStep`, from the memories at its ends."""
+    """Work dissipated by crushing pores between two memories."""
     return 0
 
 
 @point_function(otherwise=True)
 def ignited(eos, memory, since):
-    """(memory,) of an explosive lit `since` this time; () of other materials."""
+    """(memory,) of an explosive a time `since` after lighting, or ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """(heat,), the part of `heat` taken by internal energy in the memory; () without."""
+    """(heat,), the part of `heat` that the memory takes as internal energy, or ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def stored_heat(eos, loss):
-    """Dissipated energy that is in the memory and thus in `compression_energy`."""
+    """Dissipated energy contained in `compression_energy`."""
     return loss - loss
 
 
@@ -65,7 +65,7 @@ def pressure(eos, j, memory, heat):
 
 @point_function()
 def bulk_modulus(eos, j, memory, heat):
-    """-j dp/dj."""
+    pass
 
 
 @point_function()
@@ -75,7 +75,7 @@ def compression_energy(eos, j, memory):
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """Volume ratio with the pressure p, or nearest to it."""
+    """Volume ratio at the pressure p, or nearest to it."""
 
 
 @point_function(otherwise=True)

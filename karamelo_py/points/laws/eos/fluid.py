@@ -1,4 +1,4 @@
-"""Eos fluid, ideal-gas and jwl: liquids, gases with internal energy, explosives."""
+"""Eos fluid, ideal-gas and jwl."""
 
 from math import inf, sqrt
 from typing import Any, NamedTuple
@@ -23,7 +23,7 @@ from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size: dam breaks take 4
+LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size; dam breaks take 4
 FRONT = 1.5  # cells in which a point burns
 STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock, and of a strong one
 
@@ -40,7 +40,7 @@ class Tait(NamedTuple):
     gamma
         Exponent, 7 for water.
     tension
-        Tension that the liquid sustains (0: none); default: from the formula, up to K.
+        Largest tension (0: none); by default the formula's, up to K.
 
     Example
     -------
@@ -50,9 +50,9 @@ class Tait(NamedTuple):
     Notes
     -----
     p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
-    gamma/rho0) at zero pressure. A K below the real one allows longer steps: density stays within 1
-    % if speeds stay below 10 % of the speed of sound. In splashes, tension makes drops swell and
-    stick together: use ``tension=0``.
+    gamma/rho0) at zero pressure. A lower K allows longer steps: density stays within 1 % while
+    speeds are below 10 % of the speed of sound. Use ``tension=0`` for splashes, where tension makes
+    drops swell and stick together.
 
     See Also
     --------
@@ -64,9 +64,9 @@ class Tait(NamedTuple):
     scalarised = ("compression_energy",)
 
     specific_volume: float
-    K: float  # K gamma is the bulk modulus
+    K: float  # bulk modulus over gamma
     gamma: float
-    tension: float = inf  # sustainable; above K the formula limits it
+    tension: float = inf  # largest tension; beyond K the formula limits it
 
     @classmethod
     def given(cls, rho0: AboveZero, K: AboveZero, gamma: AboveZero, *, tension: FromZero = inf):
@@ -134,7 +134,7 @@ def _compression_energy_tait(eos, j, memory):
 
 @ratio_at_pressure.on(Tait)
 def _ratio_at_pressure_tait(eos, p, heat):
-    # Tension of K would need an infinite volume.
+    # A tension of K would need an infinite volume.
     borne = max(p, -eos.tension)
     return power(max(1 + borne / eos.K, round_off(p)), -1 / eos.gamma)
 
@@ -165,8 +165,8 @@ class IdealGas(NamedTuple):
     rho^(gamma - 1), exactly in each step. Viscous work heats the gas, as does kinetic energy
     dissipated by PIC, FLIP, APIC, MLS and TPIC. For shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
-    The gas has pressure from the first step: a free surface expands. Fix initial_stress changes the
-    energy at constant volume.
+    A free surface expands from the first step. Fix initial_stress changes the energy at constant
+    volume.
 
     See Also
     --------
@@ -275,7 +275,7 @@ def _bulk_modulus_ideal_gas(eos, j, memory, heat):
 
 @at_pressure.on(IdealGas)
 def _at_pressure_ideal_gas(eos, j, memory, p, heat):
-    # The volume is constant and the energy follows; a gas sustains no tension.
+    # Volume is constant and energy follows; a gas sustains no tension.
     return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))
 
 
@@ -305,9 +305,9 @@ class Jwl(NamedTuple):
     -----
     p = F (A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w E/V) with V = rho0/rho and
     the energy E per initial volume, dE = -p dV (Lee, Hornig & Kury 1968; Dobratz & Crawford 1985
-    for constants). The burnt fraction F of a point grows from 0 to 1 after the time of fix
-    detonation, while the front moves 1.5 cells (programmed burn, Wilkins 1964); an explosive that
-    is not lit has no pressure. Viscous work heats the products.
+    for constants). From the time of fix detonation the burnt fraction F of a point grows from 0 to
+    1 while the front moves 1.5 cells (programmed burn, Wilkins 1964). Viscous work heats the
+    products.
 
     The strain energy is E - E0: it falls as the products do work. Fix initial_stress has no effect.
 
@@ -361,7 +361,7 @@ def _stored_heat_of_gas(eos, loss):
 @taken_heat.on(IdealGas)
 @taken_heat.on(Jwl)
 def _taken_heat_of_gas(eos, memory, heat):
-    # A moment may hold slightly more than there was: a cold gas does not lose all that at once.
+    # A cold gas must not lose all its energy at once if a moment holds slightly more than it had.
     return (max(heat, -0.1 * memory.E),)
 
 
@@ -398,7 +398,7 @@ def _ignited_jwl(eos, memory, since):
 
 @compressed.on(Jwl)
 def _compressed_jwl(eos, memory, step, heating):
-    # dE = -p dJ with the mean pressure of the step, which is linear in E.
+    # dE = -p dJ with the step's mean pressure, which is linear in E
     before, j, dt = step
     half, after = 0.5 * (j - before), memory._replace(since=memory.since + dt)
     F = burnt(eos, after)
@@ -413,7 +413,7 @@ def _pressure_jwl(eos, j, memory, heat):
 
 @bulk_modulus.on(Jwl)
 def _bulk_modulus_jwl(eos, j, memory, heat):
-    # At constant entropy. Until all is burnt, waves are at most as fast as the front.
+    # at constant entropy; until all is burnt, waves are at most as fast as the front
     p, slope = cold(eos, j)
     gas = eos.omega * memory.E / j
     K = max(gas + eos.omega * (p + gas) - j * slope, 0)

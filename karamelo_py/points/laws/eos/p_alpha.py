@@ -1,4 +1,4 @@
-"""Eos p-alpha: porous solids that are crushed."""
+"""Eos p-alpha."""
 
 from typing import Any, NamedTuple
 
@@ -20,16 +20,16 @@ from karamelo_py.points.laws.eos_strength import Eos
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-MOST_PASSES = 60  # of Newton's method, safeguarded by bisection; two or three in small steps
+MOST_PASSES = 60  # of Newton's method safeguarded by bisection; small steps take two or three
 
 
 class PAlpha(NamedTuple):
-    """Foam, powder, concrete, rubble: a porous solid that is crushed.
+    """Porous solid that can be crushed: foam, powder, concrete, rubble.
 
     Parameters
     ----------
     solid
-        ID of the equation of state of the solid without voids.
+        ID of the equation of state without voids.
     alpha0
         Initial distension: density of the solid over density with voids.
     pe
@@ -98,7 +98,7 @@ class Pores(NamedTuple):
 
 
 class Distension(NamedTuple):
-    """Tag of the column alpha."""
+    pass
 
 
 column(PAlpha, "alpha", Distension())
@@ -133,8 +133,8 @@ def solid_pressure(eos, j, alpha, heat):
 
 @compressed.on(PAlpha)
 def _compressed_p_alpha(eos, memory, step, heating):
-    # The solution is unique: ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the curve only
-    # slightly.
+    # The solution is unique because ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the
+    # curve only slightly.
     old = memory.alpha
     low = eos.ps - (eos.ps - eos.pe) * power((old - 1) / (eos.alpha0 - 1), 1 / eos.n)
     crushing = (solid_pressure(eos, step.j, old, ()) > low * old) & (old > 1)
@@ -148,7 +148,7 @@ def _compressed_p_alpha(eos, memory, step, heating):
         new = p - excess / (1 - (K - solid) * slope / (alpha * alpha))
         new = where((low < new) & (new < high), new, 0.5 * (low + high))
         settled = abs(new - p) <= 4 * round_off(p) * eos.ps
-        p = where(moves, new, p)  # the same number of passes, whatever other lanes need
+        p = where(moves, new, p)  # the same number of passes whatever other lanes need
         moves = moves & (not settled)
         if not any_lane(moves):
             break
@@ -158,7 +158,7 @@ def _compressed_p_alpha(eos, memory, step, heating):
 
 @crush_work.on(PAlpha)
 def _crush_work_p_alpha(eos, before, after, step):
-    # The elastic energy changes by -p dj less what pores take.
+    # The elastic energy changes by -p dj minus the work of crushing.
     work = 0.5 * (step.before - step.j)
     work *= pressure(eos, step.before, before, ()) + pressure(eos, step.j, after, ())
     stored = compression_energy(eos, step.j, after) - compression_energy(eos, step.before, before)

@@ -1,4 +1,4 @@
-"""Eos shock: Mie-Grueneisen equation of state."""
+"""Eos shock."""
 
 from math import inf, sqrt
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-# S (1 - J) from which the pressure follows its tangent: at 1 the Hugoniot has a pole.
+# S (1 - J) beyond which the pressure follows the tangent; the Hugoniot has a pole at 1
 _STEEPEST = 0.9
 
 
@@ -28,7 +28,7 @@ class Shock(NamedTuple):
     rho0
         Density before deformation.
     K
-        Bulk modulus; unused, for compatibility with Karamelo. The initial stiffness is rho0 c0^2.
+        Bulk modulus, unused (Karamelo's syntax): the initial stiffness is rho0 c0^2.
     c0
         Speed of sound without shear, at zero pressure.
     S
@@ -42,7 +42,7 @@ class Shock(NamedTuple):
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
     tension
-        Tension at which the material spalls (0: none); default: from the formula.
+        Tension at which the material spalls (0: none); by default the formula's.
 
     Example
     -------
@@ -52,14 +52,14 @@ class Shock(NamedTuple):
     Notes
     -----
     With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
-    for T above Tr (Meyers 1994, chapter 5). This is the Hugoniot curve plus, with a temperature,
-    the heat of plastic work. In tension the first part is rho0 c0^2 mu. The curve has a pole at (S
+    for T above Tr (Meyers 1994, chapter 5). Without a temperature it is the Hugoniot curve alone.
+    In tension the first term is rho0 c0^2 mu. The curve has a pole at (S
     - 1) mu = 1; beyond S (1 - rho0/rho) = 0.9 the pressure follows the tangent.
 
-    Voids open at constant tension (spall), and close before the material sustains pressure again.
-    The velocity of a free surface then drops by du = 2 tension/(rho0 c0), in the acoustic
-    approximation (Antoun et al. 2003, Spall Fracture, section 4.2). The remaining tension slows the
-    spalled layer further; a damage releases it.
+    Voids open at constant tension and close before the material sustains pressure again. In the
+    acoustic approximation the free surface velocity drops by 2 tension/(rho0 c0) (Antoun et al.
+    2003, Spall Fracture, section 4.2). The remaining tension slows the spalled layer further,
+    unless a damage releases it.
 
     In compression, with the rate of volume change d < 0, cell size h and speed of sound c, the
     viscous pressure is rho h (Q1 h d^2 - Q2 c d) (von Neumann & Richtmyer 1950; Landshoff 1955). It
@@ -76,9 +76,9 @@ class Shock(NamedTuple):
     specific_volume: float
     modulus: float  # rho0 c0^2
     S: float
-    thermal: float  # Gamma rho0 cv, pressure per kelvin above Tr
+    thermal: float  # Gamma rho0 cv, per kelvin above Tr
     Tr: float
-    tension: float = inf  # sustainable
+    tension: float = inf  # largest
 
     @classmethod
     def given(
@@ -95,7 +95,7 @@ class Shock(NamedTuple):
         *,
         tension: FromZero = inf,
     ):
-        # K could only replace c0: rho0 c0^2 replaces K.
+        # K could only replace c0, so rho0 c0^2 replaces K.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
             raise ScriptError(
                 f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
@@ -158,7 +158,7 @@ def _bulk_modulus_shock(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
-    # Constant beyond the volume ratio at which cold material reaches its tension.
+    # constant beyond the volume ratio at which cold material reaches its tension
     most = min(eos.tension, eos.modulus)
     bounded = most < eos.modulus
     whole = where(bounded, eos.modulus / where(bounded, eos.modulus - most, 1), inf)
@@ -170,7 +170,7 @@ def _compression_energy_shock(eos, j, memory):
     flat = 1 - y
     in_tension, near = closed < 0, y < 1e-3
     log_of = logarithm(where(in_tension, j, flat))
-    # The closed form is a small difference near 1.
+    # the closed form is a small difference near 1
     few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
     log_of_flat = log_of + ((1 - flat) - y) / flat  # corrects the rounding of 1 - y
     energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))

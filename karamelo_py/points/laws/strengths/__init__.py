@@ -1,9 +1,8 @@
 """Strengths: deviatoric stress of a point from its strain. One file each.
 
-A strength is a NamedTuple of parameters (its class is the tag), a part of a composed law
-(`karamelo_py.points.laws.eos_strength`). `heat` is the temperature (`Warm`), or (). Strengths that
-depend on pressure and change the volume define `pressure_response` instead of `shear_response`.
-Defaults are for an elastic strength with a shear modulus ``G``, without memory.
+A strength is a NamedTuple of parameters, a part of `eos_strength`. `heat` is the temperature
+(`Warm`) or (). Strengths that depend on pressure and change the volume define `pressure_response`
+instead of `shear_response`. The defaults are elastic with a shear modulus ``G`` and no memory.
 """
 
 import sys
@@ -20,25 +19,21 @@ class StrainStep(NamedTuple):
     strain: Any  # increment, not deviatoric
     j: Any  # volume ratio after the step
     dt: Any
-    extra: Any  # pressure in forces beyond the point's (F-bar)
+    extra: Any  # pressure in the nodal forces minus the point's (F-bar)
 
 
 class FrictionTrial(NamedTuple):
-    """Stress after a step assumed elastic."""
-
     s: Any  # deviatoric
     p: Any
     K: Any
 
 
 class Remembered(NamedTuple):
-    """Tag of a number in the memory."""
-
     index: int
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare the memory of a strength: names of numbers, also dump columns, and initial values.
+    """Declare the memory of a strength: names (also of dump columns) and initial values.
 
     A value is a number or the name of a parameter; ``ep``, the equivalent plastic strain, comes
     first.
@@ -70,14 +65,14 @@ def initial_memory(strength, like):
 def respond(strength, law, kin, step, memories):
     """Deviatoric stress, memory, and work per volume that is not stored, after a `StrainStep`.
 
-    `memories`: of all parts of the `law`.
+    `memories` holds the memories of all parts of the `law`.
     """
     return shear_response(strength, kin, step, memories.strength, memories.heat)
 
 
 @point_function()
 def shear_response(strength, kin, step, memory, heat):
-    """As `respond`, for strengths that need nothing from the other parts."""
+    """As `respond`, for strengths that need nothing from other parts."""
 
 
 @point_function()
@@ -90,15 +85,12 @@ def pressure_response(strength, kin, trial, strain):
 
 @point_function()
 def fbar_fraction(strength, memory):
-    """Fraction of the averaged pressure used by the yield surface, with F-bar.
-
-    Undefined for strengths independent of pressure.
-    """
+    """Fraction of the averaged F-bar pressure used by a pressure-dependent yield surface."""
 
 
 @point_function(otherwise=True)
 def initial_loss(strength, like):
-    """(0,) for a strength that dissipates energy, or ()."""
+    """(0,) if the strength dissipates energy, or ()."""
     return ()
 
 
@@ -114,31 +106,30 @@ def elastic_ratio(strength, memory, j):
 
 @point_function(otherwise=True)
 def added_pressure(strength, memory):
-    """Pressure beyond the equation of state's."""
+    """Pressure added to the equation of state's."""
     return 0
 
 
 @point_function(otherwise=True)
 def added_energy(strength, law, elastic, memories):
-    """Energy of the added pressure, at the elastic volume ratio."""
+    """Energy of the added pressure at the elastic volume ratio."""
     return 0
 
 
 @point_function(otherwise=True)
 def shear_modulus(strength):
-    """Stiffness against further shear, for the wave speed."""
+    """Shear stiffness, for the wave speed."""
     return strength.G
 
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """Squared wave speed, increased by viscosity: reduces the stable step."""
+    """Squared wave speed raised by viscosity, which reduces the stable step."""
     return squared
 
 
 @point_function(otherwise=True)
 def shear_strain(strength, kin, s):
-    """Elastic part of the deviatoric strain, a symmetric tensor."""
     return 0.5 / strength.G * s
 
 

@@ -1,4 +1,4 @@
-"""Strength johnson-holmquist-2: brittle materials under impact."""
+"""Strength johnson-holmquist-2."""
 
 from math import inf, sqrt
 from typing import NamedTuple
@@ -22,7 +22,7 @@ LEAST_STRAIN = 1e-9  # failure strain
 
 
 class JohnsonHolmquist2(NamedTuple):
-    """Strength of ceramics and glass under impact: intact, breaking, and crushed.
+    """Strength of intact to crushed ceramics and glass under impact.
 
     Parameters
     ----------
@@ -59,14 +59,14 @@ class JohnsonHolmquist2(NamedTuple):
     -----
     The von Mises stress is at most sHEL (si - D (si - sf)), where the intact and broken strengths
     si and sf rise by 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL - PHEL)
-    (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D grows to 1 with the
-    plastic strain over the failure strain, at once where that is 0. Broken material sustains a
-    tension of T (1 - D); beyond, it opens. In compression, a step that lowers the strength converts
-    the fraction beta of the lost shear energy to pressure. Dump columns: ep, damage, bulking (the
-    added pressure), opened (the volume ratio of gaps). The rate is the strain rate.
+    (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D grows to 1 with plastic
+    strain over failure strain, at once if the latter is 0. Damaged material opens beyond a tension
+    of T (1 - D). In compression, a step that lowers the strength converts the fraction beta of the
+    lost shear energy to pressure. Dump columns: ep, damage, bulking (the added pressure), opened
+    (the volume ratio of gaps). The rate is the strain rate.
 
-    Where damaged material opens, the energy balance is of first order in the step: -4 % with a
-    tenth of the stable step, -0.7 % with a hundredth.
+    Opening has an energy error of first order in the step: -4 % with 10 % of the stable step, -0.7
+    % with 1 %.
 
     See Also
     --------
@@ -119,7 +119,7 @@ def _added_pressure_johnson_holmquist(strength, memory):
 
 @added_energy.on(JohnsonHolmquist2)
 def _added_energy_johnson_holmquist(strength, law, elastic, memories):
-    # (p + dP)^2/(2 K) less p^2/(2 K)
+    # (p + dP)^2/(2 K) - p^2/(2 K)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     added = memories.strength.bulking
     return 0.5 * added * (2 * p + added) / stiffness_at_rest(law, memories)
@@ -136,7 +136,7 @@ def rate_factor(strength, step):
 
 
 def limits(strength, p, factor):
-    """Of intact and of broken material; P* + T*."""
+    """Return the intact and broken strengths, and P* + T*."""
     above = max(p + strength.T, 0) / strength.PHEL
     intact = strength.A * power(above, strength.N) * factor
     broken = strength.B * power(max(p, 0) / strength.PHEL, strength.M) * factor
@@ -159,7 +159,7 @@ def _respond_johnson_holmquist(strength, law, kin, step, memories):
     failure = max(strength.D1 * power(above, strength.D2), LEAST_STRAIN)
     damage = min(memory.damage + x / failure, 1)
     weaker = intact - damage * (intact - broken)
-    # Shear energy released beyond the plastic work.
+    # shear energy released beyond the plastic work
     released = where(x > 0, (flow * flow - weaker * weaker) / (6 * strength.G), 0)
     K = stiffness_at_rest(law, memories)
     gained = where(p > 0, strength.beta * released, 0)

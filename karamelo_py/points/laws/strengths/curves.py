@@ -1,4 +1,4 @@
-"""Strengths tabulated and formula: a flow stress from the script."""
+"""Strengths tabulated and formula."""
 
 from pathlib import Path
 from typing import ClassVar, NamedTuple
@@ -21,7 +21,7 @@ from karamelo_py.script.reading import read_text
 
 
 class Tabulated(NamedTuple):
-    """Flow stress over plastic strain, from a measured curve with linear interpolation.
+    """Flow stress interpolated in a measured curve over plastic strain.
 
     Parameters
     ----------
@@ -37,9 +37,9 @@ class Tabulated(NamedTuple):
 
     Notes
     -----
-    Constant beyond the last point; a fall must be less than 3 G per unit of plastic strain.
-    ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves for the plastic
-    strain with the flow stress at its end.
+    Beyond the last point the flow stress is constant; it may fall by less than 3 G per unit of
+    plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves
+    for the plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -62,7 +62,7 @@ class Tabulated(NamedTuple):
 
 
 def _points(curve: tuple) -> np.ndarray:
-    """(n, 2) plastic strain and flow stress."""
+    """Return (n, 2) plastic strain and flow stress."""
     if len(curve) == 1 and isinstance(curve[0], Path):
         path = curve[0]
         try:
@@ -123,9 +123,9 @@ DEPTH = 8  # of the stack, a tuple
 
 
 class FlowFormula:
-    """For signatures: a formula of plastic strain, its rate and temperature, as numbers.
+    """Script argument: a formula of plastic strain, its rate and temperature, as numbers.
 
-    Two numbers per instruction: the operation; a constant or the index of an input.
+    Each instruction has two: the operation, and a constant or the index of an input.
     """
 
     script_kind: ClassVar[str] = "a formula of ep, epdot and T"
@@ -175,9 +175,9 @@ class FlowStress(NamedTuple):
     Notes
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with finite-difference slopes. A fall of Y must be less than 3 G per unit of plastic strain; a
-    negative Y counts as 0. Formulas are interpreted: no compilation, but ten times slower than a
-    compiled law.
+    with finite-difference slopes. Y may fall by less than 3 G per unit of plastic strain; a
+    negative Y counts as 0. Formulas are interpreted, not compiled: ten times slower than a compiled
+    law.
 
     See Also
     --------
@@ -213,7 +213,7 @@ def _check_formula(law: FlowStress) -> None:
 
 
 def value(strength, ep, epdot, T):
-    """The formula in double precision."""
+    """Evaluate the formula in double precision."""
     stack = (0.0,) * DEPTH  # top first
     for k in range(int(strength.count)):
         op = int(strength.program[2 * k])
@@ -240,11 +240,11 @@ shear_response.on(FlowStress)(radial_return)
 def _flow_stress_flow_stress(strength, before, increment, dt):
     T = temperature_or(before.heat, strength.initial_temperature)
     near = 1e-6 * (increment + 1e-4)
-    # In double precision: the difference is small.
+    # double precision, because the difference is small
     here = real(before.memory.ep, 1.0) + increment
     stress = max(value(strength, here, increment / dt, T), 0.0)
     beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
     flow = max(real(stress, increment), 0)
     slope = real((beyond - stress) / near, increment)
-    # With a slope of -3 G or less there is no solution.
+    # a slope of -3 G or less has no solution
     return flow, max(slope, -2 * strength.G)

@@ -1,4 +1,4 @@
-"""strength drucker-prager: cohesion and friction as a cone."""
+"""Strength drucker-prager."""
 
 from math import cos, inf, radians, sin, sqrt, tan
 from typing import Literal, NamedTuple
@@ -19,7 +19,7 @@ from karamelo_py.points.laws.strengths.frictional import (
 
 
 def cone(fit: str, c: float, phi: float, psi: float) -> tuple[float, float]:
-    """xi c and eta for angles of friction and dilatancy in radians (see `DruckerPrager`)."""
+    """Return xi c and eta for friction and dilatancy angles in radians (see `DruckerPrager`)."""
     if fit == "plane-strain":
         t = tan(min(psi, phi))
         dilation = 3 * t / sqrt(9 + 12 * t * t)
@@ -31,7 +31,7 @@ def cone(fit: str, c: float, phi: float, psi: float) -> tuple[float, float]:
 
 
 class DruckerPrager(NamedTuple):
-    """Soil strength from cohesion and friction: a cone around the pressure axis.
+    """Soil strength as a cone of cohesion and friction around the pressure axis.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class DruckerPrager(NamedTuple):
     residual_cohesion, residual_phi
         Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain of the fall, linear in the cone's coefficients.
+        Equivalent plastic strain of the fall, which is linear in the cone's coefficients.
 
     Example
     -------
@@ -61,9 +61,9 @@ class DruckerPrager(NamedTuple):
 
     Notes
     -----
-    sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952; de Souza Neto et al. 2008, section 6.4).
-    With compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
-    sin(phi))). With extension 3 + sin(phi) replaces 3 - sin(phi). With plane-strain xi = cos(phi)/b
+    sqrt(s:s/2) <= xi c + eta p (Drucker & Prager 1952; de Souza Neto et al. 2008, section 6.4). For
+    compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
+    sin(phi))). For extension 3 + sin(phi) replaces 3 - sin(phi). For plane-strain xi = cos(phi)/b
     and eta = sin(phi)/b, where b = sqrt(1 - d^2/3) + d sin(phi)/3 and d = 3 tan(psi)/sqrt(9 + 12
     tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain equals
     mohr-coulomb's for any psi. The dilatancy coefficient is d, and for the other fits eta of psi.
@@ -117,7 +117,7 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # Half the difference of the in-plane principal stresses in flow, over sqrt(J2).
+    # Half the in-plane principal stress difference in flow over sqrt(J2), and the dilatancy.
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
@@ -135,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the apex of the cone the trial pressure counts, see below.
+            # Beyond the apex the trial pressure counts, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

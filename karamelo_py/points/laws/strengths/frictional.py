@@ -1,11 +1,11 @@
-"""Base of pressure-dependent strengths: cohesion and friction, optional softening; memory.
+"""Base of pressure-dependent strengths: cohesion and friction with optional softening.
 
-The memory is the equivalent plastic strain ep, the plastic volume ratio Jp, and the volume ratio Js
-of separation. Beyond the largest sustainable tension points separate; that volume closes before
-they sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
-granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017,
-"Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section
-4.3.4). Volume gained by plastic shear (dilatancy) remains.
+The memory is the equivalent plastic strain ep, the plastic volume ratio Jp and the separation
+volume ratio Js. Beyond the largest tension points separate; that volume closes before they sustain
+pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of granular flows
+through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017, "Multi-species
+simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section 4.3.4). Dilatancy,
+the volume gained by plastic shear, remains.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Cohesion, friction and dilation.
+    """Return cohesion, friction and dilation.
 
     Linear from the peak to the residual; a step uses the values at its beginning.
     """
@@ -44,27 +44,27 @@ def surface(strength, strain):
 
 
 def lowest_pressure(strength, strain):
-    """-cohesion / friction, or a given bound."""
+    """Return -cohesion / friction or the strength's bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """If the yield surface ends at `lowest`."""
+    """Lowest pressure if the yield surface ends at `lowest`."""
     return lowest
 
 
 def fraction_by_dilatancy(strength, memory):
-    """Fraction b of the averaged pressure used by the yield surface, with F-bar.
+    """Fraction b of the averaged F-bar pressure used by the yield surface.
 
     Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
     stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with the
-    sines f of friction and d of dilatancy: with b = 0 negative for a between d and f (pressure
-    grows in stripes, and strength falls), with b = (f - d)/(f (1 - d)) a square.
+    sines f of friction and d of dilatancy. b = 0 makes it negative for a between d and f (pressure
+    grows in stripes, and strength falls); b = (f - d)/(f (1 - d)) makes it a square.
     """
     f, d = sines_after(strength, memory.ep)
-    # The sine of a steep cone in plane strain may be above 1.
+    # the sine of a steep cone in plane strain may exceed 1
     return where(f > d, min((f - d) / (where(f > d, f, 1) * max(1 - d, 1e-3)), 1), 0)
 
 
@@ -75,7 +75,7 @@ def sines_after(strength, strain):
 
 @point_function(otherwise=True)
 def sines(strength, friction, dilation):
-    """Sines of friction and dilatancy in plane strain of a yield surface."""
+    """Sines of friction and dilatancy of a yield surface in plane strain."""
     return friction, dilation
 
 
@@ -84,7 +84,7 @@ def elastic_part(strength, memory, j):
 
 
 def respond_by_friction(strength, law, kin, step, memories):
-    """Return to the yield surface, and store the plastic volume change."""
+    """Return the stress to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_part(strength, memory, step.j)
@@ -116,7 +116,7 @@ def respond_by_friction(strength, law, kin, step, memories):
 
 
 def frictional(strength: type) -> None:
-    """Give `strength` (with ``G`` and the fields of `surface`) memory and response."""
+    """Give `strength` (with ``G`` and the fields of `surface`) its memory and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     elastic_ratio.on(strength)(elastic_part)
     respond.on(strength)(respond_by_friction)
@@ -150,7 +150,7 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # sine of dilatancy over sine of friction, from which neither occurred
+ENOUGH = 1 / 3  # sine of dilatancy over sine of friction that is enough for neither to occur
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
 # latter also need steep friction and no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
@@ -167,9 +167,9 @@ def little_dilatancy(strength):
 
 
 def _vibrates(strength, scene):
-    """A strain cycle of a point at its limit releases more work than it takes.
+    """Facts of a point at its limit whose strain cycles release more work than they take.
 
-    Without dilatancy it releases (f - G/(K + G/3)) (K + G/3) e^2/2, f the sine of friction.
+    Without dilatancy they release (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
     f = little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking
@@ -203,7 +203,7 @@ def _poisson(K_over_G):
 
 
 class Soil(NamedTuple):
-    """Constants as scripts give them: angles in degrees, None without softening."""
+    """Constants as in scripts: angles in degrees, None without softening."""
 
     cohesion: float
     phi: float
@@ -214,7 +214,7 @@ class Soil(NamedTuple):
 
 
 def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
-    """Cohesion, friction, dilation at the peak; residual cohesion and friction; softening.
+    """Return cohesion, friction, dilation; residual cohesion and friction; softening.
 
     `surface_of` converts cohesion and friction angle (radians) for the yield surface.
     """

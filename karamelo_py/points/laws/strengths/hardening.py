@@ -1,4 +1,4 @@
-"""strength plastic, and the base of von Mises strengths with any hardening."""
+"""Strength plastic, and the base of von Mises strengths with any hardening."""
 
 from math import sqrt
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from karamelo_py.points.laws.strengths import remembers, shear_response
 
 
 def elastic_trial(G, s, strain):
-    # The deviator of the sum: rounding over many steps would give s a trace.
+    # the deviator of the sum, because rounding over many steps would give s a trace
     return dev(s + 2 * G * strain)
 
 
@@ -97,23 +97,22 @@ def before_flow(strength, memory, heat):
 
 @point_function()
 def flow_stress(strength, before, increment, dt):
-    """Flow stress, and its slope, after a plastic strain `increment` in a step dt.
-
-    `before` is the `FlowState` at the beginning.
+    """Flow stress and its slope after a plastic strain `increment` in a step dt, from a
+    `FlowState`.
     """
 
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """Part of the flow stress that is independent of the step's increment."""
+    """Part of the flow stress that does not depend on the step's increment."""
     return ()
 
 
 @point_function(otherwise=True)
 def first_guess(strength, before, q, slope):
-    """First guess of the plastic strain, 0 for q below the flow stress, and a bound k.
+    """First guess of the plastic strain (0 for q below the flow stress), and a bound k.
 
-    `slope` is 3 G. A change c in Newton's method is followed by at most about k c^2.
+    `slope` is 3 G. After a change c, Newton's method changes the strain by at most about k c^2.
     """
     return real(0, q), real(0, q)
 
@@ -133,8 +132,8 @@ def onto_yield_surface(trial, q, flow, x):
 def radial_return(strength, kin, step, memory, heat):
     """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
 
-    The `shear_response` of strengths with ``G``, a `flow_stress`, and ``ep`` in the memory; q is
-    the von Mises stress of the elastic trial.
+    This is the `shear_response` of strengths with ``G``, a `flow_stress` and ``ep`` in the memory;
+    q is the von Mises stress of the elastic trial.
     """
     trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
@@ -152,8 +151,8 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x, the flow stress does not: unique for any step size. Newton's method,
-    safeguarded by bisection.
+    The left side falls with x and the flow stress does not, so x is unique for any step size.
+    Newton's method is safeguarded by bisection.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms
@@ -171,14 +170,14 @@ def plastic_increment(strength, q, memory, heat, dt):
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n; larger next to a kink of
-        # the curve, so the excess must be small, too.
+        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. It is larger next to a
+        # kink of the curve, so the excess must be small too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = 0.5 * (low + high)
-        # Not below 0 by rounding: plastic strain only grows.
+        # rounding must not reduce plastic strain
         x = where(active, max(where(done | within, new, middle), 0), x)
         last = change
         active = active & (not (done | (middle <= low) | (middle >= high)))

@@ -1,4 +1,4 @@
-"""Strengths linear and fluid: unlimited elastic shear, and viscous shear."""
+"""Strengths linear and fluid."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -12,7 +12,7 @@ from karamelo_py.points.laws.viscosity import damped
 
 
 class Elastic(NamedTuple):
-    """Elastic shear without limit.
+    """Unlimited elastic shear.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def _shear_response_elastic(strength, kin, step, memory, heat):
 
 
 class Viscous(NamedTuple):
-    """Viscous shear of a Newtonian fluid: no stress at rest.
+    """Viscous shear of a Newtonian fluid.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class Viscous(NamedTuple):
     Notes
     -----
     s = 2 mu dev(D), D the strain rate. Viscosity shortens the stable step unless 4/3 mu/(rho h) is
-    much less than the speed of sound. Viscous work counts as dissipated energy.
+    far below the speed of sound. Viscous work is dissipated.
 
     See Also
     --------
@@ -81,7 +81,7 @@ SIGNIFICANT = 0.05  # of the fluid's viscosity
 
 
 def _viscosity(strength, scene):
-    """Kinematic viscosity; 0 if shear spreads over less than a cell in the run."""
+    """Kinematic viscosity, or 0 if shear spreads over less than a cell in the run."""
     laws = [solid.material.whole for solid in scene.hub.solids.values()]
     viscous = [law for law in laws if parameter(law, "strength") is strength]
     nu = max((float(strength.mu * specific_volume(law)) for law in viscous), default=0.0)

@@ -1,4 +1,4 @@
-"""Strengths johnson_cook, swift and zerilli-armstrong: power-law hardening of metals."""
+"""Strengths johnson_cook, swift and zerilli-armstrong."""
 
 from typing import Any, NamedTuple
 
@@ -23,7 +23,7 @@ from karamelo_py.points.laws.temperatures import homologous, temperature_or
 
 
 class JohnsonCook(NamedTuple):
-    """Flow stress of metals that depends on plastic strain, strain rate and temperature.
+    """Flow stress of metals by plastic strain, strain rate and temperature.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class JohnsonCook(NamedTuple):
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
     1983). The second factor is 1 up to the reference rate, the third without a temperature. Each
     step solves for the plastic strain with the flow stress at its end, the step's rate and the
-    temperature at its beginning: one solution for any step size.
+    temperature at its beginning; the solution is unique for any step size.
 
     See Also
     --------
@@ -82,7 +82,7 @@ class JohnsonCook(NamedTuple):
         Tr: float,
         Tm: float,
     ):
-        """Leave out factors of 1: each costs a logarithm or a power."""
+        """Omit factors of 1, each of which costs a logarithm or a power."""
         check_temperatures(Tr, Tm)
         epsdot0 = reference_rate(epsdot0, C, "C")
         rate = RateFactor(epsdot0, C) if C > 0 else Absent()
@@ -116,12 +116,11 @@ remembers(JohnsonCook, ep=0.0)
 shear_response.on(JohnsonCook)(radial_return)
 
 
-# Increments up to this fraction of the strain use a series of this many terms.
+# increments up to this fraction of the strain use a series of this many terms
 _NEAR, _TERMS = 1 / 32, 9
 
 
 def power_of_strain(factor, exponent, strain):
-    """factor strain^exponent, 0 at no strain."""
     some = strain > 0
     return where(some, factor * power(where(some, strain, 1), exponent), 0)
 
@@ -129,7 +128,8 @@ def power_of_strain(factor, exponent, strain):
 def power_law(factor, exponent, strain, value, increment):
     """factor (strain + increment)^exponent and its slope, 0 at zero strain.
 
-    `value` is the power without the increment; times (1 + x)^n as a short series for small x.
+    For small x = increment / strain, `value`, the power without the increment, is multiplied by a
+    short series of (1 + x)^n.
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
     x = increment / where(strain > 0, strain, 1)
@@ -168,7 +168,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, before, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the precomputed part is without the rate
+        return real(0, q), real(0, q)  # the precomputed part lacks the rate
     hard, soft = before.precomputed
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, before.memory.ep, hard * soft, excess, slope)
@@ -249,7 +249,7 @@ def _flow_stress_swift(strength, before, increment, dt):
 
 
 class ZerilliArmstrong(NamedTuple):
-    """Flow stress of metals from dislocation motion: strain, strain rate and temperature.
+    """Flow stress of metals from dislocation motion, by strain, strain rate and temperature.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def _flow_stress_zerilli_armstrong(strength, before, increment, dt):
     ep = before.memory.ep
     athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
     root, root_slope = power_law(strength.C2, 0.5, ep, root, increment)
-    # exp(C4 T ln(rate)) is the rate to a power.
+    # exp(C4 T ln(rate)) is the rate to a power
     exponent = strength.C4 * temperature_or(before.heat, strength.initial_temperature)
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(1, exponent, rate)

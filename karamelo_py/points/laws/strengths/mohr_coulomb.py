@@ -1,4 +1,4 @@
-"""strength mohr-coulomb: cohesion and friction."""
+"""Strength mohr-coulomb."""
 
 from math import cos, sin, sqrt
 from typing import NamedTuple
@@ -43,11 +43,11 @@ class MohrCoulomb(NamedTuple):
     Notes
     -----
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
-    stress (tension positive). Principal stresses return to a plane, an edge (two equal) or, in
-    tension, the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element Modeling in Earth
-    Science using Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2). Pressure follows
-    from the elastic part of J. A step uses the strength at its beginning. With softening, results
-    depend on the cell size.
+    stress (tension positive). Principal stresses return to a plane, an edge or, in tension, the
+    apex p = -c cot(phi) (Simpson 2017, Practical Finite Element Modeling in Earth Science using
+    Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2). Pressure follows from the elastic
+    part of J. A step uses the strength at its beginning. With softening, results depend on the cell
+    size.
 
     See Also
     --------
@@ -86,32 +86,32 @@ frictional(MohrCoulomb)
 
 
 def returned_to_plane(s, yield_surface, G, K):
-    """Return principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
+    """Return the principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    To a plane; if that changes their order, to an edge; failing that, to the apex (Simpson 2017,
+    To a plane, to an edge if that changes their order, or failing that to the apex (Simpson 2017,
     section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi), sin(phi),
     sin(psi).
     """
     k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G
-    # n and m, normals of yield function and plastic potential, are (1 + sin, 0, sin - 1).
+    # The normals of yield function and plastic potential are (1 + sin, 0, sin - 1).
     mean = 4 * lam * sin_phi * sin_psi
     up = 2 * G * (1 + sin_phi) * (1 + sin_psi)
     down = 2 * G * (1 - sin_phi) * (1 - sin_psi)
     f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k
     volume = 2 * lam * sin_psi  # lam tr(m)
-    rise = 2 * G * (1 + sin_psi) + volume  # C m for the largest
-    fall = volume - 2 * G * (1 - sin_psi)  # smallest; `volume` for the other
+    rise = 2 * G * (1 + sin_psi) + volume  # C m of the largest
+    fall = volume - 2 * G * (1 - sin_psi)  # of the smallest; `volume` of the other
     x = f / (up + down + mean)
     s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
     if s1 >= s2 and s2 >= s3:
         return s1, s2, s3
     if s2 > s1:
-        # Triaxial extension: planes 1-3 and 2-3.
+        # triaxial extension: planes 1-3 and 2-3
         other = s[1] - s[2] + (s[1] + s[2]) * sin_phi - 2 * k
         cross = down + mean
     else:
-        # Triaxial compression: planes 1-3 and 1-2.
+        # triaxial compression: planes 1-3 and 1-2
         other = s[0] - s[1] + (s[0] + s[1]) * sin_phi - 2 * k
         cross = up + mean
     a = up + down + mean
@@ -121,7 +121,7 @@ def returned_to_plane(s, yield_surface, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # Equal but for rounding: on both planes.
+        # on both planes, because they are equal but for rounding
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
@@ -138,13 +138,13 @@ def returned_to_plane(s, yield_surface, G, K):
 def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
     s, p, K = trial
     k, sin_phi, _ = yield_surface = surface(strength, strain)
-    # Only needed above this bound of the yield function.
+    # a cheap bound of the yield function
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:
         return s, p
     (a, b, c), directions = principal(s)
-    # Ranks from the largest; equal values stay in order.
+    # ranks from the largest; equal values stay in order
     at_a = (1 if b > a else 0) + (1 if c > a else 0)
     at_b = (1 if a >= b else 0) + (1 if c > b else 0)
     at_c = (1 if a >= c else 0) + (1 if b >= c else 0)

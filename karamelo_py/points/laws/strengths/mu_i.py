@@ -1,4 +1,4 @@
-"""strength mu-i: dense granular flow, with rate-dependent friction."""
+"""Strength mu-i."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -64,7 +64,7 @@ class MuI(NamedTuple):
     rho_s: AboveZero
 
     def checked(self):
-        """Refuse friction that decreases with the rate: such flow is unstable."""
+        """Refuse friction that decreases with the rate, which makes flow unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below the friction of slow flow",
@@ -97,7 +97,7 @@ SLOW = 0.05  # fraction of the grains' viscosity that gives a warning
 def _slows(strength, scene):
     """Compare the viscosity of the PIC fraction with the grains', mu p/(rho gamma').
 
-    For p at half the height of a body, and half of I0.
+    p is taken at half the height of a body, I as half of I0.
     """
     added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
@@ -162,5 +162,5 @@ def _respond_mu_i(strength, law, kin, step, memories):
 
 
 def yields_early_with_fbar(strength):
-    """Check for friction with little dilatancy: averaged stress yields at the point's pressure."""
+    """True for friction with little dilatancy: averaged stress yields at the point's pressure."""
     return isinstance(strength, MuI) or little_dilatancy(strength) > 0
