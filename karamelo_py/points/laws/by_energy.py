@@ -295,8 +295,7 @@ SCANNED = 0.5, 3.0  # stretches
 
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Return the path and stretch nearest to rest where a principal direction loses its stiffness.
-    """
+    """Path and stretch nearest to rest where a principal direction loses its stiffness."""
     unstable = []
     for path, stretches in PATHS.items():
         for end in SCANNED:

@@ -165,8 +165,7 @@ def mean_decay(x):
 
 
 def weight_before(x):
-    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, exact in decay; the new has x - a.
-    """
+    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, exact in decay; x - a after."""
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))
