@@ -200,10 +200,9 @@ class STL(Enclosed):
 
 
 class MeshSolid(Solid):
-    """A body with one point in each element of a mesh.
+    """A body with one point in each element of a mesh, at the centroid.
 
-    It lies at the centroid of the element and has its exact volume (times x in axisymmetric
-    domains).
+    It has the exact volume of the element (times x in axisymmetric domains).
 
     Parameters
     ----------
@@ -220,10 +219,9 @@ class MeshSolid(Solid):
 
     Notes
     -----
-    Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D; lower dimensions are ignored, and, with a warning, centroids outside the domain.
-    Elements of higher order have the volume within their curved edges. The cpdi methods take
-    elements of one shape, by their corners. In 2D the mesh lies in the plane z = 0.
+    Elements are as in region mesh; lower dimensions are ignored, and, with a warning, centroids
+    outside the domain. Elements of higher order have the volume within their curved edges. The cpdi
+    methods take elements of one shape, by their corners. In 2D the mesh lies in the plane z = 0.
 
     See Also
     --------

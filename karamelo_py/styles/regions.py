@@ -19,8 +19,8 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 class Primitive(region.Region):
     """Base of shapes with an exact depth: slabs across some axes, round across others."""
 
-    slabs: Sequence[tuple] = ()  # axis, lower and upper end of each
-    across: Sequence[int] = ()  # axes along which it is round, with a centre and a radius
+    slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
+    across: Sequence[int] = ()  # axes across which it is round, with a centre and a radius
     centre: Sequence[float] = ()
     radius: float
 
@@ -64,7 +64,7 @@ class Primitive(region.Region):
 
 
 def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
-    """Planes (d + 1,) of a slab, see `Convex`; none where it is open."""
+    """Planes (d + 1,) of a slab, see `Convex`; none at open ends."""
     normal = np.eye(d)[axis]
     return [np.append(n, at) for n, at in ((normal, lo), (-normal, -hi)) if math.isfinite(at)]
 
@@ -223,7 +223,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """The domain cuts a half-space anywhere."""
+        """Return None: the domain cuts a half-space anywhere."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
@@ -352,6 +352,5 @@ class Difference(region.Region):
 
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
-    """Descriptions of regions for kernels; None if one has none."""
     shapes = [part.outline() for part in parts]
     return None if any(one is None for one in shapes) else tuple(shapes)

@@ -22,7 +22,7 @@ from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MISSED = 0.01  # of a shape's volume
-COARSE = 0.08  # of a box's or ball's
+COARSE = 0.08  # of a box's or ball's volume
 MANY = 10  # per cell and direction
 
 
@@ -125,7 +125,7 @@ class RegionSolid(Solid):
         self._warn_of_size(hub)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
-        """The second: of the shape in a file, if any."""
+        """Volumes of the points and of the shape; None if the shape's volume is unknown."""
         whole = self.region.volume
         total = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (total, whole)
@@ -241,7 +241,7 @@ class PointsSolid(Solid):
             )
         half = volumes[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        # Stress is given at the temperature of the point.
+        # Stress belongs to the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
         self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)

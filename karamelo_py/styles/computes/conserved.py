@@ -141,9 +141,9 @@ class EnergyBalance(Compute):
     -----
     Publishes ID, the sum; ID_total, without the work; and ID_drift, the change of ID since the
     first output over the largest kinetic, stored or dissipated energy or work so far. Velocities
-    lag positions by half a step, which gives a drift of the order of dt (33 % in a body of a few
-    cells); the end of a run prints the change between energies at equal times. Energy stored within
-    points by affine transfers is not included.
+    lag positions by half a step, so the drift is of the order of dt (33 % in a body of a few
+    cells); the energy line at the end of a run compares equal times. Energy stored within points by
+    affine transfers is not included.
 
     See Also
     --------
@@ -168,7 +168,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """Base of computes of a momentum: `terms` of points are components and magnitude."""
+    """Base of computes of a momentum, whose `terms` are its components and its magnitude."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)

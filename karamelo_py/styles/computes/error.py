@@ -30,11 +30,6 @@ def column(points: PointTable, name: str) -> np.ndarray:
 
 
 class PointField:
-    """Its name in the script, and its columns (one for a scalar).
-
-    `weights` count shear components twice in the square of the magnitude.
-    """
-
     script_kind = "a column of points, or displacement, velocity, stress or strain"
 
     def __init__(self, name: str, columns: tuple[str, ...]):
@@ -54,10 +49,10 @@ class PointField:
 
 
 class Norm:
-    """L1, L2 or max, absolute or relative to the norm of the exact values.
+    """Norm L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    In a history, differences are weighted by the time since the last output: the number of outputs
-    has no effect.
+    Histories weight differences by the time since the last output, so the number of outputs has no
+    effect.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -82,7 +77,6 @@ class Norm:
         self._exact = 0.0
 
     def terms(self, sizes: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Terms of a norm from the magnitudes (2, n) of differences and exact values."""
         return np.vstack([weight * sizes**self.power, weight])
 
     def moment(self, sums: np.ndarray, largest: list[np.ndarray]) -> np.ndarray:
@@ -92,7 +86,7 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """As `scaled`, and add the moment to `history` and `largest`, once."""
+        """Return `scaled`, and add a new moment to `history` and `largest`."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -101,7 +95,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first state counts alone until the second.
+            # The first state has no duration: it counts alone until the second.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -118,10 +112,10 @@ class Norm:
 
 
 class Compared:
-    """Mix-in: has `sizes(points)` and a `norm`."""
+    """Mix-in for computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
-        """Norms (2,) of differences and exact values now, and other sums."""
+        """Return norms (2,) of differences and exact values now, and the remaining sums."""
         sums = self.hub.fields.added_up(self)
         largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
         return self.norm.moment(sums, largest), sums[3:]
@@ -208,7 +202,7 @@ class Error(Compared, Compute):
         self.publish_all(now, self.norm.largest, self.norm.history)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Magnitudes (2, n) of differences and exact values at points, and weights."""
+        """Return magnitudes (2, n) of differences and exact values, and weights (n,)."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for name, weight, formula in self.parts:
@@ -218,7 +212,7 @@ class Error(Compared, Compute):
 
 
 class GroupOrValue:
-    """For signatures: a group of points, or a number that changes over time."""
+    """Script argument: a group of points, or a value that changes over time."""
 
     script_kind = "a group of points, or a value"
 
@@ -322,13 +316,14 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Magnitudes (2, n) of differences and of the curve, weights; the curve, and one."""
+        """Return magnitudes (2, n) of differences and of the curve, weights, the curve, and
+        ones."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mask (n,) of the positions that the curve covers, and its values there."""
+        """Return the mask (n,) of the positions that the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

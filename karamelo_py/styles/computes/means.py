@@ -16,10 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
-    """Base of means: `terms` of points are weights, and weights times quantities.
-
-    With zero total weight the mean is 0.
-    """
+    """Base of means over weights (`terms`); with zero total weight the mean is `empty`."""
 
     empty = 0.0
 
@@ -235,7 +232,7 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
-        # Radix selection: eight bits of coordinates at a time, from the highest.
+        # Radix selection: eight bits of the coordinates at a time, from the highest.
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
@@ -243,7 +240,7 @@ class PositionQuantile(Compute):
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:
-                # Fractions such as 0.1 of ten equal points must not fail by round-off.
+                # Round-off must not shift a fraction such as 0.1 of ten equal points.
                 wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
@@ -255,7 +252,7 @@ class PositionQuantile(Compute):
         self.publish_components(_numbers(np.array(first, np.uint64)))
 
     def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
-        """Masses of points whose coordinates begin with these bits, by the next bits."""
+        """Masses of points whose coordinates begin with the bits `first`, by their next bits."""
         terms_by_axis = []
         for axis, begin in enumerate(first):
             bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)
@@ -267,8 +264,8 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Integers in the order of the floating-point numbers."""
-    bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
+    """Map floating-point numbers to integers in the same order."""
+    bits = (numbers + 0.0).view(np.uint64)  # + 0.0 makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
 
@@ -337,7 +334,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Distance, id and columns of the given or nearest point."""
+        """Return distance, id and columns of the point with the given id, or of the nearest one."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

@@ -48,7 +48,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """As the first process does, which alone writes."""
+        """Write nothing, but take part in the exchange: only rank 0 writes."""
         with discarded():
             self.write()
 
@@ -56,19 +56,19 @@ class Dump(Rhythmic):
         self.hub.warn(begins_anew(self.path()), place=self.place)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], owner: str) -> None:
-        """Columns are 0 because no point or node (`owner`) stores them."""
+        """Warn that columns are 0 because no point or node (`owner`) stores them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {owner} have no such field")
 
 
 POSITIONS = ("x", "y", "z")
-# Written with every row anyway; `tag` is Karamelo's other name of the id.
+# Written with every row anyway; Karamelo calls the id `tag`, too.
 LEADING = ("id", "type", "tag")
 
 
 class TableRows(NamedTuple):
-    """Rows in the order of ids: ids and types, (n,) integers; columns."""
+    """Ids and types (n,) in the order of ids, and columns."""
 
     ids: np.ndarray
     types: np.ndarray
@@ -78,16 +78,16 @@ class TableRows(NamedTuple):
 class TableDump(Dump):
     """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, an earlier base of a style, defines the rows: `names` of columns,
-    `absent` ones (always 0), the `extent` (number of rows, largest id), and all rows by id, in
-    `tables` that fit into memory.
+    `OfPoints` or `OfNodes`, an earlier base of the style, defines the `names` of columns, the
+    `absent` ones (always 0), the `extent` (number of rows, largest id), and `tables` of rows by id
+    that fit into memory.
 
     Attributes
     ----------
     to_first
-        Whether only the first of several processes gets the tables, which all iterate over once.
+        Whether only rank 0 gets the tables, which all ranks iterate over once.
     counts_rows
-        Whether it reads the extent before.
+        Whether `write` reads the extent first.
     """
 
     to_first = False
@@ -102,7 +102,7 @@ class TableDump(Dump):
             raise ScriptError(message, argument="file", expected=expected, hint=hint)
         check_columns(columns, columns_available, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
-        # A viewer needs all three positions; those not requested come first.
+        # A viewer needs all three positions.
         if not set(POSITIONS) <= set(wanted):
             wanted = [*POSITIONS, *(name for name in wanted if name not in POSITIONS)]
         super().__init__(hub, every, file, *wanted)
@@ -156,7 +156,7 @@ class OfPoints:
 
 
 class OfNodes:
-    """Rows are the nodes of the background grids; with `occupied`, only nodes with mass.
+    """Rows are the nodes of the background grids.
 
     Parameters
     ----------

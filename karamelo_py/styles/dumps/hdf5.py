@@ -15,7 +15,7 @@ from karamelo_py.output.vtkhdf import VERSION, describe
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
-# Lowest compression: with shuffled bytes, higher levels take twice the time for a few per cent.
+# With shuffled bytes, higher levels take twice the time for a few per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
@@ -51,7 +51,7 @@ class Hdf5Dump(TableDump):
         import h5py
 
         if k == 0 or self.one_file_per_step:
-            # In memory first: HDF5 cannot close a file without room on the disk.
+            # In memory first: HDF5 cannot close a file on a full disk.
             with h5py.File("new", "w", driver="core", backing_store=False, libver=VERSION) as root:
                 self._prepare(root, snapshot.last)
                 root.flush()
@@ -73,7 +73,7 @@ class Hdf5Dump(TableDump):
                     for name in ("time", "step", *self.columns):
                         root[name].resize(k, axis=0)
                     raise
-        except (OSError, RuntimeError) as error:  # from HDF5; the message is the system's
+        except (OSError, RuntimeError) as error:  # h5py raises both; the text is the system's
             reason = re.search("error message = '([^']*)'", str(error))
             message = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {message}") from error
@@ -81,7 +81,7 @@ class Hdf5Dump(TableDump):
     def _reserve(self, path: Path, last: int) -> None:
         """Refuse a disk without room for a snapshot of any content.
 
-        HDF5 writes at any time, and may neither report nor survive a failure.
+        HDF5 may write at any time, and neither report nor survive a failure.
         """
         if not hasattr(os, "posix_fallocate"):
             return
@@ -97,10 +97,9 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Continue with the snapshots of an earlier run.
+        """Continue with the snapshots of an earlier run, rewritten for equal bytes.
 
-        They are rewritten for equal bytes. A file that a killed program was writing can be read but
-        not written.
+        A file that a killed program was writing can be read but not written.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -134,7 +133,6 @@ class Hdf5Dump(TableDump):
 
     @property
     def _first(self) -> int:
-        """Points are numbered from 1, nodes from 0."""
         return int(self.rows_are == "points")
 
     def _prepare(self, root: Any, last: int) -> None:
@@ -182,7 +180,7 @@ class Hdf5Dump(TableDump):
             arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
-            # Pieces of a fixed size: equal bytes however the rows arrive.
+            # Blocks of a fixed size give equal bytes however the rows arrive.
             for begin in range(0, count, PIECE):
                 block, here = (
                     slice(begin, min(begin + PIECE, count)),
@@ -205,10 +203,10 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Open it so that its content stays readable if the program dies.
+    """Open a file so that its content stays readable if the program dies.
 
-    h5py's swmr=True also opens a file that a killed program has left, if it was opened that way
-    from the start (`h5py.File.swmr_mode` does it a moment later).
+    h5py's swmr=True also opens a file left by a killed program, if it was opened that way from the
+    start (`h5py.File.swmr_mode` sets it a moment later).
     """
     import h5py
 
@@ -224,19 +222,20 @@ def _opened_to_append(path: Path) -> Any:
 class Hdf5(OfPoints, Hdf5Dump):
     """Write the material points to one compressed binary file, which h5py and xarray read.
 
-    Each column is an array over time and id. Deleted points are NaN. The file is complete after
-    every snapshot. ParaView opens the small file of the same name with the ending ``.vtkhdf``, with
-    all snapshots.
+    Each column is an array over time and id; deleted points are NaN. The file is complete after
+    every snapshot. ParaView opens the small file of the same name with the ending ``.vtkhdf``,
+    which has all snapshots.
 
     Notes
     -----
     In Python::
 
-        points = xarray.open_dataset("points.h5", engine="h5netcdf") points.seq.sel(time=0.5,
-        method="nearest").max() h5py.File("points.h5")["seq"][-1]
+        points = xarray.open_dataset("points.h5", engine="h5netcdf")
+        points.seq.sel(time=0.5, method="nearest").max()
+        h5py.File("points.h5")["seq"][-1]
 
-    Open a file whose program was killed while writing with ``h5py.File(name, swmr=True)``. After a
-    full disk, the file has the snapshots that were complete.
+    If the program was killed while writing, open the file with ``h5py.File(name, swmr=True)``.
+    After a full disk, the file has the complete snapshots.
 
     Example
     -------

@@ -29,7 +29,7 @@ SHRUNK, AT_LEAST = 2, 3
 
 
 class Plain:
-    """Writes text unchanged, with the interface of ``zlib.compressobj``."""
+    """Passes text through, with the interface of ``zlib.compressobj``."""
 
     def compress(self, data: bytes) -> bytes:
         return data
@@ -42,15 +42,13 @@ class Plain:
 
 
 class LammpsDump(TableDump):
-    # For a file with all snapshots: position of the next one, length of the text so far, and the
-    # encoder's state.
+    # For one file with all snapshots: position of the next one, and length of the text so far.
     remembers = ("_end", "_length")
     to_first = True
     _end = 0
     _length = 0
     _encoder: Any = None
     named = False  # with ELEMENT
-    # Makes the encoder of a new file, and opens the text of a file.
     encoder: Any = Plain
     opened: Any = staticmethod(partial(open, mode="rb"))
 
@@ -84,7 +82,7 @@ class LammpsDump(TableDump):
             self.warn_of_absence()
             self._end = self._length = 0
             return
-        # Pending bytes of an encoder are not in the file, but follow from it.
+        # Pending bytes of an encoder are not in the file; the text restores them.
         self._encoder = self.encoder()
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
@@ -117,10 +115,9 @@ class LammpsDump(TableDump):
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
-    """Ends of the domain along the three axes.
+    """Return the ends of the domain along the three axes.
 
-    OVITO takes a box of zero thickness for degenerate; one cell about zero suits a slice of unit
-    width.
+    OVITO takes a box of zero thickness for degenerate; one cell about zero suits unit width.
     """
     domain = hub.domain
     used = slice(domain.dimension)
@@ -129,7 +126,7 @@ def box(hub: Hub) -> list[tuple[float, float]]:
 
 
 class Gzipped:
-    """Mix-in for a text dump: the same text, gzipped.
+    """Mix-in for text dumps: the same text, gzipped.
 
     Parameters
     ----------
@@ -138,14 +135,14 @@ class Gzipped:
     """
 
     def encoder(self) -> Any:
-        """Without name and date, for reproducible bytes."""
+        """Omit name and date, for reproducible bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
     opened = staticmethod(gzip.open)
 
 
 class BinaryRows:
-    """Mix-in for a text dump: the same rows as little-endian double-precision numbers.
+    """Mix-in for text dumps: the same rows as little-endian double-precision numbers.
 
     Parameters
     ----------

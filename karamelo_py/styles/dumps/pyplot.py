@@ -23,16 +23,15 @@ from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
-# Above, a width or height is in pixels.
+# Larger widths and heights are in pixels.
 MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
-# Fast; nearly as small as the best.
 PNG_COMPRESSION = 1
-# Components of either sign: a diverging colour map, grey at 0.
+# Components of either sign have a diverging colour map, grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # points of which the typical size is taken, about
+SAMPLE = 1 << 16  # number of points that give the typical size
 
 
 class PyPlot(Dump):
@@ -50,7 +49,7 @@ class PyPlot(Dump):
         File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
         ``*`` each picture replaces the previous one.
     width, height
-        Size: up to 50 in inches (of 100 pixels), above in pixels; from 20 to 20000 pixels.
+        Up to 50 in inches (of 100 pixels), above in pixels; from 20 to 20000 pixels.
     field
         Column of dump particle that sets the colour, or a formula of columns, groups and solids (1
         for their points, else 0), time and published values. Default: the solid (in 1D: vx).
@@ -68,14 +67,14 @@ class PyPlot(Dump):
     label
         Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
-        A condition of columns as in `field`; other points are omitted, as in ``not tool && y > 0``.
+        Condition on columns, as in `field`, for the drawn points: ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
         Limits of the view; default: the domain.
     scale
         log: colours follow the logarithm of the column.
     quantile
-        Fraction of the values beyond either colour limit, such as 0.01, so that few values do not
-        use up all colours.
+        Fraction of the values beyond either colour limit, such as 0.01, so that a few extremes do
+        not use up all colours.
     dpi
         Pixels per inch: a picture of 600 pixels has 1800 with 300.
     fontsize
@@ -204,7 +203,7 @@ class PyPlot(Dump):
         self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
-        # takes 0.3 s
+        # the import takes 0.3 s
         from karamelo_py.output import pictures
 
         units = self.hub.output.units
@@ -285,7 +284,7 @@ def look_of(
     outlines: bool,
     **look: Any,
 ) -> dict[str, Any]:
-    """From the words of a script or a command line."""
+    """Check the keywords of a script or a command line, and return the settings of a picture."""
     for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
         if None not in ends and ends[0] >= ends[1]:
             range_of = "colours" if low == "vmin" else "picture"

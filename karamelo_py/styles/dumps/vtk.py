@@ -45,7 +45,6 @@ class VtkDump(TableDump):
 
     @property
     def index(self) -> Path:
-        """The file that lists the snapshots with their times."""
         stem = str(self.file)[: -len(".vtu")].replace("*", "", 1).rstrip("._-")
         return self.hub.folder / f"{stem}.pvd"
 
@@ -75,10 +74,10 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add what is drawn of the last points, or store what it needs."""
+        """Add the cells of the last points, or store what they need in `kept`."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
-        """Add what is drawn between all points."""
+        """Add the cells between all points."""
 
 
 class Vtk(OfPoints, VtkDump):
@@ -127,7 +126,7 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """The numbers of the written nodes, if some are omitted."""
+        """Store the numbers of the written nodes, if some are omitted."""
         if self.occupied:
             kept.append(ids)
 

@@ -23,14 +23,14 @@ LAYERS = 3.5  # cells between the nodes of an edge, along its normal
 
 
 class Support(Field):
-    """It balanced a node when fix absorbing began; NaN before."""
+    """Force that balanced a node when fix absorbing began; NaN before."""
 
     shape = vector
     start = float("nan")
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """rho c A in all directions; `normal` is rho A, of which one component counts."""
+    """Apply rho c A in all directions; `normal` is rho A, of which one component counts."""
     axis, along, across = values
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
@@ -44,7 +44,7 @@ def absorb(mass, v, force, normal, support, values, dt):
 
 
 def dashpot(rate, mass, v, force, dt):
-    """-rate m (v + v')/2, with v' after it and `force` have acted."""
+    """Return -rate m (v + v')/2, where v' is the velocity after this force and `force`."""
     half = 0.5 * dt * rate
     return (-1 / (1 + half)) * (rate * mass * v + half * force)
 
@@ -55,7 +55,7 @@ class Absorbing(Fix):
     Parameters
     ----------
     material
-        The material at the edge, whose waves the dashpots fit.
+        The material at the edge, whose wave speeds set the dashpots.
     side
         Outward direction of the edge: xlo, xhi, ylo, yhi, zlo or zhi.
 
@@ -69,9 +69,9 @@ class Absorbing(Fix):
     the surface. Of a pulse of 20 cells at normal incidence, 0.2 % of the energy returns; oblique
     waves return more. In saturated ground, soil and water move as one at the edge.
 
-    In its first step the fix measures the force on each node, and from then on applies the opposite
-    force. Ground that begins with its stress (fix initial_stress) therefore stays where it is; a
-    later load, such as weight, slowly pushes the edge outwards.
+    The fix opposes the force that it measures on each node in its first step. Ground that begins
+    with its stress (fix initial_stress) therefore stays at rest; a later load, such as weight,
+    slowly pushes the edge outwards.
 
     Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
     move less than half a cell.
@@ -129,7 +129,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Of P and S waves, for the mass of the soil alone where pores are full."""
+    """Return the speeds of P and S waves, in full pores for the mass of the soil alone."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

@@ -23,12 +23,14 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Faces on the surface of the region; for meshes from the boxes of points."""
+        """Return faces on the region's surface; for meshes None, which means the boxes of
+        points."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Heat per time (n,) into the points, from values of formulas at the faces (m,)."""
+        """Return the heat per time (n,) into the points from values of formulas at the faces
+        (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -43,7 +45,7 @@ class EdgeHeat(OnEdge, HeatFix):
 
 
 def on_points(points: PointsView, faces: Faces, of_faces: np.ndarray) -> np.ndarray:
-    """Sums (n,) of face values (m,) over the faces of each point."""
+    """Sum face values (m,) over the faces of each point (n,)."""
     return np.bincount(faces.point, of_faces, len(points.ids))
 
 
@@ -62,7 +64,7 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat through the region's surface next to it, by the initial area of the
+    Each point gets the heat through the adjacent surface of the region, by the initial area of the
     smooth surface (for a mesh, of its points' faces). To load part of an edge, restrict the group,
     or set q to 0 elsewhere. A region that extends beyond the domain or a symmetry plane has no
     surface there.
@@ -99,8 +101,8 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    Areas are as in edge_heat_flux. T is the temperature next to the surface after the step, so no
-    coefficient cools points below the fluid. Publishes the heat per time into all points as ID_s,
+    Areas are as in edge_heat_flux. T is the temperature at the surface after the step, so that even
+    a large h cools no point below the fluid. Publishes the heat per time into all points as ID_s,
     and the area as ID_area.
 
     See Also

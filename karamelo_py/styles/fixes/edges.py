@@ -21,7 +21,7 @@ from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 AT_ONCE = 4_000_000  # distances of faces and points
-PARTS = 4  # per direction of a box, for measuring the surface
+PARTS = 4  # per direction of a box, to measure the surface
 
 
 class Faces(NamedTuple):
@@ -36,10 +36,10 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """Outer faces of the points `ids` inside a region.
+    """Return outer faces of the points `ids` inside a region.
 
-    Points are boxes; a face counts if the centre of the adjacent box of the same size is outside.
-    Boxes cut by a region: `faces_cut`.
+    Points are boxes; a face is outer if the centre of the adjacent box of the same size is outside.
+    `faces_cut` does the same for boxes cut by a region.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -76,10 +76,9 @@ def joined(tables: Sequence[Columns]) -> Columns:
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
-    """Its surface at the points `ids` of a solid that fills it.
+    """Return the surface at the points `ids` of a solid that fills `region`.
 
-    The surface in a part of a box belongs to the nearest inside point in this box or an adjacent
-    one.
+    The surface in a sub-box belongs to the nearest inside point in this box or an adjacent one.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -89,7 +88,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     pieces = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
     if not len(ids):
         return pieces[0]
-    corner = x0.min(axis=0) - 2.5 * size  # puts points of whole boxes at the box centres
+    corner = x0.min(axis=0) - 2.5 * size  # aligns points of whole boxes with the box centres
     shape = tuple(((x0.max(axis=0) - corner) / size + 5).astype(np.int64))
     cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
     order = np.argsort(cells, kind="stable")
@@ -105,7 +104,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # a box may have two points: one absorbed a small neighbour
+            for k in (0, 1):  # two points may share a box: one absorbed a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -117,14 +116,14 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
-    """Centres (n PARTS^d, d) of the parts of boxes around `x`."""
+    """Return the centres (n PARTS^d, d) of the sub-boxes of boxes around `x`."""
     d = x.shape[1]
     places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     return (x[:, None, :] + size * places).reshape(-1, d)
 
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
-    """Area (n,) in boxes around `x`: by parts at an edge."""
+    """Return the surface area (n,) in boxes around `x`, summed over sub-boxes at an edge."""
     lengths, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
@@ -140,10 +139,9 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """For cut boxes: see `surface_at`.
+    """Return faces of cut boxes: projections of the surface across the axes (see `surface_at`).
 
-    Projections of the surface across the axes. At an edge within a part of a box, opposite
-    projections cancel, and only the difference remains.
+    At an edge within a sub-box, opposite projections cancel, and only the difference remains.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
@@ -159,7 +157,7 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """The surface at the points `ids` of a solid, in every orientation."""
+    """Return the surface at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)
@@ -167,7 +165,8 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
-    """Simplices (m, d, d) of a set of faces, in pieces that the nearest points take."""
+    """Divide simplices (m, d, d) of a set of faces into pieces, each assigned to the nearest
+    point."""
     none = np.zeros(0, np.int64)
     if not len(ids) or not len(sheet):
         return Faces(ids[:0], none, none, np.empty(0), np.empty((0, d)))
@@ -191,7 +190,7 @@ def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Face
 
 
 def _parts_of_simplex(d: int, count: int) -> np.ndarray:
-    """Centres (n, d - 1) of `count`^(d - 1) equal parts, in fractions of its edges."""
+    """Return the centres (n, d - 1) of `count`^(d - 1) equal pieces, in fractions of the edges."""
     if d < 3:
         return ((np.arange(count) + 0.5) / count)[:, None] if d == 2 else np.zeros((1, 0))
     i, j = np.divmod(np.arange(count * count), count)
@@ -224,14 +223,14 @@ class OnEdge(Fix):
                 )
 
     def faces_at(self, ids: np.ndarray) -> Faces:
-        """By rows in the view; cached."""
+        """Return faces by rows in the view (cached)."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Forces on a point are summed in this order, whenever its faces were found.
+            # Sums over the faces of a point keep this order, whenever its faces were found.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -239,12 +238,12 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """From the surface of the region; None to find them from the boxes."""
+        """Return faces on the surface of the region; None to find them from the boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """Solids whose faces come from the surface, with all faces."""
+        """Return all faces of the solids whose faces come from the surface."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         by_solid = {}
         for solid in self.hub.solids.values():
@@ -313,14 +312,14 @@ class EdgeTraction(EdgeFix):
     Publishes the sum as ID_x, ID_y, ID_z.
 
     Points are boxes that fill the region; those with an outer face in the direction of `side` take
-    the traction on its initial area. It is a dead load (constant magnitude and direction), half a
-    box inside the edge, and sums exactly to traction times area on a plane side. Faces of a hole in
-    this direction are loaded too: for a plate with a hole, use the region without it. In
+    the traction on its initial area. It is a dead load (constant magnitude and direction), acts
+    half a box inside the edge, and sums exactly to traction times area on a plane side. Faces of a
+    hole in this direction are loaded too: for a plate with a hole, use the region without it. In
     axisymmetry, area and force are per radian.
 
-    Faces of a set in a mesh load the points of the group that are nearest to their parts:
-    ``region(top, mesh, deck.inp, TOP)`` with a surface, side set or boundary group, and
-    ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
+    Faces of a set in a mesh load the nearest points of the group: ``region(top, mesh, deck.inp,
+    TOP)`` with a surface, side set or boundary group, and ``fix(lid, edge_traction, all, top, all,
+    0, -1e3)``.
 
     See Also
     --------
@@ -370,13 +369,13 @@ class EdgePressure(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z.
 
-    The pressure acts inwards on each outer face of the points' boxes, on its initial area, with
+    The pressure acts inwards on the initial area of each outer face of the points' boxes, with
     constant magnitude and direction. A curved edge is stair-stepped, but the force along each axis
-    is correct: that on the projected area. With points=cut, forces are those on the smooth edge. In
-    axisymmetry, forces are per radian.
+    (pressure times projected area) is correct. With points=cut, forces are those on the smooth
+    edge. In axisymmetry, forces are per radian.
 
-    For a part of an edge, define a separate region; the group may have to exclude other sides of a
-    region such as ``region(top, block, 0, 1, 0.9, 1)``.
+    To load part of an edge, define a separate region; the group may have to exclude other sides of
+    a region such as ``region(top, block, 0, 1, 0.9, 1)``.
 
     See Also
     --------

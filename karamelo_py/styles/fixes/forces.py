@@ -28,7 +28,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import per_direction, vector
 
 ACCELERATION = Powers(1, 0, -2)
-TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium: unique to this unit system
+TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium; no other system has them
 
 
 def accelerate(mass, v, v_star, force, value, before, kick, share):
@@ -233,10 +233,10 @@ class LocalDamping(Fix):
     forces cause no damping: the state of rest is unchanged, and steady motion is not damped. With
     0.8 a scene comes to rest within about ten periods of its slowest vibration.
 
-    It acts after all other fixes, in ulmpm/contacts after contact, on the net force: touching
-    bodies come to rest with correct contact forces. Nodes that are held or move at a prescribed
-    constant velocity are not damped; their reactions are correct. Publishes the sum of the damping
-    forces as ID_x, ID_y, ID_z.
+    The damping acts on the net force after all other fixes, in ulmpm/contacts after contact:
+    touching bodies come to rest with correct contact forces. Nodes that are held or move at a
+    prescribed constant velocity are not damped; their reactions are correct. Publishes the sum of
+    the damping forces as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -297,7 +297,6 @@ class InitialStress(Fix):
 
 
 def refuse_following(hub: Hub, group: ParticleGroup) -> None:
-    """Refuse points of materials whose stress follows from their deformation."""
     for solid in hub.solids.values():
         law = solid.material.whole
         follows = not can(elastic_law(law), with_stress) or can(law, ignited)
@@ -315,7 +314,8 @@ class Detonation(Fix):
     Parameters
     ----------
     t
-        Time at which a point is lit: a number or a formula of x, y, z, x0, y0, z0.
+        Time at which a point is lit (distance from the detonator over the detonation speed): a
+        number or a formula of x, y, z, x0, y0, z0.
 
     Example
     -------
@@ -324,7 +324,7 @@ class Detonation(Fix):
 
     Notes
     -----
-    The time is the distance from the detonator over the speed. Other materials are unaffected.
+    Other materials are unaffected.
 
     See Also
     --------
@@ -358,7 +358,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Bodies with a tension that they cannot sustain, in 10 % of their points."""
+    """Return bodies with a tension that they cannot sustain, in 10 % of their points."""
     cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

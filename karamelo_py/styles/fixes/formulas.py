@@ -44,10 +44,8 @@ def per_direction(hub: Hub, name: str, formulas: Sequence, *, all_given: bool = 
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Values (n, d) of a formula per direction, 0 if missing.
-
-    `first()` gives the reference positions for formulas that need them.
-    """
+    """Evaluate a formula per direction, (n, d), 0 if missing; `first()` gives reference
+    positions."""
     asked = any(formula is not None and formula.names & FIRST for formula in formulas)
     x0 = first() if asked else x
     values = np.zeros(x.shape)

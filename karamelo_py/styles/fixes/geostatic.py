@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.forces import refuse_following
 
 
 class GeostaticStress(Fix):
-    """Set the stress of ground under any surface once, before the next step: weight above, and k0.
+    """Set the stress of ground under its weight once, before the next step, below any surface.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ class GeostaticStress(Fix):
 
     Notes
     -----
-    The vertical stress of a point is the weight of the points of the group above it, in columns as
-    wide as the largest point; layers may differ in material and in points per cell. A material with
-    pore_water is full of water up to its highest point in the column: the pressure of the water is
-    hydrostatic below that point, and the stress is the effective stress. Below a
-    level surface the ground is at rest with fix body_force; below a slope it is close to it. The
-    material has to take a stress: see initial_stress.
+    The vertical stress of a point is the weight of the group's points above it, in columns as wide
+    as the largest point; layers may differ in material and in points per cell. A material with
+    pore_water is saturated up to its highest point in the column: the water pressure is hydrostatic
+    below that point, and the stress is the effective stress. With fix body_force, ground with a
+    level surface is at rest, and a slope is close to it. The material must accept a stress: see
+    initial_stress.
 
     See Also
     --------
@@ -80,10 +80,10 @@ class GeostaticStress(Fix):
 
 
 def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Steps (n, d) from the points of one solid to the middles of their boxes.
+    """Return steps (n, d) from the points of one solid to the centres of their boxes.
 
-    Boxes side by side fill the cells; Gauss points, also Karamelo's three per cell, do not lie in
-    their middles. Points that do not lie so stay.
+    Adjacent boxes fill the cells, but Gauss points (and Karamelo's three per cell) are not at their
+    centres. Other points do not move.
     """
     step = np.zeros_like(x)
     for along, length, out in zip(x.T, size.T, step.T, strict=True):
@@ -92,7 +92,7 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
         begins = np.diff(at, prepend=-np.inf) > 1e-6 * long
         line, at, long = np.cumsum(begins) - 1, at[begins], long[begins]
         middle = np.cumsum(long) - long / 2
-        # Gaps in the solid divide it.
+        # A gap divides the solid.
         piece = np.cumsum(np.diff(at - 1.5 * middle, prepend=np.inf) > 0)
         off = np.bincount(piece, at - middle) / np.bincount(piece)
         to = middle + off[piece] - at
@@ -102,7 +102,7 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weight per area above the centres of points that are boxes.
+    """Return the weight per area (n, k) above the centres of points that are boxes.
 
     Parameters
     ----------
@@ -111,10 +111,8 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     weights
         Weights per volume, (n, k).
 
-    Returns
-    -------
-    (n, k). Columns fill the width of the points and are at least as wide as the widest; each box
-    gives its weight to the columns that it overlaps, and takes the mean of their loads.
+    Columns are at least as wide as the widest box. Each box gives its weight to the columns that it
+    overlaps, and takes the mean of their loads.
     """
     flat, half = x[:, :-1], size[:, :-1] / 2
     begin = (flat - half).min(axis=0)
@@ -122,16 +120,16 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     count = np.maximum(width / size[:, :-1].max(axis=0) * (1 + 1e-9), 1).astype(int)
     left, across = (flat - half - begin) / width * count, 2 * half / width * count
     first = np.minimum(left.astype(int), count - 1)
-    inside = np.clip((first + 1 - left) / across, 0, 1)  # part of a box in its first column
+    inside = np.clip((first + 1 - left) / across, 0, 1)  # fraction of a box in its first column
     load = np.zeros_like(weights)
     corners = np.array(list(product((0, 1), repeat=flat.shape[1])), int)
     boxes = np.tile(np.arange(len(x)), len(corners))
     part = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
     columns = np.concatenate([np.minimum(first + c, count - 1) for c in corners])
-    inner = part > 1e-9  # round-off makes no box lie in two columns
+    inner = part > 1e-9  # no second column for round-off
     boxes, part, columns = boxes[inner], part[inner], columns[inner]
     column = np.tile(columns @ np.cumprod([1, *count])[:-1], 3)
-    # The load in a column, from above, changes its slope at the tops and bottoms of boxes.
+    # The load in a column changes its slope at the tops and bottoms of boxes.
     slope = (part * across.prod(axis=1)[boxes])[:, None] * weights[boxes]
     slope = np.concatenate([slope, 0 * slope, -slope])
     z = np.concatenate([(x[:, -1] + k * size[:, -1])[boxes] for k in (0.5, 0, -0.5)])

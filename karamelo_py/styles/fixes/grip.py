@@ -20,7 +20,7 @@ class GripOfTool(Grip):
 
 
 def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
-    """A grip class that no other fix of the scene uses: a point may touch several."""
+    """Return a grip class that no other fix of the scene uses: a point may touch several."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:
@@ -31,7 +31,7 @@ def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
 
 class Gripping(Fix):
     remembers = ("has_touched",)
-    has_touched = False  # until then, the grips of a restart file belong to an earlier fix
+    has_touched = False  # until then, grips in a restart file belong to an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
     mu = 0.0

@@ -27,7 +27,6 @@ class HeatFix(Fix):
         self.formulas = formulas
 
     def _compare(self, T: Expression) -> None:
-        """Warn of a temperature in degrees Celsius among others in kelvin."""
         begins = (solid.T0 for solid in self.hub.solids.values() if solid.T0 is not None)
         warmest = max(begins, default=-inf)
         if T.is_constant and T.constant < COLD and warmest - T.constant > WARM:
@@ -56,11 +55,11 @@ def check_coefficient(h: Expression) -> None:
         raise ScriptError(message, argument="h", expected=expected)
 
 
-MANY = 1_000_000  # points of a solid above which the check is skipped
+MANY = 1_000_000  # points of a solid; larger ones skip the check
 
 
 def hold_node(capacity, T, T_star, flow, value, before, dt, share):
-    """The total is the heat per time needed."""
+    """Set T to the value; the total is the heat per time needed."""
     return T, value, flow, capacity * (value - T_star) / dt
 
 
@@ -101,7 +100,7 @@ class TemperatureNodes(HeatFix):
 
 
 def hold_point(capacity, T, face, supply, value, other, dt):
-    """Whatever the heat flow."""
+    """Set T to the value, whatever the heat flow."""
     return 0.0, supply, value
 
 
@@ -135,7 +134,7 @@ class TemperatureParticles(HeatFix):
 
 
 def heat(capacity, T, face, supply, value, other, dt):
-    """Through one face of the point."""
+    """Supply heat through one face of the point."""
     return 1.0, supply + face * value, T
 
 
@@ -180,9 +179,9 @@ class HeatFluxParticles(FacesOfPoints):
     -----
     A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
     at an edge of the body has two and needs two fixes. In axisymmetry the face is at the radius of
-    the point, slightly inside the surface. The printed area of the group depends on its layer on
-    curved surfaces (0.66 to 1.44 of the surface); edge_heat_flux uses the area of the surface.
-    Publishes the heat per time (in 2D per thickness, in axisymmetry per radian) as ID_s.
+    the point, slightly inside the surface. On curved surfaces the printed area depends on the layer
+    of points (0.66 to 1.44 of the surface); edge_heat_flux uses the exact area. Publishes the heat
+    per time (in 2D per thickness, in axisymmetry per radian) as ID_s.
 
     See Also
     --------
@@ -197,7 +196,7 @@ class HeatFluxParticles(FacesOfPoints):
 
 
 def exchange(capacity, T, face, supply, value, other, dt):
-    """Newton's law of cooling through one face of the point, at its temperature after the step.
+    """Apply Newton's law of cooling through one face, at the point's temperature after the step.
 
     With the temperature before, a large coefficient would cool the point below the fluid.
     """
@@ -234,7 +233,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    order = LAST  # the supply of the other fixes bounds the temperatures for the watch
+    order = LAST  # the other fixes' supply bounds the temperatures for the watch
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

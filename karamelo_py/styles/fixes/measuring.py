@@ -15,18 +15,18 @@ def force_of_nodes(mass, v, v_star, force, value, before, kick, share):
 
 
 def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
-    """Momentum over the time that forces act."""
+    """Return the momentum over the time that forces act."""
     return v, x, mass * v / kick
 
 
-# Quantity that is measured at nodes or points, and when in a step.
+# Quantities at nodes or points, and when they are measured in a step.
 HOOKS = {
     "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
     "force": ("post_update_grid_state", node_hook(force_of_nodes)),
     "momentum_before": ("initial_integrate", point_hook(momentum_rate)),
     "momentum_after": ("final_integrate", point_hook(momentum_rate)),
 }
-# Before all other fixes, whatever their order in the script.
+# These run before all other fixes, whatever their order in the script.
 COME_FIRST = ("internal_force", "momentum_before")
 
 

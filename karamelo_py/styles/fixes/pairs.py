@@ -65,7 +65,7 @@ class PairContact(Gripping):
     def law(self) -> NamedTuple:
         """Tag of :mod:`karamelo_py.points.bodies` for the force between two points.
 
-        Requested in each step: constants of materials may change between runs.
+        Read in each step: constants of materials may change between runs.
         """
         raise NotImplementedError
 
@@ -94,13 +94,14 @@ class PairContact(Gripping):
         self.publish_components(total)
 
     def sent(self, simulation: Any) -> int:
-        """Number of points that may touch others now: one process searches all of them."""
+        """Number of points that may touch others now; one process searches all of them."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Rows of the points of each block that may touch others; None if no solids do.
+        """Rows of the points of each block in the overlap of the solids' boxes; None without
+        overlap.
 
-        Each solid is a box, extended by the contact distance of two points.
+        Boxes are extended by the contact distance of two points.
         """
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
@@ -130,7 +131,7 @@ class PairContact(Gripping):
     def _push(
         self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
     ) -> list[tuple]:
-        """Forces and grips of the points of each process, and the sum of forces on the first."""
+        """Forces and grips of the points of each process, and the sum of forces on rank 0."""
         of_all, d = np.concatenate(tables), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
@@ -182,7 +183,7 @@ class ContactMinimizePenetration(PairContact):
     and yields by mu p before it slides.
 
     dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, as
-    by set_dt, it drops by 1 % of the time.
+    by set_dt, it decreases by 1 % of the elapsed time.
 
     A surface of spheres is rough. The force on a block (two points per cell and direction) is 0.19,
     0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces inclined to the grid lock:
@@ -224,7 +225,7 @@ class ContactMinimizePenetration(PairContact):
 
 
 def plane_modulus(solid: Solid, argument: str) -> float:
-    """E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
+    """Return E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
     law = elastic_law(solid.material.whole)
     G, lam = parameter(law, "G", None), parameter(law, "lam", None)
     if G is None or lam is None or not G > 0:

@@ -13,7 +13,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Give the pressure; publish the mass of water that left per time, known from the last step."""
+    """Return the pressure; publish the mass of water that left per time in the last step."""
     return values[0], flux[-3]
 
 
@@ -32,10 +32,10 @@ class PorePressure(Fix):
 
     Notes
     -----
-    Other surfaces are impermeable. The group has the nodes at the surface; where it settles within
-    a cell (ulmpm), those on both sides. The pressure is no load on the soil: a lake also weighs on
-    its bed, by fix edge_traction. Publishes ID_s, the mass of water per time that left in the step
-    before.
+    Other surfaces are impermeable. The group contains the nodes at the surface, or on both sides of
+    a surface that settles within a cell (ulmpm). The pressure does not load the soil: add the
+    weight of a lake on its bed by fix edge_traction. Publishes ID_s, the mass of water per time
+    that left in the previous step.
 
     See Also
     --------

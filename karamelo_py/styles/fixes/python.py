@@ -22,7 +22,6 @@ from karamelo_py.scene.plugins import misfit
 from karamelo_py.script.errors import FAILURES, ScriptError, nearest
 
 MOMENTS = tuple(STAGES)
-# Types in which a function may store values.
 DATA = (
     *(int, float, complex, str, bytes, bytearray, list, dict, set, tuple),
     *(np.ndarray, np.generic, np.random.Generator, np.random.RandomState),
@@ -30,13 +29,13 @@ DATA = (
 
 
 class PythonFunction:
-    """For signatures: a function of a module, or one passed to the scene from Python."""
+    """Script argument: a function of a module, or one passed to the scene from Python."""
 
     script_kind = "the name of a function: module.function"
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Modules next to the script come first."""
+        """Import the function; modules next to the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -89,15 +88,15 @@ class Python(Fix):
     Changes to them take effect. The return value is published: a number as ID, up to three as ID_x,
     ID_y, ID_z. A call costs some ten microseconds.
 
-    With several processes all points are gathered in each step. ``pull.point_by_point = True``
-    after a function that treats each point or node separately and moves no points: each process
-    then calls it for its local points, in any order. ``points.total(terms)`` sums terms (n,) or (n,
-    k) over all points.
+    With several processes all points are gathered in each step. Set ``pull.point_by_point = True``
+    for a function ``pull`` that treats each point or node separately and moves no points: each
+    process then calls it for its local points, in any order. ``points.total(terms)`` sums terms
+    (n,) or (n, k) over all points.
 
-    Restart files hold values that the function stores between steps, if ``remembers = ("taken",
-    "left")`` names them: variables in the module, or attributes in the class of a callable object,
-    with numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these.
-    The first file warns of other such data that has changed. Defaults of arguments, other objects,
+    Restart files contain values that the function stores between steps if it names them, as in
+    ``remembers = ("taken", "left")``: in the module, or in the class of a callable object. They are
+    numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. The
+    first file warns of other such data that has changed. Defaults of arguments, other objects,
     other modules, and ``np.random`` itself are not checked.
 
     Example
@@ -155,7 +154,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of other changed values: files lack them."""
+        """Warn once of changed values that restart files lack."""
         keeper = self.keeper
         forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
@@ -207,9 +206,9 @@ class Python(Fix):
 
 
 class Keeper:
-    """The object or module of a function, with the values that it needs between steps.
+    """The object or module of a function, with the values that it stores between steps.
 
-    `names` are the names in ``remembers``; `place` is where this word belongs.
+    `names` are the names in ``remembers``; `place` says where this word belongs.
     """
 
     def __init__(self, function: Callable):
@@ -230,7 +229,7 @@ class Keeper:
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:
-        """Changed since the last call, and not remembered."""
+        """Names of values that have changed since the last call and are not remembered."""
         before, self.seen = self.seen, self._look()
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 
@@ -238,7 +237,7 @@ class Keeper:
         data = dict(self.data)
         if inspect.isfunction(self.function):
             seen = inspect.getclosurevars(self.function)
-            # A notebook has many other names.
+            # A notebook defines many unrelated names.
             module = sys.modules.get(self.function.__module__)
             notebook = self.function.__module__ == "__main__" or module is None
             data = (dict(seen.globals) if notebook else data) | dict(seen.nonlocals)

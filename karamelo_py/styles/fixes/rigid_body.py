@@ -27,7 +27,7 @@ NOT_ROUND = 1e-9  # relative tolerance of moments of inertia
 
 
 class Components:
-    """Annotation: a formula, or several in parentheses; NULL leaves a component free."""
+    """Script argument: a formula, or several in parentheses; NULL leaves a component free."""
 
     script_kind = "a formula, or several in parentheses: (a, b)"
 
@@ -55,26 +55,22 @@ class RigidBody(Fix):
     ----------
     solid
         The solid, of material rigid.
-    velocity
-        Initial velocity of its centre: one number per dimension, in parentheses.
-    spin
-        Initial angular velocity: one number in 2D, three in 3D.
+    velocity, spin
+        Initial velocity of its centre (one number per dimension) and angular velocity (one number
+        in 2D, three in 3D).
     gravity
         Acceleration, one formula per dimension.
-    force
-        Further force on its centre: formulas of time and published values.
-    torque
-        Further torque about its centre: one formula in 2D, three in 3D.
-    motion
-        Prescribed velocity of its centre, one formula per dimension; NULL leaves one free.
-    turning
-        Prescribed angular velocity: one formula in 2D, three in 3D.
+    force, torque
+        Further force on its centre, and torque about it: formulas of time and published values.
+    motion, turning
+        Prescribed velocity of its centre and angular velocity: formulas; NULL leaves a component of
+        the velocity free.
     fixed
         Directions in which it does not move: of x, y, z, and rx, ry, rz for rotation.
     pivot
         A position that the body rotates about, as on a hinge or a ball joint; then its x, y, z.
     mass
-        Mass; default: of its points. In axisymmetry, masses and forces are per radian.
+        Default: the mass of its points. In axisymmetry, masses and forces are per radian.
     inertia
         Moment of inertia about its centre in 2D; in 3D about the axes x, y, z through it at the
         start. Default: of its points, as squares or cubes, in proportion to the mass.
@@ -88,19 +84,19 @@ class RigidBody(Fix):
     -----
     Publishes its centre ID_x, ID_y, ID_z; velocity ID_vx, ...; rotation ID_rx, ...; angular
     velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ... In
-    2D x, y, vx, vy, rz, wz, fx, fy, tz. In 2D the rotation may exceed 2 PI; in 3D it is a vector
-    along the axis, at most PI long.
+    2D: x, y, vx, vy, rz, wz, fx, fy, tz; the rotation may exceed 2 PI. In 3D the rotation is a
+    vector along the axis, at most PI long.
 
-    In ulmpm/contacts it and other solids push each other on the grid (with the friction of fix
-    contact/friction); otherwise by fix contact/rigid_body. Its velocity at the end of the step is
-    found together with all impulses: it may be far lighter than what it touches. Momentum is
-    conserved to round-off. As for points, velocities belong to the middle of a step, unless
-    scheme(..., start=half).
+    In ulmpm/contacts the body and other solids push each other on the grid (with the friction of
+    fix contact/friction); in other methods use fix contact/rigid_body. Its velocity at the end of
+    the step is solved together with all impulses, so it may be far lighter than what it touches.
+    Momentum is conserved to round-off. As for points, velocities belong to the middle of a step,
+    unless scheme(..., start=half).
 
-    Formulas may contain its own values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the same
-    ID replaces this one, and the body retains its velocity: to release it, repeat the line without
-    fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through each other, rigid
-    solids and nodes that a fix holds.
+    Formulas may contain its published values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the
+    same ID replaces this one, and the body retains its velocity: to release it, repeat the line
+    without fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through each
+    other, rigid solids and held nodes.
 
     See Also
     --------
@@ -236,7 +232,7 @@ class RigidBody(Fix):
             self.hub.values.array[slot] = self.state[column]
 
     def rigid_positions(self) -> np.ndarray:
-        """Positions (n, d) of its points, from its state."""
+        """Positions (n, d) of its points."""
         d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
         arm[:, :d] = self.body.x0
         arm -= self.constants[kernel.START : kernel.START + 3]
@@ -254,7 +250,7 @@ class RigidBody(Fix):
             )
 
     def slots(self) -> np.ndarray:
-        """(k, 2): slots of its values, and their columns in the state."""
+        """Slots of its values and their columns in the state, (k, 2)."""
         columns = dict(zip(("", "r", "v", "w", "f", "t"), COLUMNS, strict=True))
         names = [(name, columns[name[:-1]] + "xyz".index(name[-1])) for name in self.published]
         return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])
@@ -266,7 +262,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, given: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """By axis, None if missing; of rotation if `ways` begin at 3."""
+        """Return formulas by axis, None if missing; `ways` from 3 on are rotations."""
         items: list[Expression | None] = [None] * size
         if given is None:
             return items
@@ -306,7 +302,7 @@ class RigidBody(Fix):
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
-        """Hold a position (3,) of the body; [] if it moves freely."""
+        """Return the pivot (3,) of the body and fix its directions; [] if it moves freely."""
         if pivot is None:
             return []
         if max(self.ways) < 3:
@@ -395,7 +391,7 @@ class RigidBody(Fix):
 
 
 def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """By columns; x, y, z if principal."""
+    """Principal moments and axes (by columns); x, y, z if principal."""
     off = np.abs(tensor - np.diag(np.diag(tensor))).max()
     if off <= NOT_ROUND * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)
@@ -430,9 +426,9 @@ class ContactRigidBody(Fix):
 
     For ulmpm and tlmpm. A body rolls on its radius plus half a point: with a radius of 3 cells, its
     acceleration on a slope is 3.6 % too large (2 % in 3D). Use ulmpm/contacts for liquids, and for
-    bodies that slide or are held by friction. The acceleration of a sliding box is 0.04 % too large
-    with ulmpm/contacts and 5 % too small with this fix, and a box that friction should hold creeps
-    by 0.04 cells in 500 steps.
+    bodies that slide or are held by friction: a sliding box accelerates 0.04 % too much there and 5
+    % too little with this fix, and a box that friction should hold creeps by 0.04 cells in 500
+    steps.
 
     See Also
     --------
@@ -480,7 +476,6 @@ class ContactRigidBody(Fix):
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
     def refuse(self, number: int) -> int:
-        """Refuse a point, by its number from 0, that has no way out."""
         raise ScriptError(
             f"{named(self.hub, number)} is so deep in the body '{self.body.id}' that no way out of "
             "it is the shortest",
@@ -504,7 +499,6 @@ def surfaces_of(body: RigidBody) -> list[ContactRigidBody]:
 
 
 def _touches_nothing(fix: Any, scene: Any) -> bool:
-    """Return True if other solids on its grid do not notice a body."""
     method, solids = scene.hub.update.method, scene.hub.solids.values()
     soft = not all(solid.rigid for solid in solids)
     return soft and not (surfaces_of(fix) or method.fields_per_solid or method.own_grids)

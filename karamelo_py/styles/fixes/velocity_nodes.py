@@ -16,10 +16,7 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_directio
 
 
 def prescribe(mass, v, v_star, force, value, before, kick, share):
-    """Set v to the value one step earlier, as at a symmetry plane.
-
-    The total is the reaction.
-    """
+    """Set v to the value one step earlier, as at a symmetry plane; the total is the reaction."""
     return before, value, force, mass * (value - v_star) / kick
 
 
@@ -33,30 +30,29 @@ def prescribe_mapped(mass, v, v_star, force, value, before, kick, share):
 
 
 def prescribe_at_most(mass, v, v_star, force, value, before, kick, share):
-    """The total is the reaction, which pushes backwards."""
+    """Bound v* from above; the total is the reaction, which pushes backwards."""
     allowed = min(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / kick
 
 
 def prescribe_mapped_at_most(mass, v, v_star, force, value, before, kick, share):
-    """Otherwise stress would do spurious work: a rebound would gain half of the energy."""
+    """Bound v, too: otherwise stress does spurious work, and a rebound gains half of the energy."""
     allowed = value if v_star == value else min(v, value)
     return allowed, allowed, force, 0.0
 
 
 def prescribe_at_least(mass, v, v_star, force, value, before, kick, share):
-    """The total is the reaction, which pushes forwards."""
+    """Bound v* from below; the total is the reaction, which pushes forwards."""
     allowed = max(v_star, value)
     return v, allowed, force, mass * (allowed - v_star) / kick
 
 
 def prescribe_mapped_at_least(mass, v, v_star, force, value, before, kick, share):
-    """See `prescribe_mapped_at_most`."""
     allowed = value if v_star == value else max(v, value)
     return allowed, allowed, force, 0.0
 
 
-# By bound: after the momentum update, and after velocities are mapped again.
+# By bound: hooks after the momentum update, and after velocities are mapped again.
 HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
@@ -69,7 +65,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """For signatures: a number or a formula, after the word leq or geq if it is a `bound`."""
+    """Script argument: a number or a formula, after the word leq or geq if it is a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
@@ -108,11 +104,11 @@ class VelocityNodes(Fix):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z: the force that holds the nodes, with friction. Frictional work heats
-    points with a temperature; the wall takes no heat.
+    Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work
+    heats points with a temperature; the wall takes no heat.
 
-    Of several such fixes on a node in one direction, the last decides: it has the node's whole
-    reaction, and only its friction acts. A bound that is not reached exerts no force.
+    Of several such fixes on a node in one direction, the last decides: it publishes the node's
+    whole reaction, and only its friction acts. A bound that is not reached exerts no force.
 
     A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
     in cells next to faces whose nodes are all held or bounded, so a group should extend to the last
@@ -148,8 +144,8 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all its directions drags material along; others are clamps, rollers
-        # or planes of symmetry.
+        # A wall that moves in all directions drags material along; others are clamps, rollers or
+        # symmetry planes.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1

@@ -15,13 +15,12 @@ from karamelo_py.script.errors import plural
 from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
 
-SAMPLE = 1000  # points at which formulas are compared, about
-ALIKE = 1e-6  # of a velocity, or of the wave speed: smaller differences are ignored
+SAMPLE = 1000
+ALIKE = 1e-6  # of a velocity, or of the wave speed; smaller differences are ignored
 DIFFERENT = " how they move, that one how they deform"
 
 
 def start(mass, v, x_old, x, value, before, dt, kick):
-    """Start the step from the value one step earlier."""
     return before, x, 0.0
 
 
@@ -58,8 +57,8 @@ class VelocityParticles(VelocityOfPoints):
     warning before the first step.
 
     Use two cells of points or more: nodes that other points reach move less, so the outer cell of a
-    grip deforms with the body. The rest of a solid slips past a grip of one cell when squeezed by
-    20 % in ulmpm (linear, quadratic-spline, cubic-spline).
+    grip deforms with the body. In ulmpm (linear, quadratic-spline, cubic-spline), the rest of a
+    solid squeezed by 20 % slips past a grip of one cell.
 
     See Also
     --------
@@ -117,7 +116,7 @@ class InitialVelocityParticles(VelocityOfPoints):
 def gradient(
     evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
+    """Differentiate (n, d) by x (`moves`) or x0, by central differences over `step`.
 
     At the reference position, x and x0 are the same coordinate.
     """
@@ -155,7 +154,6 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
     for other in fixes if fix.leads_points else ():
         axes = unlike(other, fix) if other.prescribes_velocity else []
         caught = _within(simulation, other, fix) if axes else ()
-        # A tool that passes a wall is no conflict.
         if 2 * len(caught) > len(simulation.points.members(fix.group)):
             yield _said(other, axes, caught)
 

@@ -29,7 +29,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """The yield surface uses part of the averaged pressure (F-bar)."""
+    """Return True if the yield surface uses part of the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -58,9 +58,9 @@ class Method:
     thermal
         Whether heat flows.
     place
-        Place of the command in the script, for messages.
+        Location of the command in the script, for messages.
     frame
-        Weights belong to present or reference positions.
+        Whether weights belong to present or reference positions.
     own_grids
         Whether each solid has a separate grid over its bounding box, with its cell size.
     fields_per_solid
@@ -80,7 +80,7 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """Equally spaced in a cell, so that their domains tile it."""
+        """Whether the basis needs points equally spaced in a cell, whose domains tile it."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
@@ -137,7 +137,7 @@ class Method:
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """(n, s), as the basis stores them."""
+        """Domain shapes (n, s), as the basis stores them."""
         basis, half = type(self.basis), solid.half_size
         n, d = half.shape
         unit = np.eye(d)
@@ -164,7 +164,7 @@ class Method:
         """Refuse incompatible options; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         if scheme.traits.implicit:
-            return  # no part for these transfers
+            return  # implicit schemes do not use these transfers
         unsteady = (
             transfer.traits.inverts_spread and not basis.traits.steady_moment and self.frame.moves
         )

@@ -26,7 +26,7 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """Glued solids have the same."""
+    """Velocity field of each solid; glued solids have the same one."""
     numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -42,7 +42,7 @@ def flows(law: NamedTuple) -> bool:
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
-    """(F, F): fraction of frictional heat that the first of two solids takes.
+    """Fraction (F, F) of frictional heat that the first of two solids takes.
 
     With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces in contact (Carslaw &
     Jaeger 1959, section 2.15); otherwise half each, none without a temperature.
@@ -208,7 +208,7 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """usf and usavg read them at the start of a step."""
+        """Views of `touched`, which usf and usavg read at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:

@@ -1,4 +1,4 @@
-"""Bases of walls and rigid tools, which push points: planes, balls, their force."""
+"""Bases of walls and rigid tools that push points: planes, balls, their force."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -60,7 +60,7 @@ class ToolFix(PointForces):
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
     def face(self, points: PointsView) -> np.ndarray:
-        """Areas (n,) of a face of these cubes, per radian in axisymmetry."""
+        """Face areas (n,) of these cubes, per radian in axisymmetry."""
         domain = self.hub.domain
         return self.side(points) ** (domain.dimension - 1) * domain.depth(points.position)
 
@@ -102,7 +102,7 @@ class PlaneTool(ToolFix):
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Present depth (n,) of points behind the plane, and its normal (d,)."""
+        """Present depth (n,) of points past the plane, and its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_place(points, self.origin) @ normal), normal
 

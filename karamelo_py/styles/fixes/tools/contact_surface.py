@@ -54,14 +54,14 @@ class ContactSurface(StiffTool):
     the slip distance per step: a load that it can hold stays at rest, and yields by mu p before it
     slides. dt is as in contact/minimize_penetration.
 
-    The force acts in the direction in which the depth decreases fastest. A point deeper than a
+    The force acts in the direction of the steepest decrease of the depth. A point deeper than a
     cell, or in the middle of a thin region, ends the run.
 
     A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.56 in tlmpm and 1.57 in
-    ulmpm (exact 1.541; points=cut). Its energy is balanced to 0.3 %. It sinks in by ten times the
+    ulmpm (exact 1.541; points=cut), with an energy balance to 0.3 %. It sinks in by ten times the
     force on a point divided by m / dt^2, here 5 % of a cell. A belt over half a bollard with mu =
-    0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for one whose
-    thickness is 10 % of the radius, as here).
+    0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for this one, as
+    thick as 10 % of the radius).
 
     See Also
     --------
@@ -94,7 +94,7 @@ class ContactSurface(StiffTool):
             self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Its displacement (d,) so far, and mean velocity (d,) in the next step."""
+        """Displacement (d,) of the region so far, and its mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):
@@ -136,7 +136,7 @@ class ContactSurface(StiffTool):
         )
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """For a region without a kernel."""
+        """Forces for a region without a kernel."""
         way, velocity = self.moved(points.dt)
         x = points.position.astype(float) - way
         within, aside = self.depth(x), ASIDE * self.hub.domain.h

@@ -67,7 +67,6 @@ class CuttingTool(ToolFix):
         turn = a[0] * b[1] - a[1] * b[0]
         if not abs(turn) > 0:
             raise ScriptError("tip, A and B lie in one line", expected="two faces with an angle")
-        # Away from the other face.
         normals = np.array([[a[1], -a[0]], [-b[1], b[0]]]) * np.sign(turn)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 

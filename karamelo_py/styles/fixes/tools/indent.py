@@ -15,7 +15,7 @@ from karamelo_py.styles.fixes.tools.base import BallTool
 
 
 class Radius(Expression):
-    """For signatures: a radius above 0, which came after the centre in Karamelo in 2020."""
+    """Script argument: a radius above 0, which came after the centre in Karamelo in 2020."""
 
     script_kind = "a number or a formula above 0"
 

@@ -67,7 +67,8 @@ class MeldTool(ToolFix):
         self.across = [k for k in range(3) if k != self.along]
 
     def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
-        """Heights (n,) of points above the end, and positions (n, 2): fixed and rotating axes."""
+        """Heights (n,) of points above the end, positions (n, 2) along fixed and rotating axes,
+        rotation."""
         c1, c2, theta, lo = at
         x = points.position.astype(float)
         q = x[:, self.across] - np.array([c1, c2])

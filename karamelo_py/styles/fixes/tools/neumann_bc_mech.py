@@ -18,8 +18,8 @@ class NeumannBcMech(ToolFix):
     group
         Group of points: a single layer along the surface.
     traction
-        tx, ty, tz, one per dimension of the domain: force per area. Numbers or formulas of x, y, z,
-        x0, y0, z0, time and published values. NULL leaves a component unchanged.
+        tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
+        time and published values. NULL leaves a component unchanged.
 
     Example
     -------

@@ -30,11 +30,12 @@ class StiffTool(Gripping, ToolFix):
         led: Any = 0.0,
         fraction: float = 1.0,
     ) -> np.ndarray:
-        """Forces (n, d) that move points by `push` (n,) along `normal` in a step: m push / dt^2.
+        """Return forces (n, d) that move points by `push` (n,) along `normal` in a step: m push /
+        dt^2.
 
         Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops the slip on a
-        tool of this `velocity`, and reverses `fraction` of a point's slip distance: of
-        the positions (n, d) `seen`, minus the displacement `led` by the tool.
+        tool of this `velocity`, and reverses `fraction` of the slip distance: of the positions (n,
+        d) `seen`, minus the displacement `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
         load = stiffness * np.maximum(push, 0)
