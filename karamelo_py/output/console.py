@@ -14,8 +14,8 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms: lines faster than QUICK (seconds) for more than
-# BURST lines are written in bundles every LINES seconds.
+# Rich redraws the bar after every line, in 0.25 ms: lines faster than QUICK (seconds) are bundled
+# for LINES seconds after BURST lines.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
@@ -114,7 +114,7 @@ class Console:
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
-            # Redrawn by `progress`: a refresh thread would wait for compiled loops.
+            # `progress` redraws it: a refresh thread would wait for compiled loops.
             self._progress = Progress(
                 BarColumn(bar_width=30), TextColumn("{task.description}"),
                 console=self._rich, auto_refresh=False, transient=True,
@@ -146,7 +146,6 @@ class Console:
             self.say(f"# {text}")
 
     def end_run(self) -> None:
-        """Remove the progress bar; safe at any time."""
         self._running = False
         self._release()
         if self._progress is not None:
@@ -181,8 +180,8 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run still finishes, and flushing at
-            # exit must not fail.
+            # The reader (head, less) has closed the pipe; the run continues, and flushing at exit
+            # must not fail.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
@@ -192,14 +191,14 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # Escape what the stream's encoding (a Windows pipe) lacks.
+        # The stream's encoding (a Windows pipe) may lack characters.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()
 
 
 def show(value: object) -> str:
-    """1 234 567, 0.333333."""
+    """Format a value: 1 234 567, 0.333333."""
     if isinstance(value, bool) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -210,7 +209,7 @@ def show(value: object) -> str:
 
 
 def duration(seconds: float) -> str:
-    """42 s, 3 min 20 s, 2 h 5 min."""
+    """Format a duration: 42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -61,7 +61,7 @@ class Fields(PointTable):
 
     @property
     def _rows(self) -> Rows:
-        """Clears the cache after a step."""
+        """Clear the cache after a step."""
         simulation = self.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
@@ -77,13 +77,13 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: PointGroup) -> np.ndarray:
-        """Without deleted points: 0-based ids."""
+        """Return the 0-based ids of existing points."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: PointGroup | None = None) -> float:
-        """Of a quantity of `SUMMED` over a group or all points, exact."""
+        """Sum a quantity of `SUMMED` exactly over a group or all points."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -104,7 +104,6 @@ class Fields(PointTable):
                     yield block, rows
 
     def some(self, group: PointGroup | None) -> Iterator[PointTable]:
-        """A group's local points in pieces, then an empty table."""
         for block, rows in self.rows_of(group):
             yield self._some(block, rows)
         yield self._some(self.setup.blocks[0], np.empty(0, np.int64))
@@ -114,7 +113,7 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, part: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Exact sums of terms over the points of a part's group.
+        """Sum terms exactly over the points of a part's group.
 
         The method `name` of `part`, called with tables of some points and `arguments`, returns rows
         of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
@@ -138,7 +137,7 @@ class Fields(PointTable):
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
-        """Over all processes, of terms (n,) or (n, k), rounded once."""
+        """Sum terms (n,) or (n, k) over all processes, rounded once."""
         columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
         limbs = np.zeros((len(columns), LIMBS), np.int64)
         for k, column in enumerate(columns):
@@ -155,7 +154,7 @@ class Fields(PointTable):
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Largest value, and the first point that has it."""
+        """Return the largest value and the first point that has it."""
 
         def of_rank() -> tuple[float, int]:
             best = -inf, 0
@@ -170,7 +169,7 @@ class Fields(PointTable):
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """All points in pieces; `to_first`: to rank 0 only."""
+        """Yield all points in pieces; with `to_first`, to rank 0 only."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
         ordered = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
@@ -199,7 +198,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """For `particle`, then groups and solids (1 for their points, else 0)."""
+        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -207,7 +206,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """A dump or compute uses ``epdot``, which points then store."""
+        """True if a dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -235,7 +234,7 @@ class Fields(PointTable):
         return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
-        """(n,) of all nodes; nodes without mass are at rest."""
+        """A column (n,) of all nodes; nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
 
 
@@ -283,7 +282,6 @@ def _born_with(_: Setup, block: Block) -> np.ndarray | None:
     return (block.points.mass * of_eos[block.points.material]).astype(float)
 
 
-# Energies (n,) of a block's points; None if the law has none.
 SUMMED = {
     "mass": lambda s, block: block.points.mass.astype(float),
     "kinetic": _kinetic,
@@ -295,7 +293,7 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """Annotation: formula of dump columns, groups and solids (1 or 0), time and values."""
+    """Script argument: a formula of dump columns, groups and solids (1 or 0), time and values."""
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
     MOST = 6
@@ -335,12 +333,11 @@ class ColumnFormula:
         return self.formula.evaluate_columns(self.hub.values, columns)
 
     def holds(self, points: PointTable) -> np.ndarray:
-        """(n,) bool: nonzero, at each existing point."""
         return self.of(points) != 0
 
 
 class ShownColumn(ColumnFormula):
-    """Annotation: a dump particle column, or a formula of them."""
+    """Script argument: a column of dump particle, or a formula of them."""
 
     script_kind = "a column of dump particle, or a formula of columns, such as sqrt(vx^2 + vy^2)"
 
@@ -351,7 +348,6 @@ class ShownColumn(ColumnFormula):
 
 
 def check_columns(columns: Sequence[str], names: Sequence[str], *, first: int) -> None:
-    """Refuse unknown names; `first` is the argument index of the first."""
     for index, name in enumerate(columns):
         if name not in names:
             raise unknown_column(f"unknown column '{name}'", name, names, argument=first + index)

@@ -1,4 +1,4 @@
-"""Files written completely or not at all, and locks; pictures and movies."""
+"""Files written completely or not at all; locks; pictures and movies."""
 
 import errno
 import json
@@ -32,7 +32,6 @@ def discarded() -> Iterator[None]:
 
 
 def folder_of_discarded() -> Path | None:
-    """None if files are kept."""
     return _DISCARDED.get()
 
 
@@ -54,13 +53,12 @@ def whole(path: Path) -> Iterator[BinaryIO]:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a text; on failure the file is unchanged."""
     with whole(path) as file:
         file.write(text.encode())
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Empty if the file is missing or incomplete."""
+    """Return the content, empty if the file is missing or incomplete."""
     with suppress(OSError, ValueError):
         return json.loads(path.read_text(encoding="utf-8"))
     return {}
@@ -68,7 +66,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open at byte `start` (0: new); an error truncates it to `start`, plus `tail`."""
+    """Open at byte `start` (0: new); an error truncates the file to `start`, plus `tail`."""
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
@@ -83,7 +81,6 @@ def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
 
 
 def picture_format(path: Path) -> str:
-    """png, pdf or svg, by file name."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in FORMATS:
         raise ScriptError(
@@ -120,7 +117,6 @@ def reported(path: Path, kind: str = "") -> Iterator[None]:
 
 
 def movie_format(path: Path) -> str:
-    """gif, or mp4 if ffmpeg is available, by file name."""
     ending = path.suffix.lower().lstrip(".")
     if ending not in ("gif", "mp4") or "*" in path.name:
         raise ScriptError(
@@ -139,8 +135,6 @@ def movie_format(path: Path) -> str:
 
 
 class Frames:
-    """PNG frames of a movie with `fps` frames per second."""
-
     remembers = ("_frames",)
 
     def __init__(self, fps: float):
@@ -201,7 +195,7 @@ _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDi
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock it, if the system can; None if another program has locked it."""
+    """Lock a path, if the system can; None if another program has locked it."""
     try:
         import fcntl
 

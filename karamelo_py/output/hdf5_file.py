@@ -16,7 +16,7 @@ from typing import Any
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, addresses: 44 bytes
-_NEW = (2, 3)  # with such a header
+_NEW = (2, 3)  # versions with such a header
 _MASK = 0xFFFFFFFF
 
 
@@ -30,8 +30,6 @@ def reading(path: Path) -> Iterator[Any]:
 
 
 class _Closed(io.RawIOBase):
-    """A raw file that appears closed at its present length."""
-
     def __init__(self, raw: io.RawIOBase):
         self._raw = raw
         self._size = raw.seek(0, os.SEEK_END)
@@ -63,7 +61,7 @@ class _Closed(io.RawIOBase):
 
 def _closed(head: bytes, size: int) -> bytes:
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
-        return head  # left to HDF5
+        return head  # HDF5 reports the error
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(
         head
     )

@@ -38,7 +38,7 @@ class Log(Rhythmic):
         self._file: TextIO | None = None
         self._claims: list[Claim] = []
         self._is_kept = True
-        # Headings and numbers of each row, if a program wants them.
+        # Headings and numbers of each row, for a program that reads them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
         self._end = 0
@@ -49,7 +49,7 @@ class Log(Rhythmic):
         return self.hub.folder / self.file
 
     def begin(self) -> None:
-        """Write the header: to a new file, and always to the terminal."""
+        """Write the header to a new file, and always to the terminal."""
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
         headings = [column.heading for column in self.columns]
@@ -79,7 +79,7 @@ class Log(Rhythmic):
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Drop rows after the restored state."""
+        """Delete rows after the restored state."""
         if self._file is not None and self._is_kept:
             self._file.truncate(self._end)
 

@@ -28,7 +28,6 @@ class NodeTable(NamedTuple):
     loaded: dict[str, int]  # nodes with mass under each force fix, by ID
 
     def node(self, name: str) -> np.ndarray:
-        """A column (n,)."""
         if name == "T" and self.hub.update.thermal:
             mass = self.arrays["heat/sums"][:, MASS]
             return np.where(mass > 0, self.arrays["heat/velocity"][:, 0], 0.0)
@@ -42,7 +41,6 @@ class NodeTable(NamedTuple):
         return np.zeros(len(self.ids))
 
     def positions(self) -> np.ndarray:
-        """(n, 3)."""
         return places_of(self.hub, self.ids)
 
 
@@ -61,7 +59,7 @@ def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
 
 
 def mask(nodes: NodeTable) -> np.ndarray:
-    """Karamelo's bits: 1 for all nodes, 2 for the first group, 4 for the second, ..."""
+    """Return Karamelo's bits: 1 for all nodes, 2 for the first group, 4 for the second, ..."""
     bits = np.ones(len(nodes.ids))
     for k, group in enumerate(nodes.hub.groups.values(), 1):
         if group.kind == "nodes":
@@ -75,7 +73,7 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 
 
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Along one axis.
+    """Return the kind of each node along one axis.
 
     Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
     Bernstein: 1 in the middle of a cell. Else 0.
@@ -95,7 +93,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Of fixes on nodes, and of fixes on points, transferred by the basis."""
+    """Loads of fixes on nodes, and of fixes on points, transferred by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -126,14 +124,14 @@ def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.nda
 
 
 def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
-    """``*`` in the name becomes the direction."""
+    """Columns of a vector; ``*`` in the name becomes the axis."""
     return {
         name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
         for k, axis in enumerate(AXES)
     }
 
 
-# None: 0 in scenes without it.
+# None: the column is 0 in scenes without it.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
@@ -167,7 +165,6 @@ def _force(axis: int, _: object, block: Block) -> np.ndarray | None:
     return None if force is None or axis >= len(force) else force[axis]
 
 
-# Values (n,) of a block's points, or None.
 BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
     "vol": _volume,
     "rigid": lambda simulation, block: (

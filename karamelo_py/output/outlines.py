@@ -13,7 +13,7 @@ FINE = 300  # steps along the longest side of a tool's outline
 # sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines between faces
-# Points that measure spacing (least, most), and distances per batch.
+# Least and most points that measure spacing, and distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
@@ -70,7 +70,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """With linear weights."""
+    """Sums at nodes of `at` (in cells), with linear weights."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -93,7 +93,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) between corners (2,), with `fine` steps on the long side."""
+    """Lines (m, 2) of zero depth between corners (2,), with `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -127,7 +127,7 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Tight bounds between corners (3,); None without a surface."""
+    """Depths on a lattice tightly around the surface between corners (3,); None without one."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -147,7 +147,6 @@ def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
-    """Ends by bisection; empty without a surface."""
     axes, crossed = lattice.axes, np.flatnonzero(_crossed(lattice.depths, axis))
     ends = []
     for k, beyond in ((crossed[0], -1), (crossed[-1], 1)) if len(crossed) else ():

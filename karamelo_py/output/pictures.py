@@ -93,7 +93,7 @@ class DrawnPoints(Artist):
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # rasterised in .pdf and .svg, too: viewers cannot show so many circles
+        if many:  # rasterised in .pdf and .svg, too: viewers cannot show as many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.place(self.rows[:, first : first + MARKS])
@@ -121,7 +121,6 @@ class Picture:
         self.axes = self.figure.add_subplot()
         self.limits: tuple[float, float] | None = None
         self.beyond = (False, False)
-        # Axis with labels that follow the limits.
         self.scale: Any = None
         self._laid_out = False
         self._widest = 0.0
@@ -146,7 +145,7 @@ class Picture:
         """Mark ends of the colour bar with values beyond."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """In a unit that suits its numbers; without a unit, with a power of 1000."""
+        """Label lengths in a unit that suits the numbers; without a unit, with a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -259,7 +258,7 @@ class Picture:
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Room for the widest labels: nothing moves between pictures."""
+        """Reserve room for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         for _ in range(2):  # the aspect ratio moves the axes
@@ -279,7 +278,7 @@ class Picture:
         self._laid_out = True
 
     def _make_room_at_left(self) -> None:
-        """If the label of y would lie outside."""
+        """Move the axes if the label of y would lie outside."""
         label = self.axes.yaxis.label
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
@@ -289,14 +288,13 @@ class Picture:
         self.figure.draw_without_rendering()
 
     def _points_per_unit(self) -> float:
-        """Points (1/72 inch) on paper per unit of x."""
         box = self.axes.get_position()
         lo, hi = self.axes.get_xlim()
         return box.width * self.figure.get_figwidth() * 72 / (hi - lo)
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """To the finite values, rounded outwards to 2^k / 8 to change rarely."""
+    """Limits grown to the finite values, rounded outwards to 2^k / 8 to change rarely."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -312,7 +310,6 @@ def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float
 
 
 def within(values: np.ndarray, fraction: float) -> np.ndarray:
-    """Finite values, or their quantiles `fraction` and 1 - `fraction`."""
     finite = values[np.isfinite(values)]
     return np.quantile(finite, [fraction, 1 - fraction]) if fraction and len(finite) else finite
 
@@ -406,7 +403,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # As large as its material, at least this: more for few points.
+        # At least this size: more for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -454,7 +451,7 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """Four edges; ticks at the lowest one, for z at the leftmost."""
+        """Draw four edges; ticks at the lowest one, for z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):
@@ -505,7 +502,7 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Points that are not completely hidden: the surface of a large body."""
+        """Mask of points that are not completely hidden: the surface of a large body."""
         # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5

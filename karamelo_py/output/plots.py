@@ -16,8 +16,6 @@ from karamelo_py.script.errors import Place
 
 @dataclass(eq=False)
 class PlottedCurve(Rhythmic):
-    """`y` against `x`; `side` left or right, `scale` linear or log, `label` of the y axis."""
-
     remembers = ("points",)
 
     every: int | ByTime
@@ -97,7 +95,7 @@ def _over_one_axis(
 
 
 def blank_figure(width: float, height: float) -> Any:
-    # 0.3 s, only for scenes with plots.
+    # takes 0.3 s
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -107,7 +105,7 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """`lead` is omitted if 1."""
+    """Format lead x 10^exponent; `lead` is omitted if 1."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
@@ -124,7 +122,6 @@ def _parts(a: float) -> tuple[str, int]:
 
 
 def real_ticks(axis: Any) -> None:
-    """Label ticks with full numbers, without common factor or offset."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     class WholeNumbers(ScalarFormatter):
@@ -144,7 +141,6 @@ def real_ticks(axis: Any) -> None:
 
 
 def tidy(axes: Any) -> None:
-    """A light grid, no frame at the far sides, full numbers at the ticks."""
     real_ticks(axes.xaxis)
     real_ticks(axes.yaxis)
     axes.grid(True, color="0.9", linewidth=0.7)

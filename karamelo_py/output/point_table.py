@@ -64,7 +64,7 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Zero for deleted points."""
+        """Gather a field; zero for deleted points."""
         local = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -79,7 +79,8 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """(n, components) or None; initial values where laws lack it."""
+        """A declared field (n, components), initial where laws lack it; None if no block stores
+        it."""
         arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -88,7 +89,7 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """(n, *columns) by ``of(laws)(matter, rows)``; 0 if it is None."""
+        """Values (n, *columns) of ``of(laws)(matter, rows)``; 0 if it is None."""
         local, s = [], self.s
         for part in self.parts:
             points = known_to_laws(part.points)
@@ -101,7 +102,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """In order: arrays (copies; 0 for deleted points) and columns."""
+    """Arrays (copies; 0 for deleted points) and columns of points in order."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -116,12 +117,12 @@ class PointTable:
 
     @property
     def numbers(self) -> np.ndarray:
-        """(n,) from 0."""
+        """Numbers (n,) from 0."""
         return self._rows.ids
 
     @property
     def ids(self) -> np.ndarray:
-        """(n,) from 1, as in dumps."""
+        """Ids (n,) from 1, as in dumps."""
         return self.numbers + 1
 
     @property
@@ -130,43 +131,42 @@ class PointTable:
 
     @property
     def present(self) -> np.ndarray:
-        """(n,) False for deleted points."""
+        """Mask (n,), False for deleted points."""
         return self._rows.present
 
     @property
     def position(self) -> np.ndarray:
-        """(n, d)."""
+        """Positions (n, d)."""
         return self._cached("x", lambda rows: rows.take(partial(_place, rows.s)))
 
     @property
     def velocity(self) -> np.ndarray:
-        """(n, d)."""
+        """Velocities (n, d)."""
         return self._cached("v", lambda rows: rows.take(partial(shown_velocity, rows.s)))
 
     @property
     def mass(self) -> np.ndarray:
-        """(n,)."""
         return self._cached("mass", lambda rows: rows.take(lambda points: points.mass))
 
     @property
     def reference_position(self) -> np.ndarray:
-        """(n, d) before the first step."""
+        """Positions (n, d) before the first step."""
         return self._cached("x0", lambda rows: places_before(self.hub, rows.ids))
 
     @property
     def reference_volume(self) -> np.ndarray:
-        """(n,) before the first step."""
+        """Volumes (n,) before the first step."""
         return self._cached("V0", lambda rows: volumes_before(self.hub, rows.ids))
 
     @property
     def solid(self) -> np.ndarray:
-        """(n,) numbers of solids, from 0."""
+        """Numbers (n,) of solids, from 0."""
         firsts = [solid.first_id for solid in self.hub.solids.values()]
         return (np.searchsorted(firsts, self.numbers, side="right") - 1).astype(np.int32)
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """(n, d d) sum N v (X - x), for transfers that store it, else None.
+        """Sums N v (X - x), (n, d d), for transfers that store them, else None.
 
         In present coordinates: in the total frame, the arms X - x are F times the reference arms.
         """
@@ -182,7 +182,6 @@ class PointTable:
         return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """(n, components); None if the scene lacks it."""
         return self._rows.declared(kind)
 
     def columns_of_laws(self) -> set[str]:
@@ -210,7 +209,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # Only this kinematics' components: in 2D the fourth is 12, as in 3D.
+        # Components of this kinematics: in 2D the fourth is 12, as in 3D.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -261,7 +260,7 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """(d, n) at the time of positions if rates are stored, else half a step earlier."""
+    """Velocities (d, n) at the time of positions if rates are stored, else half a step earlier."""
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
         return points.v
@@ -283,12 +282,10 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
 
 
 def places_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Initial positions (n, d) by id."""
     return from_solids(hub, ids, lambda solid, numbers: solid.x0_of(numbers), hub.domain.dimension)
 
 
 def volumes_before(hub: Scene, ids: np.ndarray) -> np.ndarray:
-    """Initial volumes (n,) by id."""
     return from_solids(hub, ids, lambda solid, numbers: solid.volume0[numbers])
 
 

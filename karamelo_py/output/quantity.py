@@ -68,11 +68,10 @@ class Quantity:
 
     @property
     def heading(self) -> str:
-        """Karamelo's name, without blanks."""
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """The number or word; the first NaN is reported."""
+        """Return the number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
@@ -90,7 +89,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """The script may redefine a variable between runs."""
+        """Look the source up again: the script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula

@@ -70,7 +70,6 @@ class RunRecord:
 
     @property
     def script(self) -> str:
-        """Script file as written by the user; SCRIPT if none."""
         return str(self.content.get("script", {}).get("file", "SCRIPT"))
 
     def begin(self, facts: Mapping[str, object]) -> None:
@@ -121,7 +120,6 @@ class RunRecord:
 
 
 def _finite(value: object) -> object:
-    """Convert NumPy's numbers to Python's; None if not finite."""
     if isinstance(value, dict):
         return {name: _finite(of) for name, of in value.items()}
     if isinstance(value, (list, tuple)):

@@ -22,7 +22,7 @@ class ByTime:
         self.passed = -1
 
     def now(self, time: float) -> int:
-        """Multiples up to `time`, allowing for round-off."""
+        """Number of multiples up to `time`, allowing for round-off."""
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
@@ -37,7 +37,7 @@ class Rhythmic:
         raise NotImplementedError
 
     def take_part(self) -> None:
-        """Write as another process than the first."""
+        """Write on a rank other than 0."""
         self.write()
 
     def finish(self) -> None:
@@ -54,7 +54,7 @@ class Rhythmic:
 
 
 class Every:
-    """Annotation: a number of steps, or ``time(T)``; int or `ByTime`."""
+    """Script argument: a number of steps, or ``time(T)``; int or `ByTime`."""
 
     script_kind = "a whole number above 0, of steps, or time(T)"
 
@@ -78,7 +78,7 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """First step that may be due; unless `fixed`, half of a longer way, as steps may grow."""
+    """First step that may be due; unless `fixed`, half of a longer interval, as steps may grow."""
     if not isinstance(every, ByTime):
         return (step // every + 1) * every
     left = ((every.now(time) + 1) * every.span - time) / dt

@@ -66,7 +66,7 @@ class Output:
         self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
-        """The first state unless the run continues `within` another."""
+        """Write the first state unless the run continues `within` another."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not self.plots:
@@ -87,7 +87,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """With `last`, everything not yet written."""
+        """Write what is due; with `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -97,7 +97,6 @@ class Output:
             if i.last_step != step and (last or is_due(i.every, step, time))
         ]
         if any(item is self.log or item in self.plots.values() for item in due):
-            # Computes and energy fixes work only when needed.
             self.hub.refresh_values()
         for item in due:
             self._write(item)
@@ -170,7 +169,7 @@ def _located(error: ScriptError, place: Place | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """`path`, whose first ``*`` becomes a number, can name the file `other`."""
+    """True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -1,9 +1,9 @@
 """Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
 The nine digits of x are the rounded digits of x 10^k. The product has twice the digits of a double:
-exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Such numbers and those
-near the ends of the range of doubles are left to Python; all are without compilation or on
-big-endian machines.
+exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Python formats such
+numbers, those near the ends of the range of doubles, and all without compilation or on big-endian
+machines.
 
 Digits are written eight at a time; surplus ones are overwritten, because mispredicted branches cost
 more than bytes.
@@ -45,7 +45,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Rows as text, block by block: integers, the rest with nine significant digits."""
+    """Yield rows as text in blocks: integers, the rest with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -71,7 +71,7 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 
 @kernel
 def write_rows(table, start, text, at):
-    """Write row after row, up to a number left to Python: its index, or the count; the text's end.
+    """Write rows up to a number left to Python: return its index, or the count, and the text's end.
 
     `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
     `start`: index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and
@@ -96,7 +96,7 @@ def write_rows(table, start, text, at):
 
 
 def _put_integer(text, at, n):
-    """The integer's end, or `at` if it is too large."""
+    """Write an integer and return its end, or `at` if it is too large."""
     if not -LARGEST_INTEGER < n < LARGEST_INTEGER:
         return at
     text[index(at)] = MINUS
@@ -112,7 +112,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Nine significant digits; their end, or `at` if in doubt."""
+    """Write nine significant digits and return their end, or `at` if in doubt."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)

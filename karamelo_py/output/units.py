@@ -83,7 +83,6 @@ class Units(NamedTuple):
 
 
 def time_text(time: float, unit: str) -> str:
-    """A time with its unit, such as 80 µs."""
     factor, unit = suited(unit, time, TIMES)
     return f"{time * factor:.6g} {unit}".rstrip()
 

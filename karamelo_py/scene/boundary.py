@@ -13,7 +13,7 @@ from karamelo_py.script.errors import Place, ScriptError
 
 
 def _not_periodic(hub: Scene) -> Iterator[tuple[str, str, Place | None]]:
-    """Yield what periodic directions do not support, what to write instead, and the line."""
+    """Yield what periodic directions do not support, what to write instead, and the location."""
     update, settings = hub.update, hub.settings
     method = update.method
     name = registry.name_of("method", type(method))
@@ -81,7 +81,7 @@ def check(hub: Scene) -> None:
 def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
     """Delete points that left the domain in a failed step, whose start `repeat` restores.
 
-    Depends on the state only, not on threads or on how a run is divided.
+    The result depends on the state only, not on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -107,7 +107,7 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
 
 
 def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, float]:
-    """Delete points (ids, ascending); mass and energy, negative work in the balance."""
+    """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
     simulation = hub.simulation
     for fix in hub.fixes.values():
         body = fix.body

@@ -13,16 +13,16 @@ import numpy as np
 from karamelo_py.scene.region import Region
 
 HALVED = 5  # per direction
-PLANE = 0.01  # from a plane, relative to the box
-EDGE = 0.05  # for a part of a box, whose edge would otherwise be sharp
+PLANE = 0.01  # distance from a plane, relative to the box
+EDGE = 0.05  # for a sub-box, whose edge would otherwise be sharp
 SHEET = 0.01  # for a surface that may belong to a thin sheet
 LEAST = 0.1  # of a box: smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off, relative to the box
-# Fraction of a box in the smallest parts that are not plane: 1/3 of it at a corner in 2D or an edge
-# in 3D. A sheet thinner than these parts has more, or they are most of its body.
+# Fraction of a box in the smallest sub-boxes that are not plane: 1/3 of it at a corner in 2D or an
+# edge in 3D. A sheet thinner than these has more, or they are most of its body.
 ROUGH = 0.025
 MOSTLY = 0.1
-FACE = 2  # parts of a face per direction
+FACE = 2  # pieces of a face per direction
 SLOPE = 1e-3  # relative to the largest; smaller slopes are zero, as sums would lose their digits
 
 
@@ -30,7 +30,7 @@ class Pieces(NamedTuple):
     number: np.ndarray  # (n,) of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) volume fractions of the box
-    # (m,) fraction of each box in smallest parts that are not plane
+    # (m,) fraction of each box in the smallest sub-boxes that are not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
@@ -40,7 +40,7 @@ class Pieces(NamedTuple):
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
+    """Clip boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
 
     Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
     """
@@ -69,7 +69,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small ones into the nearest larger one in an adjacent box (fraction 0 then)."""
+    """Merge small pieces into the nearest larger one in an adjacent box (fraction 0 then)."""
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -183,7 +183,8 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction (n,) and centroid (d, n) of a unit cube's part with mean + slopes (x - 1/2) > 0."""
+    """Fraction (n,) and centroid (d, n) of the part of a unit cube with mean + slopes (x - 1/2) >
+    0."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
@@ -197,8 +198,8 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, minus (plus, minus ...)
-    those at the other corners, outside the cube."""
+    """Solve `_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, minus (plus, minus
+    ...) those at the other corners, outside the cube."""
     d = len(m)
     top = mean + m.sum(axis=0) / 2
     fraction, moment = np.zeros(len(mean)), np.zeros(m.shape)

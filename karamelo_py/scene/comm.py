@@ -25,7 +25,7 @@ def handled_signals(
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    # Ignored if the program shall outlive the terminal (nohup).
+    # Ignored signals let the program outlive the terminal (nohup).
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:
         signal.signal(number, handler)
@@ -77,7 +77,6 @@ class SerialComm:
         return thing
 
     def gather(self, thing: T) -> list[T] | None:
-        """Objects of all processes at rank 0, else None."""
         return [thing]
 
     def allgather(self, thing: T) -> list[T]:
@@ -113,7 +112,6 @@ class SerialComm:
         return {}
 
     def alltoall(self, numbers: np.ndarray) -> np.ndarray:
-        """Exchange one number with each process, (size,)."""
         return numbers
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:

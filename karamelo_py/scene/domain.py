@@ -60,7 +60,7 @@ class Domain:
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """(n,) bool: `x` (n, >= dimension) in the closed box."""
+        """Mask (n,) of `x` (n, >= dimension) in the closed box."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance

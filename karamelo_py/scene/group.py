@@ -50,7 +50,7 @@ class AnyGroup(Named):
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """``all`` is every node or point."""
+        """Look a group up; ``all`` is every node or point."""
         if ALL in (argument.text, argument.word()):
             return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
         try:
@@ -101,7 +101,7 @@ class ParticleGroup(AnyGroup):
                 yield ids[self.has(ids)]
 
     def has(self, ids: np.ndarray) -> np.ndarray:
-        """(n,) bool, by point number."""
+        """Mask (n,) by point number."""
         if self.all:
             return np.ones(len(ids), np.bool_)
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)

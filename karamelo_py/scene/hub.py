@@ -145,7 +145,7 @@ class Update:
 
     @property
     def words_of_state(self) -> str:
-        """Without the scheme: any scheme can continue such a state."""
+        """Exclude the scheme: any scheme can continue such a state."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
@@ -188,7 +188,6 @@ class Hub:
         self.checking = False  # ``karamelo-py check``: the first run only reports
         self.pausing = False  # stops before runs, which a program controls
         self.open_ended = False  # a program may continue after the script
-        # active in some run of the rehearsal
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
         self.restart: Any = None  # until the script has rebuilt the scene
@@ -227,7 +226,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """In a rehearsal: will have."""
+        """In a rehearsal, include runs that will begin."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -293,7 +292,7 @@ class Hub:
         code: str = "",
         cause: str = "",
     ) -> None:
-        """Except in a rehearsal."""
+        """Warn and record the warning, except in a rehearsal."""
         if not self.rehearsing:
             self.record.warn(message, hint, place or self.place, code, cause)
             text = render_message(
@@ -335,7 +334,7 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy without objects that commands never change."""
+        """Copy the hub without objects that commands never change."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)
@@ -371,5 +370,5 @@ class Hub:
             mine = self.groups[ID] = copy.copy(group)
             mine.hub = self
         if real._lattices is not None:
-            # The same objects if unchanged: node groups need no new search.
+            # Unchanged lattices stay the same objects: node groups need no new search.
             self._lattices = self._key_of_lattices, real._lattices[1]

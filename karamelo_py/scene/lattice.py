@@ -1,4 +1,4 @@
-"""Lattices: the regular grids of a scene and their node numbers."""
+"""Regular grids of a scene and their node numbers."""
 
 import itertools
 import math
@@ -67,7 +67,7 @@ class Lattice:
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """(n, 3) of nodes, by default of all."""
+        """Positions (n, 3) of nodes, by default of all."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing
@@ -87,7 +87,7 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """(n, d) of positions, or of the nearest cell."""
+        """Cells (n, d) of positions; the nearest one outside the grid."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
@@ -150,6 +150,6 @@ def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple
 
 
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
-    """Indices of the numbers `start` to before `end`."""
+    """Indices of the numbers from `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
     return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

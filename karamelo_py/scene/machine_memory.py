@@ -39,7 +39,7 @@ class MachineMemory(NamedTuple):
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
     """Memory with caches and swap; None if the system does not report it.
 
-    Least of the machine's, of containers and jobs (cgroups), and of each process (ulimit -v).
+    The least of the machine's, of containers and jobs (cgroups), and of each process (ulimit -v).
     """
     import psutil
 

@@ -8,9 +8,9 @@ from karamelo_py.points.laws.thin import Thin
 
 
 class MaterialPart(Named):
-    """A named law or part of a law, of a `kind` such as ``eos`` and a `style`.
+    """A named law or component of a law, of a `kind` such as ``eos`` and a `style`.
 
-    `made` is the law, or `laws` by kind if the style brings several; `given` are its arguments.
+    `made` is the law, or `laws` by kind if the style has several; `given` are its arguments.
     """
 
     def __init__(
@@ -38,7 +38,6 @@ class Material(MaterialPart):
 
     @property
     def whole(self) -> NamedTuple:
-        """Law in 3D."""
         return self.laws[self.kind]
 
     @property
@@ -47,12 +46,11 @@ class Material(MaterialPart):
 
     @property
     def filled(self) -> NamedTuple:
-        """Law in 3D, with the fluid in its pores."""
         return self.whole if self.fluid is None else self.fluid.around(self.whole)
 
     @property
     def words(self) -> str:
-        """``steel (eos-strength: linear, plastic)``: ID, style, styles of its parts."""
+        """Describe a material: ``steel (eos-strength: linear, plastic)``."""
         styles = [
             registry.name_of(kind, type(law))
             for kind, law in zip(self.whole._fields, self.whole, strict=True)

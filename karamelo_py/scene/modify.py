@@ -58,7 +58,6 @@ class Publisher:
     unit = NUMBER  # of its values
 
     def publish(self, name: str, value: float) -> None:
-        """Publish `value` as ID_`name`, or as ID if `name` is empty."""
         if name not in self.published:
             raise ValueError(f"'{name}' is not in {type(self).__name__}.published")
         self.has_published = True
@@ -75,7 +74,7 @@ class Publisher:
             self.publish(name, value)
 
     def refresh(self) -> None:
-        """Called before output."""
+        """Update the values before output."""
 
 
 def _formulas_in(value: Any) -> Iterator[Expression]:
@@ -137,12 +136,10 @@ class Fix(Publisher):
 
     @property
     def all_formulas(self) -> list[Expression]:
-        """Formulas among its attributes, also in tuples and lists."""
         return list(_formulas_in(tuple(vars(self).values())))
 
     @property
     def of_rigid_points(self) -> bool:
-        """True if all its points are of rigid solids."""
         soft = (solid for solid in self.hub.solids.values() if not solid.rigid)
         return isinstance(self.group, ParticleGroup) and not any(map(self.group.touches, soft))
 

@@ -55,7 +55,7 @@ class Filled:
         self._number[tuple(self._subs.T)] = np.arange(len(places))
 
     def candidates(self, begin: int, end: int) -> np.ndarray:
-        """(m, d) in cells `begin` to before `end`."""
+        """Positions (m, d) in cells from `begin` to before `end`."""
         centre = self._corner + (positions(*self._cells, begin, end) + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 
@@ -114,7 +114,6 @@ class Filled:
 
 
 def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Lattice:
-    """Cells of the domain's grid, or apart, from the corner of the region's bounding box."""
     d = domain.dimension
     if not apart:
         return Lattice(d, domain.lo, domain.hi, h)
@@ -160,7 +159,7 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill it in chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
+    """Fill a region in chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(

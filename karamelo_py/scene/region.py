@@ -57,17 +57,15 @@ class Region(Named):
 
     @property
     def lo(self) -> np.ndarray:
-        """(3,) within the domain."""
         return np.clip(self.box_lo, self.domain.lo, self.domain.hi)
 
     @property
     def hi(self) -> np.ndarray:
-        """(3,) within the domain."""
         return np.clip(self.box_hi, self.domain.lo, self.domain.hi)
 
     @property
     def aligned(self) -> bool:
-        """All faces are known to be parallel to the axes."""
+        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
@@ -77,7 +75,7 @@ class Region(Named):
 
     @property
     def flat(self) -> bool:
-        """Some part is a line or surface without an inside."""
+        """True if some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -86,20 +84,20 @@ class Region(Named):
 
     @property
     def volume(self) -> float | None:
-        """In the domain; None if unknown."""
+        """Volume in the domain; None if unknown."""
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """(n,) bool: `x` (n, >= d) in or on the shape."""
+        """Mask (n,) of `x` (n, >= d) in or on the shape."""
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """(n,) bool: `x` (n, >= d) in the region."""
+        """Mask (n,) of `x` (n, >= d) in the region."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """(n,) of `x` (n, >= d) in the shape, negative outside; ignores `exterior`.
+        """Distance (n,) of `x` (n, >= d) from the surface, negative outside; ignores `exterior`.
 
         A lower bound, up to `reach`; linear near plane parts of the surface. The default tests
         `contains` along the axes, and misses shapes thinner than `reach`.
@@ -123,7 +121,6 @@ class Region(Named):
         return None
 
     def outline(self) -> Any:
-        """Argument for `depth`."""
         shape = self.shape()
         return Outside(shape) if self.exterior and shape is not None else shape
 

@@ -163,11 +163,11 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
-        """(n, d); computed on each access for large solids."""
+        """Positions (n, d); computed on each access for large solids."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """(n, d) by ascending numbers."""
+        """Positions (n, d) by ascending numbers."""
         positions = np.empty((len(numbers), self.domain.dimension))
         for begin in range(0, len(numbers), CHUNK):
             some = numbers[begin : begin + CHUNK]
@@ -227,7 +227,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Large solids are sampled."""
+    """True if points coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():

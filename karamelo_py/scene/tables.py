@@ -17,7 +17,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Annotation: columns of a file or dump, or of arrays passed to `Simulation`."""
+    """Script argument: columns of a file or dump, or of arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 

@@ -207,7 +207,7 @@ class NodesView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """(n, 3); read only."""
+        """Positions (n, 3); read only."""
         grids = self._grids
         g = np.searchsorted(grids.first, self.index, side="right") - 1
         local = self.index - grids.first[g]
@@ -218,12 +218,12 @@ class NodesView(View):
 
     @Shown
     def mass(self) -> np.ndarray:
-        """(n,); read only."""
+        """Masses (n,); read only."""
         return self._nodes.sums[self.index, arrays.MASS]
 
     @Shown
     def force(self) -> np.ndarray:
-        """(n, d) internal plus external force; set it in ``post_particles_to_grid``."""
+        """Internal plus external force (n, d); set it in ``post_particles_to_grid``."""
         return self._vectors("sums", arrays.of_force(self._kin))[self.index]
 
     @force.writer
@@ -236,12 +236,11 @@ class NodesView(View):
 
     @property
     def _change(self) -> np.ndarray:
-        """v* - v of the momentum update."""
         return self._vectors("update", arrays.of_change(self._kin))
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """(n, d) v before the momentum update, or the velocity that deforms the points."""
+        """Velocities (n, d) before the momentum update, or those that deform the points."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -259,7 +258,7 @@ class NodesView(View):
 
     @Shown
     def velocity_update(self) -> np.ndarray:
-        """(n, d) v*, after the momentum update (``post_update_grid_state``)."""
+        """Velocities v* (n, d) after the momentum update (``post_update_grid_state``)."""
         return self._vectors("velocity" if self._on_velocity else "update")[self.index]
 
     @velocity_update.writer
@@ -354,7 +353,7 @@ class PointsView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """(n, d); corners of convected domains move with the points."""
+        """Positions (n, d); corners of convected domains move with the points."""
         return self._rows.take(self._place)
 
     @position.writer
@@ -446,10 +445,8 @@ class PointsView(View):
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` with a number (n,) of each point.
-
-        Only for points whose law is a `law`.
-        """
+        """Call ``kernel(matter, rows, numbers)`` with a number (n,) of each point whose law is a
+        `law`."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -498,7 +495,7 @@ class PointsView(View):
 
     @Shown
     def reference_position(self) -> np.ndarray:
-        """(n, d) before the first step; read only."""
+        """Positions (n, d) before the first step; read only."""
         return places_before(self._simulation.hub, self._numbers)
 
 

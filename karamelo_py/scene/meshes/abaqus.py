@@ -59,7 +59,7 @@ class _Keyword(NamedTuple):
 class _Elements(NamedTuple):
     type: str
     numbers: np.ndarray  # (n,)
-    nodes: np.ndarray  # (n, c) deck's node numbers
+    nodes: np.ndarray  # (n, c) node numbers of the deck
 
 
 class _Part:
@@ -173,7 +173,6 @@ def _cylindrical(x: np.ndarray) -> np.ndarray:
 
 
 def _spherical(x: np.ndarray) -> np.ndarray:
-    """From radius, longitude and latitude in degrees."""
     turn, rise = np.radians(x[:, 1]), np.radians(x[:, 2])
     flat = x[:, 0] * np.cos(rise)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.sin(rise)], axis=1)
@@ -529,5 +528,5 @@ class _Merged:
 
 
 def read_deck(path: Path) -> Mesh:
-    """ScriptError names the line that cannot be read."""
+    """Read a deck; ScriptError names the line that cannot be read."""
     return _Deck(path).mesh()

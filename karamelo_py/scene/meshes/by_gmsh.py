@@ -15,7 +15,7 @@ from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# Other than Gmsh's names in lower case.
+# Names that differ from Gmsh's in lower case.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
@@ -25,7 +25,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
-    """Other models of the process stay open."""
+    """Open a model; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -45,7 +45,8 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Gmsh resets SIGPIPE: a closed pipe or live page would end the program."""
+    """Initialize Gmsh without its reset of SIGPIPE: a closed pipe or live page would end the
+    program."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
@@ -77,7 +78,6 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             gmsh.model.mesh.generate(dimension)
             if not len(gmsh.model.mesh.getNodes()[0]):
                 raise ScriptError(f"{path.name} has nothing to mesh", argument="file")
-            # Physical groups, if any, are the mesh.
             groups = {d for d, _ in gmsh.model.getPhysicalGroups()}
             if groups and min(groups) > dimension:
                 raise ScriptError(
@@ -105,7 +105,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """Gmsh's errors become ValueError."""
+    """Read a mesh; Gmsh's errors become ValueError."""
     with alone(path) as link:
         try:
             with _model(link) as gmsh:
@@ -117,7 +117,7 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """Parts of a file that Gmsh's library drops: names of empty groups; groups by element.
+    """What Gmsh's library drops from a file: names of empty groups; groups by element.
 
     In versions 1 and 2 Gmsh assigns the groups of a geometrical entity to all its elements.
     """

@@ -58,8 +58,8 @@ class Mesh(NamedTuple):
         name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh groups have numbers and perhaps names; a number that only one dimension has needs
-            # no dimension in front.
+            # Gmsh groups have numbers and perhaps names; a number of only one dimension needs no
+            # dimension in front.
             once = [name for name in names if name.rpartition(":")[2] not in {*names} - {name}]
             named = [name for name in once if not name.isdigit()] or once
             error = unknown(message, group, named, argument="group")

@@ -74,7 +74,7 @@ class MeshElements(NamedTuple):
     bulge: float = 0.0  # distance of `nodes` from the straight shape, relative to the size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
-        """Of `which` (n,); corners only."""
+        """Reverse the elements `which` (n,); corners only."""
         order = list(self.shape.mirrored)
         numbers, corners = self.numbers.copy(), self.corners.copy()
         numbers[which], corners[which] = numbers[which][:, order], corners[which][:, order]
@@ -84,7 +84,7 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Of `dimension`, in a mesh or its `group`, one item per type.
+    """Elements of `dimension` in a mesh or its `group`, one item per type.
 
     `lower` accepts groups of lower dimension, such as a boundary. ScriptError if there are none,
     for unsupported types, and off z = 0 in 2D or the x axis in 1D.
@@ -140,7 +140,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Only corners if natural coordinates of other nodes are unknown."""
+    """Natural coordinates; of the corners only if those of other nodes are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -192,7 +192,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Older formats repeat elements of two physical groups."""
+    """Drop repeated elements: older formats repeat those of two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -213,7 +213,7 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """With positive orientation, volumes (n,) and centroids (n, d).
+    """Elements with positive orientation, volumes (n,) and centroids (n, d).
 
     Exact integrals of det J and x det J, with curved edges and warped faces. ScriptError for a flat
     or twisted element.

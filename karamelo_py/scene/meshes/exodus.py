@@ -25,7 +25,7 @@ SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
     "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
 }
-# Edges along z come before those at the top; further nodes are left out.
+# Edges along z come before those at the top; further nodes are ignored.
 ORDER = {
     ("hexahedron", 20): [*range(12), *range(16, 20), *range(12, 16)],
     ("wedge", 15): [*range(9), *range(12, 15), *range(9, 12)],
@@ -55,7 +55,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Blocks, side sets and node sets; KeyError or OSError for other files."""
+    """Read blocks, side sets and node sets; KeyError or OSError for other files."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

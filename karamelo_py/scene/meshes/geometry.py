@@ -82,7 +82,6 @@ def _refuse(token: _Token, reason: str, *, trusted: bool = False) -> None:
 
 
 def _collect(path: Path, files: dict[Path, list[_Token]], trusted: bool) -> None:
-    # Gmsh also reads the options next to a file.
     for file in (path, path.with_name(f"{path.name}.opt")):
         if file in files or not file.is_file():
             continue
@@ -109,7 +108,6 @@ def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> No
 
 
 def _is_data(path: Path) -> bool:
-    """A reader without commands merges the file."""
     with path.open("rb") as file:
         return path.suffix in _DATA or (path.suffix in _KINDS and file.read(12).startswith(_MESH))
 

@@ -43,7 +43,6 @@ class Skin:
 
 
 def _volumes(faces: np.ndarray) -> np.ndarray:
-    """Signed volumes (m,) below faces (m, d, d)."""
     d = faces.shape[2]
     if d == 1:
         return faces[:, 0, 0] * np.where(np.arange(len(faces)) % 2, 1, -1)
@@ -75,7 +74,6 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Simplices (m, d, d); a line in 3D is a triangle."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -160,7 +158,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Equal vertices are merged; ScriptError if the surface is open."""
+    """Merge equal vertices; ScriptError if the surface is open."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -211,7 +209,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Two triangles at an edge run through it in opposite directions."""
+    """Orient triangles so that two at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -247,7 +245,7 @@ def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
 def _within(
     shells: list[np.ndarray], lo: np.ndarray, hi: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """(n, n) bool: shells completely inside others."""
+    """Mask (n, n) of shells completely inside others."""
     n = len(shells)
     within = np.zeros((n, n), bool)
     for k in range(n):
@@ -262,7 +260,6 @@ def _within(
 
 
 def _sample(faces: np.ndarray) -> np.ndarray:
-    """(n, 3) at corners and along edges."""
     some = faces[:: max(1, 21 * len(faces) // _SAMPLES)]
     fraction = np.linspace(0, 1, 8)[:-1, None, None, None]
     return ((1 - fraction) * some + fraction * np.roll(some, -1, axis=1)).reshape(-1, 3)

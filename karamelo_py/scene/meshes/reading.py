@@ -27,11 +27,11 @@ from karamelo_py.script.errors import FAILURES, ScriptError
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas", ".cgns")
-# Other text is Gmsh's geometry language to Gmsh.
+# Gmsh takes other text for its geometry language.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
 _BY_ENDING = (".unv", ".bdf", ".nas", ".cgns")  # recognised by ending
 _MED = b"\x89HDF"
-# Other programs' files with endings of meshes: first bytes, and advice.
+# Files of other programs with endings of meshes: first bytes, and advice.
 _FOREIGN = (
     (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
     (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
@@ -90,7 +90,6 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
 
 
 def _refuse_what_is_no_cad(path: Path) -> None:
-    """On a mismatch of first bytes and ending, the library would print."""
     with path.open("rb") as file:
         begin = file.read(1024)
     right = {

@@ -80,7 +80,7 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """Whether the basis needs points equally spaced in a cell, whose domains tile it."""
+        """Return True if the basis needs points equally spaced in a cell, whose domains tile it."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
