@@ -117,7 +117,7 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """What Gmsh's library drops from a file: names of empty groups; groups by element.
+    """Content of a file that Gmsh's library drops: names of empty groups; groups by element.
 
     In versions 1 and 2 Gmsh assigns the groups of a geometrical entity to all its elements.
     """
