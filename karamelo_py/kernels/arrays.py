@@ -1,8 +1,7 @@
 """The arrays of a run, as NamedTuples for kernels.
 
 n points in a block, d dimensions, N nodes, T tiles. Arrays of points are (components, n), arrays of
-nodes (N, components). Optional fields are declared by their owners
-(:mod:`karamelo_py.compiler.fields`).
+nodes (N, components); optional fields are declared (:mod:`karamelo_py.compiler.fields`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -17,25 +16,25 @@ from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector
 
-# A NamedTuple, often empty, whose class selects implementations of point functions.
+# A NamedTuple, often empty, whose class selects implementations.
 Tag: TypeAlias = Any
 # A double or single, lanes of these, or a number with slopes.
 Number: TypeAlias = Any
-# Index of a point or node, or of several in lanes.
+# One index, or several in lanes.
 Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
-    """Fields of all nodes, dense in node number: ``nodes.sums[n, of_force(kin) + k]``."""
+    """Fields of all nodes, by node number: ``nodes.sums[n, of_force(kin) + k]``."""
 
-    sums: np.ndarray  # mass, momentum, force, as scattered by the points
-    update: np.ndarray  # v* after the momentum update, and v* - v
+    sums: np.ndarray  # mass, momentum, force, scattered by the points
+    update: np.ndarray  # v* after the momentum update, v* - v
     velocity: np.ndarray  # the velocity whose gradient deforms the points
-    fields: tuple  # declared fields, (N, components)
+    fields: tuple  # declared fields, each (N, components)
 
 
 # First components in node records; a 3D vector takes four numbers, one register.
-MASS = 0  # of Nodes.sums
+MASS = 0  # in Nodes.sums
 
 
 def of_momentum(kin):
@@ -51,11 +50,11 @@ def of_change(kin):
 
 
 def vector_at(kin, records, i, first, like):
-    """Load a vector from record `i`, from component `first` on."""
+    """Load a vector from record `i`, starting at component `first`."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
-# Widths of the records of Nodes by dimension.
+# Record widths by dimension.
 SUMS_WIDTH = {1: 4, 2: 8, 3: 8}
 UPDATE_WIDTH = {1: 2, 2: 4, 3: 8}
 VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
@@ -64,19 +63,19 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 class Points(NamedTuple):
     """Points of one law, by tile. A place (w numbers) is a position, then a stored domain shape."""
 
-    x: np.ndarray  # (2, w, n): places now and after the move; `motion.now` is the index
+    x: np.ndarray  # (2, w, n) places now and after the move; `motion.now` is the index
     home: np.ndarray | None  # (w, n) reference places (total frame)
-    v: np.ndarray  # (d, n) velocity
+    v: np.ndarray  # (d, n)
     mass: np.ndarray  # (n,)
-    state: np.ndarray  # (s, n) state of the law
+    state: np.ndarray  # (s, n), of the law
     material: np.ndarray  # (n,) int32, row in the table of laws
-    grid: np.ndarray  # (n,) int32, the grid of each point
-    id: np.ndarray  # (n,) int64, 0-based
-    fields: tuple  # declared fields, (components, n)
+    grid: np.ndarray  # (n,) int32
+    id: np.ndarray  # (n,) int64, from 0
+    fields: tuple  # declared fields, each (components, n)
 
 
 def known_to_laws(points):
-    """Return the points without optional fields, so that kernels of laws serve all methods."""
+    """The points without optional fields, so that kernels of laws serve all methods."""
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
         points.id, (),
@@ -93,7 +92,7 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
-    """Rebuild `points` from `arrays`, in the order of `arrays_of`."""
+    """Rebuild `points` from `arrays` in the order of `arrays_of`."""
     remaining = iter(arrays)
     items: list[Any] = [None if array is None else next(remaining) for array in points[:-1]]
     return Points(*items, tuple(type(one)(next(remaining)) for one in points.fields))
@@ -102,19 +101,19 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 class Tiling(NamedTuple):
     """The points of a block by tile."""
 
-    count: np.ndarray  # (3,) int64: numbers of occupied tiles, of parts of the points, and of parts
-    #                    that other processes wait for
-    share: np.ndarray  # (S + 1,) int64: tiles of the k-th part: order[share[k]:share[k + 1]]
+    count: np.ndarray  # (3,) int64: occupied tiles, parts of the points, parts that other
+    #                    processes wait for
+    share: np.ndarray  # (S + 1,) int64: tiles of part k are order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
-    grid: np.ndarray  # (T + 1,) int64: the grid of the k-th occupied tile
-    number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile
+    grid: np.ndarray  # (T + 1,) int64: its grid
+    number: np.ndarray  # (T + 1,) int64: its number
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may see
     rows: np.ndarray  # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i
-    #                   ny + j), counted from the row's first; last < first if empty; r = 0 if boxes
-    #                   are not refined
-    buffer: np.ndarray  # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x
-    #                     and step_y of its nodes there
+    #                   ny + j) from the row's first; last < first if empty; r = 0 if boxes are not
+    #                   refined
+    buffer: np.ndarray  # (T + 1, 5) int64: range of its records in the buffers; Grid.first,
+    #                     step_x and step_y of its nodes there
     report: np.ndarray  # (T + 1, 14): largest move, largest rate, failed point + 1; at looks also
     #                     kinetic and stored energy, number of the solid (-1: several), mass,
     #                     momentum, elastic energy, and this times velocity
@@ -126,41 +125,42 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 class Buffers(NamedTuple):
     """Sums of the tiles of points: dense boxes of nodes, one after another.
 
-    A tile of nodes sums the boxes that reach it, in one order, and zeros them. Its parts are ranges
-    of nodes that overlap a box, after a part that clears what the first box does not cover. Columns
-    of a part: first node in the grid and in the box; lengths; strides in the grid and in the box
-    along the first two directions; the action. With few points, the nodes are the only buffer.
+    A tile of nodes sums the boxes that reach it in a fixed order and zeros them. Its parts are
+    ranges of nodes that overlap a box, after one that clears what the first box does not cover.
+    Columns of a part: first node in the grid and in the box; lengths; strides in the grid and in
+    the box along the first two directions; the action. With few points, the nodes are the only
+    buffer.
     """
 
-    nodes: Nodes  # the fields that points scatter to
-    count: np.ndarray  # (2,) int64: number of parts; whether the nodes are the only buffer
-    first: np.ndarray  # (S + 1,) int64: rows of the k-th part are first[k]:first[k + 1]
+    nodes: Nodes  # fields that points scatter to
+    count: np.ndarray  # (2,) int64: parts; 1 if the nodes are the only buffer
+    first: np.ndarray  # (S + 1,) int64: rows of part k are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
     number: int  # index among the buffers of a scene
 
 
 class Places(NamedTuple):
-    """Places of points during a sweep: arrays (w, n)."""
+    """Places of points during a sweep, each (w, n)."""
 
     where: np.ndarray  # for weights
-    x: np.ndarray  # before
-    y: np.ndarray  # after
+    x: np.ndarray  # before the move
+    y: np.ndarray  # after the move
 
 
 class Block(NamedTuple):
     """Points of one law, the law's parameters per material, and the tiles."""
 
     points: Points
-    laws: NamedTuple  # parameters of the law, an array (m,) each
+    laws: NamedTuple  # parameters, an array (m,) over materials each
     tiling: Tiling
 
 
 class OnGrids(NamedTuple):
-    basis: Tag  # or () for what serves all bases
+    basis: Tag  # () if the result serves all bases
     kin: Tag
     grids: Grid
     of: np.ndarray  # (n,) grid of each point
-    x: np.ndarray  # (w, n) places
+    x: np.ndarray  # (n,) places
 
 
 class Matter(NamedTuple):
@@ -174,13 +174,13 @@ def matter_of(kin: Tag, block: Block) -> Matter:
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points `rows`, in this order and not yet sorted."""
+    """The block with the points `rows` in this order, not yet sorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
 
 class NoHooks(NamedTuple):
-    """No hooks in the compiled loop."""
+    pass
 
 
 HOOK = np.dtype([
@@ -189,11 +189,11 @@ HOOK = np.dtype([
     ("begin", np.int64),  # range of members; -1: all
     ("end", np.int64),
     ("slot", np.int64),  # of the published total; -1: none
-    ("uses_before", np.int64),  # the value one step earlier
-    ("uses_share", np.int64),  # 1 / number of members with mass
-    ("holds", np.int64),  # sets the velocity, or bounds it
-    ("uses_place", np.int64),  # formulas depend on position
-    ("totals", np.int64),  # number published by a hook on whole points
+    ("uses_before", np.int64),  # of the value one step earlier
+    ("uses_share", np.int64),  # of 1 / number of members with mass
+    ("holds", np.int64),  # whether it sets or bounds the velocity
+    ("uses_place", np.int64),  # whether formulas depend on position
+    ("totals", np.int64),  # numbers published by a hook on whole points
 ])  # fmt: skip
 PROGRAM = np.dtype([
     ("begin", np.int64),  # range of code; -1: NULL
@@ -202,44 +202,44 @@ PROGRAM = np.dtype([
     ("last", np.int64),
 ])  # fmt: skip
 # The hook that holds a node in one direction.
-HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # 1 + slot of the total, 0: none
+HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # slot: 1 + slot of the total; 0: none
 
 
 class Apart(NamedTuple):
     """Private arrays of A threads for hooks."""
 
-    chosen: np.ndarray  # (A, BLOCK): see Hooks
+    chosen: np.ndarray  # (A, BLOCK)
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
-    values: np.ndarray  # (A, ...): see Control
+    values: np.ndarray  # (A, ...)
     totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
-    step: np.ndarray  # (A, 1) STEP; only the entries for hooks are used
-    heat: np.ndarray  # (A, 1) HEAT; likewise
+    step: np.ndarray  # (A, 1) STEP, only its entries for hooks
+    heat: np.ndarray  # (A, 1) HEAT, likewise
 
 
 class Hooks(NamedTuple):
-    """Compiled hooks of the fixes, called by address at their stage (`kernels.hooks`)."""
+    """Compiled hooks of fixes, called by address at their stage (`kernels.hooks`)."""
 
     evaluate: int  # address of the evaluator of formulas
     table: np.ndarray  # (k,) HOOK
-    programs: np.ndarray  # (k, 4) PROGRAM, for each component, and friction at a wall
-    members: np.ndarray  # int64: node numbers; of points, bits that mark members
-    code: np.ndarray  # (c, 2) int64: programs of formulas
+    programs: np.ndarray  # (k, 4) PROGRAM: components, friction at a wall
+    members: np.ndarray  # int64: node numbers, or bits that mark points
+    code: np.ndarray  # (c, 2) int64, of formulas
     constants: np.ndarray  # (m,) float64
-    x0: np.ndarray  # (n, d) reference positions of the points, by id
+    x0: np.ndarray  # (n, d) reference positions, by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
     loads: np.ndarray  # (N, d) of this step if hooks apply forces, else (0, d)
     rigid_fields: np.ndarray  # (F,) bool: fields of rigid solids, N/F nodes each; or (0,)
-    mode: Tag  # one thread, or several
+    mode: Tag  # one thread or several
     apart: Apart
-    whole: tuple  # tags of the hooks on whole points, made by `vector_hook`
+    whole: tuple  # tags of hooks on whole points (`vector_hook`)
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
 WHOLE = -1  # instead of an address: one of Hooks.whole
 
-# Stages at which fixes act, in Karamelo's names.
+# stages of fixes, in Karamelo's names
 INITIAL_INTEGRATE = 0
 POST_PARTICLES_TO_GRID = 1
 POST_UPDATE_GRID_STATE = 2
@@ -250,130 +250,127 @@ FINAL_INTEGRATE = 6
 POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
-POST_CONTACT = 10  # damping, of the forces of contact as well
-POST_WATER_TO_GRID = 11  # what accelerates nodes, on the water in their pores
+POST_CONTACT = 10  # damping, also of contact forces
+POST_WATER_TO_GRID = 11  # accelerations of nodes, for the water in their pores
 
-# Where in the node arrays a hook acts.
+# node array on which a hook acts
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-# The step size, by `kernels.clock` and `run.step_size`: times, lengths (`spacing`) and fractions.
+# Step size (`kernels.clock`, `run.step_size`): times, lengths (`spacing`), fractions.
 STEP = np.dtype([
-    ("fixed_dt", np.float64),  # step of set_dt, or 0
+    ("fixed_dt", np.float64),  # set_dt, or 0
     ("dt_factor", np.float64),  # fraction of the stable step of waves
-    ("dt_factor_moving", np.float64),  # the same once points have moved: see kernels.clock
+    ("dt_factor_moving", np.float64),  # once points have moved (`kernels.clock`)
     ("heat_factor", np.float64),  # fraction of the stable step of conduction
     ("end_time", np.float64),
-    ("last_dt", np.float64),  # the last step; 0 at the start and after load steps
-    ("kick", np.float64),  # time that forces act: between the middles of the two steps
-    ("first_kick", np.float64),  # kick of the first step, in steps
-    ("contact_dt", np.float64),  # the step for the contact stiffness: see kernels.clock
+    ("last_dt", np.float64),  # 0 at the start and after load steps
+    ("kick", np.float64),  # time that forces act, between the middles of the two steps
+    ("first_kick", np.float64),  # of the first step, in steps
+    ("contact_dt", np.float64),  # step for the contact stiffness (`kernels.clock`)
     ("contact_kick", np.float64),  # time that forces would act in such steps
     ("last_contact_dt", np.float64),
     ("spacing", np.float64),  # smallest cell size
     ("courant", np.float64),  # stable step over cell size / rate
-    ("courant_moving", np.float64),  # the same once points have moved
+    ("courant_moving", np.float64),  # once points have moved
     ("kept", np.float64),  # FLIP coefficient
-    ("kept_by_time", np.float64),  # the same per stable step if it depends on time, or 0
+    ("kept_by_time", np.float64),  # per stable step if it depends on time, else 0
     ("first_limit", np.float64),  # stable step at the start
     ("limit", np.float64),  # stable step now
     ("over_limit", np.int64),  # consecutive steps above the stable limit
-    ("watch_limit", np.int64),  # whether to stop because of them
+    ("watch_limit", np.int64),  # whether these stop the run
 ])  # fmt: skip
-# The motion of points, by `kernels.clock` and `run.tiles`: lengths in cells, speeds per time.
+# Motion of points (`kernels.clock`, `run.tiles`): lengths in cells, speeds per time.
 MOTION = np.dtype([
     ("rate", np.float64),  # max over points of c + max |v_i - common_i|
-    ("new_rate", np.float64),  # of the last sweep
+    ("new_rate", np.float64),  # in the last sweep
     ("common", np.float64, (1, 3)),  # reference velocity for speeds
-    ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
+    ("weight", np.float64),  # of the common drift; 1: `common` is 0
     ("wave", np.float64),  # wave speed when `common` was measured
     ("speed", np.float64),  # of the fastest point, in cells per time
-    ("move", np.float64),  # largest move of a point in this step, in cells
+    ("move", np.float64),  # largest in this step, in cells
     ("new_move", np.float64),
     ("stride", np.float64),  # cells that a point may move in a step
     ("drift", np.float64),  # since the points were sorted, in cells
     ("drift_limit", np.float64),
     ("pace", np.float64),  # largest move in a step since then
     ("path", np.float64),  # largest path of a point, in cells
-    ("now", np.int64),  # index of the present array of places
-    ("wrong", np.int64),  # 1 when a point went wrong
+    ("now", np.int64),  # index of the present places
+    ("wrong", np.int64),  # 1 if a point failed
 ])  # fmt: skip
-# The watch over energy, by `kernels.watch` and `run.energy`: energies, counts and fractions.
+# Energy monitor (`kernels.watch`, `run.energy`): energies, counts, fractions.
 ENERGY = np.dtype([
-    ("watch_energy", np.int64),  # whether the work of all loads is known: see kernels.watch
+    ("watch_energy", np.int64),  # whether the work of all loads is known
     ("level", np.float64),  # fraction of the present stored energy in the balance
-    ("work", np.float64),  # of the fixes so far
-    ("kinetic", np.float64),  # sums over the points
+    ("work", np.float64),  # of fixes so far
+    ("kinetic", np.float64),  # sum over points
     ("stored", np.float64),  # with dissipated energy
     ("born_with", np.float64),  # internal energy of gases before any work
     ("stored_before", np.float64),  # one step earlier
     ("moving_before", np.float64),  # kinetic minus work, then
     ("stored_at", np.int64),  # step of these values
-    ("looks", np.int64),  # number of looks at the balance
+    ("looks", np.int64),  # looks at the balance so far
     ("balance", np.float64),  # kinetic + stored + dissipated - work
     ("first_balance", np.float64),
     ("first_work", np.float64),
-    ("sum_of_balance", np.float64),  # of a window of looks
-    ("last_balance", np.float64),  # at the look before
+    ("sum_of_balance", np.float64),  # over a window of looks
+    ("last_balance", np.float64),  # at the previous look
     ("last_but_one", np.float64),
     ("first_few", np.float64),  # mean of the first looks
     ("first_mean", np.float64),  # mean of the first window
     ("largest_mean", np.float64),
     ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
     ("largest_energy", np.float64),  # of kinetic, stored, work and rigid bodies
-    ("largest_own", np.float64),  # the same, without pure drift
+    ("largest_own", np.float64),  # without pure drift
     ("of_drift", np.float64),  # kinetic energy of the centres of mass
-    ("elastic", np.float64),  # elastic energy at the last look
+    ("elastic", np.float64),  # at the last look
     ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
     ("to_and_fro", np.float64),  # time for waves through all bodies and back
     ("time_of_look", np.float64),
-    ("lost", np.float64),  # largest loss by that, as a fraction of the unit
+    ("lost", np.float64),  # largest loss by crossing, as a fraction of the unit
     ("crossed", np.float64),  # cells that stressed material has moved through
     ("supplied", np.float64),  # largest work so far, of either sign
     ("energy_floor", np.float64),  # round-off of energies
-    ("windows", np.int64),  # consecutive windows in which the balance has grown
+    ("windows", np.int64),  # consecutive windows with a growing balance
     ("growth", np.float64),  # in the last window, relative to the largest energy
-    ("grown", np.float64),  # largest growth since the first looks
+    ("grown", np.float64),  # largest since the first looks
 ])  # fmt: skip
-# Conduction and temperatures, by `kernels.heat`, hooks and `kernels.watch`: times, temperatures.
+# Conduction (`kernels.heat`, hooks, `kernels.watch`): times, temperatures.
 HEAT = np.dtype([
     ("heat_limit", np.float64),  # stable step of conduction, infinite without
-    ("heat_reference", np.float64),  # the same in undeformed bodies
+    ("heat_reference", np.float64),  # in undeformed bodies
     ("watch_heat", np.int64),  # whether all sources of heat are known
     ("coldest", np.float64),  # lower bound from initial state, fixes and sources
     ("hottest", np.float64),
     ("T_low", np.float64),  # of the points at the last look
     ("T_high", np.float64),
-    ("own_heat", np.float64),  # largest temperature rise of a point by its dissipation
-    ("set_low", np.float64),  # set at nodes by fixes
+    ("own_heat", np.float64),  # largest rise of a point by its dissipation
+    ("set_low", np.float64),  # by fixes at nodes
     ("set_high", np.float64),
     ("rise", np.float64),  # largest heating rate of points by fixes
     ("fall", np.float64),
 ])  # fmt: skip
 CLOCK = np.dtype([("step", STEP), ("motion", MOTION), ("energy", ENERGY), ("heat", HEAT)])
-TIME, TIMESTEP, DT = 0, 1, 2  # the first of the published values
+TIME, TIMESTEP, DT = 0, 1, 2  # first published values
 LAST = 2**62  # above any id of a point
 
 
 class Control(NamedTuple):
-    """Clock, published values and totals."""
-
-    values: np.ndarray  # published values: TIME, TIMESTEP, DT come first
+    values: np.ndarray  # published values, after TIME, TIMESTEP, DT
     clock: np.ndarray  # (1,) CLOCK, for copies and files; the next four are its parts
     step: np.ndarray  # (1,) STEP
     motion: np.ndarray  # (1,) MOTION
     energy: np.ndarray  # (1,) ENERGY
     heat: np.ndarray  # (1,) HEAT
-    totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of the published values; of mass
-    #                     and momentum of each solid (1 + d); of elastic energy and this times
-    #                     velocity
+    totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of published values; of mass and
+    #                     momentum of each solid (1 + d); of elastic energy and this times velocity
     digits: np.ndarray  # (LIMBS,) scratch
-    answer: np.ndarray  # rounded totals, and results agreed between processes
+    answer: np.ndarray  # rounded totals, results agreed between processes
     firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
     ranks: Tag  # whether there are other processes
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control with a zero clock; `firsts`: ids of the first points of solids."""
+    """A control with a zero clock; `firsts` are ids of the first points of solids."""
     clock: Any = np.zeros(1, CLOCK).view(np.recarray)
     parts = clock.step, clock.motion, clock.energy, clock.heat
     clock.motion.weight = clock.motion.stride = 1.0
@@ -387,20 +384,20 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 class Setup(NamedTuple):
     """All arguments of a step; its type selects the code."""
 
-    frame: Tag  # present or reference positions for weights
+    frame: Tag  # present or reference positions
     kin: Tag
     basis: Tag
     transfer: Tag
     averaging: Tag  # F-bar or none
     contact: Tag
-    bodies: Tag  # rigid bodies that move freely, or none
-    heat: Tag  # heat conduction and its nodes, or none
-    grids: Grid  # with an array (g,) for each number
+    bodies: Tag  # freely moving rigid bodies, or none
+    heat: Tag  # conduction and its nodes, or none
+    grids: Grid  # an array (g,) for each number
     nodes: Nodes
     buffers: Buffers
     blocks: tuple[Block, ...]  # one for each constitutive law
     spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes its range of the following
+    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes, range of the following
     #                     rows, then the ranges of node numbers in use, by part
     control: Control
 
@@ -413,7 +410,7 @@ def with_items(of, /, **items):
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """Return the first index whose number is not below `x`; NumPy's search compiles for 0.4 s."""
+    """First index whose number is not below `x`; NumPy's search takes 0.4 s to compile."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

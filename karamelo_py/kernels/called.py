@@ -1,8 +1,4 @@
-"""Python hooks called from compiled steps.
-
-A step calls a Python function by address before it maps points to nodes; the function sets forces
-on points in the arrays of the step.
-"""
+"""Python hooks that compiled steps call by address, before points are mapped to nodes."""
 
 from typing import NamedTuple
 

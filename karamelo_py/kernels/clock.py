@@ -14,53 +14,52 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """Return dt, the time that points move, in the precision of the run."""
+    """dt, the time that points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step; tiny, not 0, if there is none: laws divide by it."""
+    """dt of the previous step; tiny, not 0, if there is none, because laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
-    """Return the time for which forces act: from the middle of the last step to that of this one.
+    """Time for which forces act, from the middle of the last step to the middle of this one.
 
-    In the first step it is all of it, as if initial velocities were half a step old, or half.
+    In the first step it is the whole step, as if initial velocities were half a step old, or half.
     """
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, motion: Any, like: Number) -> tuple:
-    """Return the reference velocity (d,) for speeds, in the type of `like`."""
+    """Reference velocity (d,) for speeds, in the type of `like`."""
     return vector(kin, [real(motion.common[0, k], like) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step
 ROUNDING = 1e-6  # of a step: round-off of a million additions
 
-# If dt drops suddenly (set_dt), the dt of the contact stiffness drops by this fraction of the time:
+# If dt drops suddenly (set_dt), the dt of the contact stiffness drops by this fraction per step:
 # loaded springs stiffen over several periods.
 FOLLOWING = 0.01
-# Crossing cells adds energy: the stable step is the one at rest until points have moved this far.
-STILL = 0.25  # cells
-# Cells that a point may move in a step, if the step ignores a common drift.
+STILL = 0.25  # cells a point must move before the smaller stable step for crossing cells applies
+# cells that a point may move in a step that ignores a common drift
 STRIDE = 0.65
 
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose dt of the next step: from the fastest point, or fixed; less at the end.
+    """Choose dt of the next step from the fastest point, or fixed; shorter at the end.
 
-    The last two steps are equally shortened: prescribed or mapped velocities give impulses that do
+    The last two steps are shortened equally: prescribed or mapped velocities give impulses that do
     not vanish with dt, so a very short step would have huge forces. Contact with a stiffness of
     m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back.
     """
     step, motion, heat = control.step[0], control.motion[0], control.heat[0]
     if motion.weight > 1:
-        # The common drift may have rotated since it was measured: bounded by the speeds.
+        # the drift may have rotated since it was measured, so speeds bound it
         motion.rate = max(motion.rate, motion.wave + motion.speed * step.spacing)
     limit = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
     dt = min(step.dt_factor * limit, step.heat_factor * heat.heat_limit)
@@ -72,7 +71,7 @@ def choose_dt(control: Control) -> None:
     step.limit = limit
     step.over_limit = step.over_limit + 1 if dt > limit else 0
     remaining = step.end_time - control.values[TIME]
-    # Tolerance for rounding in many additions of dt: no final step of 1e-16.
+    # Rounding of many additions of dt must not leave a final step of 1e-16.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
@@ -136,14 +135,14 @@ def read_reports(s: Setup) -> None:
 
 def take_reports(control: Control) -> None:
     motion = control.motion[0]
-    # Points move in one sweep of a step; domains may grow in another.
+    # points move in one sweep of a step; domains may grow in another
     motion.move += motion.new_move
     if motion.new_rate > 0:
         motion.rate = motion.new_rate
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Read and accept the reports of a sweep; return whether no point failed."""
+    """Accept the reports of a sweep; return whether no point failed."""
     read_reports(s)
     take(s.control)
     return s.control.motion[0].wrong == 0
@@ -163,7 +162,7 @@ def move_check(s: Setup) -> MoveCheck:
 
 
 def checked_move(check, points, p):
-    """Return the move of point `p` in cells, and whether it is allowed."""
+    """Move of point `p` in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)
@@ -188,7 +187,7 @@ def _check_points(check, points, tiling, k):
 
 
 def check_moves(s: Setup, mode: Tag) -> bool:
-    """Check the new positions again, after hooks on them."""
+    """Check new positions again after hooks on them."""
     motion = s.control.motion[0]
     for block in s.blocks:
         _check_points(mode, block.tiling.count[1], move_check(s), block.points, block.tiling)

@@ -1,4 +1,4 @@
-"""Output quantities from the state of points: stress, strain, volume, stored energy."""
+"""Output quantities from the state of points."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def export_state(matter, out):
 
 @kernel
 def export(quantity, times_volume, matter, out):
-    """Fill ``out`` (n,) with a column; ``times_volume``: times reference volume."""
+    """Fill ``out`` (n,) with a column, times reference volume if ``times_volume``."""
     kin, points, laws = at_hand(matter)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
@@ -67,7 +67,7 @@ def impose_temperature(matter, rows, temperature):
 
 @kernel
 def impose_lighting(matter, rows, since):
-    """Light the points in these rows, times ``since`` (n,) ago."""
+    """Light the points in `rows`, at times ``since`` (n,) ago."""
     _impose(law_functions.lit, matter, rows, since)
 
 

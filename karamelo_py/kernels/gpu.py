@@ -1,9 +1,9 @@
 """A step on a GPU: functions of one thread for a point, a cell, a node, or the clock.
 
-A cell has the points that see the same nodes, and the number of the first of these. Before each
-scatter a counting sort orders points by cell, then by id. One thread sums over a cell's points,
-another at a node over cells. No two threads add to one real number: results are reproducible, and
-independent of the order in memory. `fate` (5,) has errors and extremes.
+A cell has the points that see the same nodes, and the number of its first node. Before each scatter
+a counting sort orders points by cell, then by id. One thread sums over a cell's points, another at
+a node over cells. No two threads add to one real number, so results are reproducible and do not
+depend on the order in memory. `fate` (5,) has errors and extremes.
 """
 
 import functools
@@ -32,14 +32,14 @@ from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
 MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; STATUS: 0, or 1 + a status of steps
-BEHIND = 2.0**53  # above all numbers of points
+BEHIND = 2.0**53  # above all point numbers
 CHUNK = 64  # items that one thread sums
 WARP = 32  # threads that read memory together
-REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by size of a number
+REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by number size
 OCCUPIED = 1 << 40  # in `CellLists.sums`: added per cell with points
 
 
-# Stages shown by `karamelo-py bench`, by function.
+# shown by `karamelo-py bench`
 STAGES = {
     "gather_point": "gather from the nodes, update of points",
     "load_point": "loads of points",
@@ -62,14 +62,14 @@ class CellLists(NamedTuple):
     """The n points of a block by cell, of N nodes; corner c of point p is listed as c n + p."""
 
     count: np.ndarray  # (N,) int32: points of each cell not yet listed
-    number: np.ndarray  # (n,) int32: the cell of each point
+    number: np.ndarray  # (n,) int32: cell of each point
     first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
     box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; then the count
-    cell: np.ndarray  # (boxes,) int32: the cell of a box
-    order: np.ndarray  # (n,) int32: the points
+    cell: np.ndarray  # (boxes,) int32: cell of a box
+    order: np.ndarray  # (n,) int32: points
     sums: np.ndarray  # (m,) int64: counts plus OCCUPIED, summed by chunks, level by level
-    before: np.ndarray  # (m,) int64: prefix sums of these
-    loads: np.ndarray  # (numbers, n): loads of points, before weighting
+    before: np.ndarray  # (m,) int64: prefix sums
+    loads: np.ndarray  # (numbers, n): loads of points before weighting
     boxes: np.ndarray  # (columns, boxes): sums of cells for some of their nodes
 
 
@@ -82,8 +82,6 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 
 @functools.cache  # one for all launches
 def while_steps_go_on(function: Callable) -> Callable:
-    """Return a thread function that does nothing once the steps have ended."""
-
     def go_on(i, fate, *arguments):
         if fate[STATUS] == 0:
             function(i, fate, *arguments)
@@ -106,7 +104,7 @@ def _report(fate, number, moved, rate, stride):
 
 
 def is_last(s):
-    """Return True in the last step: nothing is summed for a next one."""
+    """True in the last step, which sums nothing for a next one."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.step[0].end_time
 
@@ -114,7 +112,7 @@ def is_last(s):
 class Stage:
     """A visit of the points as thread functions.
 
-    `columns`: (array, column, whether it adds) of each column of nodes it sums. The nodes of a cell
+    `columns` are (array, column, whether it adds) of the node columns it sums; the nodes of a cell
     are summed in `parts`.
     """
 
@@ -168,7 +166,7 @@ class Stage:
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
-            # From zero: the largest so far depends on the order of threads.
+            # from zero: the largest so far depends on the order of threads
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
             _report(fate, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
@@ -193,7 +191,7 @@ class Stage:
         self.gather, self.count = gather_point, count_point
 
     def scatter(self, part: int) -> Callable:
-        """Return the function of a cell that sums over its points at a part of its nodes."""
+        """Return the function that sums a cell's points at a part of its nodes."""
         point, place, quantities = self._point, self._place, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
@@ -248,7 +246,7 @@ class Stage:
         return count * part // self.parts, count * (part + 1) // self.parts
 
     def sum(self, part: int, anew: bool) -> Callable:
-        """Return the function of a node that sums over cells, `anew` from zero."""
+        """Return the function of a node that sums over cells, from zero if `anew`."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(part)
 
@@ -329,7 +327,7 @@ def sum_counts(i, fate, cells):
 
 
 def sum_sums(i, fate, cells, level):
-    """Sum a chunk of sums; `level`: where they begin, their count, where the next begin."""
+    """Sum a chunk of sums; `level` is where they begin, their count, where the next begin."""
     begin, count, above = level
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
@@ -338,7 +336,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Find a chunk's prefix sum; `above` is the level above, -1 if there is none."""
+    """Find a chunk's prefix sum; `above` is the level above, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -372,7 +370,7 @@ def _point_and_corner(corners, count, listed):
 
 
 def sort_cell(corners: int) -> Callable:
-    """Return the function that sorts a cell's points by id (and corners)."""
+    """Return the function that sorts a cell's points by id and corner."""
 
     def key(ids, listed):
         p, corner = _point_and_corner(corners, ids.size, listed)
@@ -395,10 +393,8 @@ def sort_cell(corners: int) -> Callable:
     return sort_cell
 
 
-# --- order in memory --------------------------------------------------------------------------
-#
-# The threads of a warp take adjacent cells: the first points of these cells should be adjacent in
-# memory, then their second points.
+# --- order in memory: the threads of a warp take adjacent cells, so the first points of these cells
+# should be adjacent in memory, then their second points.
 
 
 def order_cell(i, fate, cells, come_from):

@@ -1,7 +1,7 @@
 """Hooks of fixes, totals and the energy monitor on a GPU: functions of one thread.
 
-The functions of :mod:`karamelo_py.kernels.hook_loop` process members one by one, with private
-scratch. Totals are sums of integers, in any order; several copies spread the traffic.
+Members are processed one by one with private scratch (:mod:`karamelo_py.kernels.hook_loop`). Totals
+are sums of integers, in any order; several copies spread the traffic.
 """
 
 from collections.abc import Callable
@@ -56,8 +56,6 @@ def clear_held(i, fate, holders):
 
 
 class Act(NamedTuple):
-    """The hook of a launch."""
-
     hooks: NamedTuple
     h: int
     heavy: np.ndarray  # (hooks,) members with mass
@@ -83,7 +81,6 @@ def whole_nodes(target: int, stage: int) -> Callable:
 
 
 def work_of_loads(i, fate, s, about, target):
-    """Sum the work of loads on a node, and clear them."""
     if s.nodes.sums[i, arrays.MASS] > 0:
         hooks = _hooks_with_room(about.hooks)
         hooks.chosen[0] = i
@@ -216,7 +213,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks; `which`: their range, and whether not only at the end of a run."""
+    """Publish totals of hooks; `which` is their range, and whether not only at the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):

@@ -1,8 +1,7 @@
-"""Heat flow through the nodes: its rows, and the fixes that act on it.
+"""Heat flow through the nodes, and the fixes that act on it.
 
-A temperature is to heat capacity what a velocity is to mass: nodes of heat are `Nodes` with one
-component, which the loops for velocities also serve. Equations:
-:mod:`karamelo_py.kernels.equations.heat`.
+Temperature is to heat capacity what velocity is to mass, so nodes of heat are `Nodes` with one
+component, served by the same loops (:mod:`karamelo_py.kernels.equations.heat`).
 """
 
 from typing import NamedTuple
@@ -25,12 +24,12 @@ from karamelo_py.points.kinematics import Line
 
 @point_function(otherwise=True)
 def at_heat_nodes(hooks, stage, target, s):
-    """Apply fixes to the nodes of heat."""
+    pass
 
 
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
-    # Temperatures always as in FLIP.
+    # temperatures always as in FLIP
     heat = s.control.heat[0]
     heat.set_low, heat.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
@@ -54,7 +53,7 @@ def heat_of(points):
 
 @point_function(otherwise=True)
 def at_heated_points(hooks, s):
-    """Apply fixes that supply heat to points, or set their temperature."""
+    """Apply fixes that supply heat to points or set their temperature."""
 
 
 @at_heated_points.on(arrays.Hooks)
@@ -72,12 +71,12 @@ def _of_heat(s):
 
 
 def at_its_nodes(s):
-    """Return the setup with the nodes of heat (one component)."""
+    """The setup with the one-component nodes of heat."""
     return _of_heat(s)._replace(kin=Line())
 
 
 def _take_factor(control):
-    # Reported by `Warming`: how much faster conduction has become.
+    # `Warming` reports how much faster conduction has become.
     heat = control.heat[0]
     heat.heat_limit = heat.heat_reference / control.motion[0].new_rate
 
@@ -100,16 +99,16 @@ def _at_heated_points(row, s, step):
     at_heated_points(step.hooks, s)
 
 
-# One loop gathers and scatters.
+# one loop gathers and scatters
 MAP = Visit((of_heat.Warming(),), (of_heat.HeatContent(),), OldWeights())
 FLOW = Visit((of_heat.TemperatureGradient(),), (of_heat.HeatFlow(),), OldWeights())
 
-# Capacity, heat and temperature to the nodes.
+# capacity, heat and temperature to the nodes
 SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# Also the heat flow from present gradients.
+# also the heat flow from present gradients
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
@@ -117,7 +116,7 @@ FLOW_TO_NODES = (
     AtHeatedPoints(),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
-# Fixes hold the new temperature of nodes.
+# fixes hold the new temperature of nodes
 HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
@@ -125,7 +124,7 @@ WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_facto
 class Conducting(NamedTuple):
     """Heat flows through `nodes`, with the fields of velocities and of F-bar.
 
-    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted with
+    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted by
     conductance.
     """
 

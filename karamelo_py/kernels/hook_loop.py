@@ -1,7 +1,7 @@
 """The loop of compiled hooks of fixes over members of groups, at nodes and at points.
 
-The class of `members` (`HookedNodes`, `MovingPoints`, `HeatedPoints`, ...) selects how a block of
-them is chosen and processed. `karamelo_py.kernels.hooks` describes the functions of hooks.
+The class of `members` selects how a block of them is chosen and processed;
+`karamelo_py.kernels.hooks` describes the functions of hooks.
 """
 
 from typing import NamedTuple
@@ -29,14 +29,14 @@ from karamelo_py.points.laws import is_rigid
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.formula import BLOCK, ROWS, STACK, call_evaluate
 
-# Each bare number would be a type.
+# each bare number would be a type
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)  # rows of the stack, free after evaluation
 END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
-COUNT, ACT, RUB = 0, 1, 2  # task for the members of a hook
-LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or with the velocity mapped again
+COUNT, ACT, RUB = 0, 1, 2  # tasks
+LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or the re-mapped velocity
 DONE = -1  # instead of a stage
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
@@ -55,14 +55,14 @@ class Call(NamedTuple):
 
 
 class HookedNodes(NamedTuple):
-    """Nodes for node functions, also nodes of heat."""
+    """Nodes (also of heat) for node functions."""
 
     target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, `LOADS`, `LOADS_AGAIN`
     kin: NamedTuple
     grids: np.ndarray
     nodes: NamedTuple
     ranges: np.ndarray
-    kept: float  # fraction of velocity that points retain (FLIP)
+    kept: float  # FLIP coefficient
     tag: NamedTuple = ()  # type: ignore[assignment]
     before_update: bool = False
 
@@ -97,8 +97,6 @@ class WholePoints(NamedTuple):
 
 
 class HeatedPoints(NamedTuple):
-    """Points for heat functions."""
-
     ids: np.ndarray
     kin: NamedTuple
     capacity: np.ndarray  # (1, n)
@@ -110,11 +108,11 @@ class HeatedPoints(NamedTuple):
 
 
 def _turns(members, k, parts):
-    """Return begin, end and stride of the chunks of thread `k` of `parts`."""
+    """Begin, end and stride of the chunks of thread `k` of `parts`."""
     if isinstance(members, HookedNodes):
         shares = members.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # Interleaved: members may be clustered.
+    # interleaved, because members may be clustered
     size = TURN if parts > 1 else max(members.ids.size, 1)
     return k * size, members.ids.size, parts * size
 
@@ -127,7 +125,7 @@ def _bounds(members, turn, parts):
 
 @point_function()
 def act(members, task, call, count):
-    """Do `task` with the chosen members, add to totals; return how many count."""
+    """Do `task` with the chosen members, and add to totals; return how many count."""
 
 
 @noinline
@@ -171,7 +169,7 @@ def _act_on_parts(members, task, call, k):
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)
-    # Totals of other hooks that held the nodes change too.
+    # totals of other hooks that held the nodes change too
     several = hooks.holders.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
@@ -197,7 +195,7 @@ def _act_on_all(members, task, call):
 
 
 def directions(hooks):
-    """Return the dimension at run time: loops are not unrolled."""
+    """The dimension at run time, so that loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -224,7 +222,7 @@ def evaluate(call, component, count, result, shift):
 def _evaluate_now_and_before(call, c, count):
     evaluate(call, c, count, VALUE, 0.0)
     if call.hooks.table[call.h].uses_before:
-        # Nothing precedes time 0.
+        # nothing precedes time 0
         control = call.control
         step_back = min(control.step[0].last_dt, control.values[arrays.TIME])
         evaluate(call, c, count, BEFORE, -step_back)
@@ -252,7 +250,7 @@ def _clear_total(hooks, h, control):
 
 @noinline
 def publish_total(hooks, h, control):
-    totals.carry(control.totals[totals.WORK])  # it accumulates over steps
+    totals.carry(control.totals[totals.WORK])  # accumulates over steps
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)
@@ -335,7 +333,7 @@ def _clear_held(members, holders):
 
 @noinline
 def _take_over(call, n, c, force):
-    """Make a hook hold node `n` by `force`; return the previous holders' force."""
+    """Make a hook hold node `n` by `force`; return the force of the previous holders."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     if hooks.holders.size > 0 and hooks.table[h].holds:
         holder = hooks.holders[n, c]
@@ -350,7 +348,7 @@ def _take_over(call, n, c, force):
 
 @noinline
 def _is_of_rigid(hooks, n):
-    """Return True for a node of a rigid solid's field: no work is done on it."""
+    """True for a node of a rigid solid, on which no work is done."""
     rigid = hooks.rigid_fields
     return rigid.size > 0 and rigid[n // (hooks.loads.shape[0] // rigid.size)]
 
@@ -400,8 +398,8 @@ def _change_force(members, call, c, q):
 def _change_update(members, call, c, q):
     """Change v* of a node; return total, work, and force of previous holders.
 
-    Work is impulse times the mean of the velocities before and after it; or of the holding hook, as
-    a node stopped by a bound did not move with the wall before.
+    Work is impulse times the mean of the velocities before and after it, or of the holding hook: a
+    node stopped by a bound did not move with the wall before.
     """
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, dt, kept, work, before = hooks.table[call.h], call.dt, members.kept, 0.0, 0.0
@@ -410,7 +408,7 @@ def _change_update(members, call, c, q):
     old = old_star - nodes.update[n, change]
     force = nodes.sums[n, arrays.of_force(kin) + c]
     v, star, _, total = _called(call, (mass, old, old_star), force, values)
-    # Points take v* - v: changing v is an impulse too.
+    # points take v* - v, so changing v is an impulse too
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
@@ -437,10 +435,10 @@ def _change_velocity(members, call, c, q):
     """Change a node's deforming velocity; return the total."""
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces belongs to the last step, and its holding hooks.
+    # Strain before the forces belongs to the last step and its holding hooks.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
-    # Before the forces, v* is of the last step.
+    # before the forces, v* is of the last step
     remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
     star = last if remaps or (strains_first and last == value) else v
     state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]
@@ -453,7 +451,7 @@ def _change_velocity(members, call, c, q):
 def _rub_at_nodes(members, call, count):
     hooks = call.hooks
     if members.target == arrays.ON_VELOCITY:
-        # Otherwise v* is of the last step.
+        # otherwise v* is of the last step
         if hooks.table[call.h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
                 stick(members.kin, members.nodes, hooks.programs[call.h], hooks.chosen[q])
@@ -467,9 +465,9 @@ def _rub_at_nodes(members, call, count):
 def _work_at_nodes(members, call, count):
     """Sum the work of loads on the chosen nodes, and clear them.
 
-    Force times the mean of the velocities before and after the step, with its stress, constraints
-    and contact. After the step it is what points took: mapped again, for FLIP the work on points is
-    exact. v* is off by first order in dt, much at nodes with little mass.
+    Work is force times the mean of the velocities before and after the step, with its stress,
+    constraints and contact. After the step this is what points took: for FLIP, mapped again, the
+    work on points is exact. v* is off by first order in dt, much at nodes with little mass.
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
     velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
@@ -481,7 +479,7 @@ def _work_at_nodes(members, call, count):
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n) and not _is_of_rigid(hooks, n)
-            # XPIC has replaced the change of v* by then.
+            # XPIC has replaced the change of v* by then
             moved = 2 * update[n, c] - update[n, change + c]
             if again and counts:
                 moved = velocity[n, c] + sums[n, momentum + c] / sums[n, arrays.MASS]
@@ -518,17 +516,17 @@ def _act_on_whole_nodes(members, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points: loops are not compiled again for each."""
+    """Omit functions of whole points, for each of which loops would be compiled again."""
     return arrays.with_items(hooks, whole=())
 
 
 def known_to_hooks(nodes):
-    """Return the fields that the loop uses; others would have it compiled again."""
+    """Fields that the loop uses; others would have it compiled again."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
 def hooked_nodes(s, target, kept):
-    """Return the nodes for node functions; `kept` is the FLIP coefficient."""
+    """Nodes for node functions; `kept` is the FLIP coefficient."""
     nodes = s.nodes
     trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
     return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept)
@@ -567,13 +565,13 @@ def _node_hooks(stage, members, whole, call):
         hook_call = Call(hooks, control, dt, h, share)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
-                # Before the forces (usf) v* is of the last step.
+                # before the forces (usf) v* is of the last step
                 if one.tag.row == h and members.target != arrays.ON_VELOCITY:
                     _act_on_all(one, ACT, hook_call)
         else:
             _act_on_all(members, ACT, hook_call)
         publish_total(hooks, h, control)
-    # Friction follows: now it is known which walls hold a node.
+    # Friction follows, because now the walls that hold a node are known.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -586,7 +584,7 @@ def _node_hooks(stage, members, whole, call):
 
 @point_function(otherwise=True)
 def at_nodes(hooks, stage, target, s):
-    """Apply fixes to nodes."""
+    pass
 
 
 @at_nodes.on(arrays.Hooks)
@@ -607,7 +605,7 @@ def _add_work_hooks(hooks, s, again):
 
 
 def choose_points(members, call, p, end):
-    """Choose up to a block of members, with places; return number, where to continue."""
+    """Choose up to a block of members, with positions; return number, where to continue."""
     hooks, h = call.hooks, call.h
     begin, ids, where = hooks.table[h].begin, members.ids, hooks.scratch
     count = 0
@@ -651,7 +649,7 @@ def _act_on_motion(members, task, call, count):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
             for moment in members.moments:
-                # Otherwise nodes, and strains around, follow what the point had from the grid.
+                # otherwise nodes, and strains around, follow what the point had from the grid
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
             if slot >= 0:
@@ -680,7 +678,7 @@ def _act_on_warmth(members, task, call, count):
         members.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
-        # The prescribed temperature is the bound, not the resulting one.
+        # the bound is the prescribed temperature, not the resulting one
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
         elif members.capacity[0, p] > 0:
@@ -692,7 +690,7 @@ def _act_on_warmth(members, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time now and at the end of the step (else 0), and contact times."""
+    """Formulas of time now and at the end of the step (else 0), and contact times."""
     values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):
@@ -802,7 +800,6 @@ def clear_forces(kin, force, count):
 
 
 def corners_that_move(s):
-    """Count the corners stored after a point's position, which move with it."""
     return placed(s.basis, s.kin) if s.frame.moves else 0
 
 

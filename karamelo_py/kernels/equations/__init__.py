@@ -1,6 +1,6 @@
 """Quantities that points scatter, and tasks that gather: one file each.
 
-A quantity is a tag with equations as data, `takes` and `gives`; a task has functions `empty`,
+A quantity is a tag with equations as data (`takes`, `gives`), a task one with functions `empty`,
 `gathered` and `updated`. Examples: docs/house/kernels.md.
 """
 
@@ -36,10 +36,10 @@ def _zero(kin):
 
 
 class Sum(NamedTuple):
-    """Sum over points at a node: ``of(pt, node)`` is a point's contribution, a tuple.
+    """Sum over points at a node; ``of(pt, node)`` is a point's contribution, a tuple.
 
-    Where that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none for
-    b = 0), else (): lanes arrange affine sums like records once per point, not per node.
+    If that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none if b =
+    0), else (). Lanes arrange affine sums like records once per point, not per node.
     """
 
     into: NodeColumns
@@ -48,7 +48,7 @@ class Sum(NamedTuple):
 
 
 def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
-    """Return the columns of a field, or its first `count(kin)`."""
+    """Columns of a field, or its first `count(kin)`."""
     count = count or kind.shape
     return NodeColumns(kind, _zero, count, count)
 
@@ -69,17 +69,17 @@ VELOCITY = NodeColumns("velocity", _zero, vector, lambda kin: arrays.VELOCITY_WI
 
 
 def of_point(**functions: Callable) -> MappingProxyType:
-    """Name the functions of a point in `NodalQuantity.takes`."""
+    """The functions of a point in `NodalQuantity.takes`, by name."""
     return MappingProxyType(functions)
 
 
 class NodalQuantity(NamedTuple):
-    """Base of quantities; they work in lanes. `not_at_corners`: see `kernels.stencils`."""
+    """Base of quantities; they work in lanes. See `kernels.stencils` for `not_at_corners`."""
 
     in_lanes = True
     not_at_corners = ()
     records = ""  # array of nodes to prefetch
-    adds = False  # to values at nodes, instead of replacing them
+    adds = False  # whether it adds to values at nodes
     also_reads = ()  # fields of points besides `takes`
     takes = of_point()
     gives = ()
@@ -90,7 +90,7 @@ class NodalQuantity(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Base of tasks that work in lanes, with functions ``empty``, ``gathered`` and ``updated``."""
+    """Base of tasks that work in lanes, with ``empty``, ``gathered`` and ``updated``."""
 
     in_lanes = True
     not_at_corners = ()
@@ -107,17 +107,17 @@ class Report(NamedTuple):
     """Result of a point in a task; NaN or infinity if it failed."""
 
     moved: Number  # in cells
-    rate: Number  # largest so far, as `Sweep.reported` takes it
+    rate: Number  # largest so far (`Sweep.reported`)
 
 
 @point_function()
 def empty(task: Tag, w: Work, x: tuple) -> tuple:
-    """Return the totals at the start of a gather: zeros."""
+    """Totals at the start of a gather: zeros."""
 
 
 @point_function()
 def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
-    """Return `total` plus a node's contribution."""
+    """`total` plus a node's contribution."""
 
 
 @point_function()
@@ -127,7 +127,7 @@ def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Numb
 
 @point_function()
 def load_of(quantity: Tag, pt: PointView) -> tuple:
-    """Return what a point scatters, unweighted."""
+    """What a point scatters, unweighted."""
 
 
 @point_function()
@@ -137,7 +137,7 @@ def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
 
 @point_function()
 def affine_part(quantity, w, stencil, load):
-    """Return (array, first component, value at the first node, increments per node), or ()."""
+    """(array, first component, value at the first node, increments per node), or ()."""
 
 
 def _register(kind: Any) -> None:
@@ -174,12 +174,12 @@ def _register(kind: Any) -> None:
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:
-    """Return an array of nodes by name or field class; None if it is absent."""
+    """An array of nodes by name or field class, or None."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
 
 def _at_first(w, stencil, value, slopes):
-    """Return value at the first node, and increments per node, of an affine field at a point."""
+    """Value at the first node, and increments per node, of an affine field at a point."""
     value = value if isinstance(value, tuple) else (value,)
     if not len(slopes):
         return value, ()
@@ -203,8 +203,6 @@ def _joined(parts):
 
 
 def reads(*names: str) -> Callable:
-    """Declare the point fields that a function reads."""
-
     def declare(function: Any) -> Any:
         function.reads = names
         return function
@@ -213,7 +211,7 @@ def reads(*names: str) -> Callable:
 
 
 def is_apart(w):
-    """Return True for rigid points with separate sums."""
+    """True for rigid points with separate sums."""
     return laws.is_rigid(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
@@ -231,7 +229,7 @@ def v(pt):
 
 @reads("moment")
 def moment(pt):
-    """Tensor stored with the velocity; () if none."""
+    """Tensor stored with the velocity, or ()."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
 
 

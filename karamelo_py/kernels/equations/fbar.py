@@ -2,7 +2,7 @@
 
 The volume ratio J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q N_iq
 V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
-methods", eq. 23; there over the points of a cell).
+methods", eq. 23, who average over the points of a cell).
 """
 
 from typing import NamedTuple
@@ -18,23 +18,21 @@ from karamelo_py.points.kinematics import I, nothing
 
 
 class VolumeRatio(StepField):
-    """Volume ratio of a point's trial increment."""
-
     start = 1.0
 
 
 class NodalMean(SummedField):
-    """Weighted sum and weights at a node, then the mean: volume ratios, temperatures."""
+    """Weighted sum and weights at a node, then the mean (volume ratios, temperatures)."""
 
     shape = pair
 
 
 class AveragedStress(StepField):
-    """Averaged mean stress at a point."""
+    pass
 
 
 class PressureBeside(Field):
-    """Averaged minus own pressure in the last forces (F-bar)."""
+    """Averaged minus the point's pressure in the last forces."""
 
 
 class NodalStress(SummedField):
@@ -44,17 +42,14 @@ class NodalStress(SummedField):
 
 
 class PointByPoint(NamedTuple):
-    """No averaging."""
-
     in_lanes = True
 
 
 class FBar(NamedTuple):
-    """Averaged volume changes, against volumetric locking.
+    """Averages volume changes against volumetric locking.
 
-    Volume rates d_p average to sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. Weighted with
-    volumes this is self-adjoint: the mean stress, averaged alike, gives forces whose power is that
-    of the averaged strain.
+    Volume rates d_p become sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. This is self-adjoint:
+    forces of the mean stress, averaged alike, have the power of the averaged strain.
     """
 
     in_lanes = True
@@ -65,8 +60,9 @@ class FBar(NamedTuple):
 class FBarOfSoil(FBar):
     """F-bar for laws whose yield surface uses part of the averaged pressure.
 
-    With the point's pressure, soil that dilates less than friction requires would lose strength in
-    stripes (:func:`~karamelo_py.points.laws.strengths.frictional.share_of_average`).
+    With the point's pressure alone, soil that dilates less than its friction requires would lose
+    strength in stripes
+    (:func:`~karamelo_py.points.laws.strengths.frictional.fraction_by_dilatancy`).
     """
 
     point_fields = (*FBar.point_fields, PressureBeside)
@@ -81,15 +77,13 @@ def volumes(pt):
 
 
 class Volumes(eq.NodalQuantity):
-    """Scatter volume, after and before the trial increment."""
-
     says = "volumes to grid"
     takes = eq.of_point(volumes=volumes)
     gives = (eq.Sum(eq.whole(NodalMean), lambda pt, node: tuple([node.N * V for V in pt.volumes])),)
 
 
 def mean_stress(pt):
-    """Return volume times mean Kirchhoff stress, and present volume."""
+    """Volume times mean Kirchhoff stress, and present volume."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
@@ -98,7 +92,7 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
-    """-V times averaged minus own mean stress, a tensor."""
+    """-V (averaged - the point's mean stress), a tensor."""
     _, _, f = pt.law_state_F
     V_tau, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - V_tau
@@ -106,7 +100,7 @@ def minus_V_stress_beside(pt):
 
 
 class AveragedForce(eq.NodalQuantity):
-    """Add the force of averaged minus own mean stress."""
+    """Adds the force of averaged minus the point's mean stress."""
 
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
@@ -137,12 +131,11 @@ class SetMeanStress(eq.Task):
 
 
 def no_ratio(w, like):
-    """Return the initial total of the averaged volume ratio; () without averaging."""
+    """Initial total of the averaged volume ratio; () without averaging."""
     return (real(0, like),) if isinstance(w.averaging, FBar) else ()
 
 
 def gathered_ratio(node, total):
-    """Add a node's volume ratio to `total`, where it is averaged."""
     if not len(total):
         return total
     (mean,) = row(node.of(NodalMean), node.i, 0, total)
@@ -150,7 +143,7 @@ def gathered_ratio(node, total):
 
 
 def averaged(pt, dl, ratio):
-    """Give `dl` the averaged volume change; total frame: dl = dt Fdot, F + dl is scaled."""
+    """Scale `dl` to the averaged volume change; in the total frame, F + dl is scaled."""
     if not len(ratio):
         return dl
     _, _, f = pt.law_state_F
@@ -160,7 +153,7 @@ def averaged(pt, dl, ratio):
 
 @node_task
 class TakeMean(NamedTuple):
-    """The weighted mean from its two sums."""
+    """Divides a weighted sum by its weights."""
 
     goes_through = ("nodal mean", "nodal mean")
 

@@ -16,17 +16,17 @@ from karamelo_py.points import laws
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line
 
-# Heat flow is where the force of a line is.
+# the heat flow is where a line has its force
 HEAT = eq.NodeColumns("sums", lambda kin: 0, pair, lambda kin: of_force(Line()))
 FLOW = eq.NodeColumns("sums", HEAT.end, scalar, lambda kin: of_force(Line()) + 1)
 
 
 class Temperature(StepField):
-    """Temperature of a point before the step."""
+    pass
 
 
 class Capacity(StepField):
-    """Heat capacity of a point."""
+    pass
 
 
 class Conductance(StepField):
@@ -34,7 +34,7 @@ class Conductance(StepField):
 
 
 class Volume(StepField):
-    """Volume of a point."""
+    pass
 
 
 class Supply(StepField):
@@ -48,23 +48,21 @@ class TemperatureShare(StepField):
 
 
 class HeatGradient(Field):
-    """Gradient of temperature at a point."""
-
     shape = vector
 
 
 FIELDS = Temperature, Capacity, Conductance, Volume, Supply, TemperatureShare, HeatGradient
-HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as of `HeatedPoints`
+HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as in `HeatedPoints`
 
 
 def at_least_round_off(weight):
-    """Return `weight`, tiny for 0: nodes with only a gradient need a temperature."""
+    """`weight`, but not 0: nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 
 @eq.reads("mass", "state", "material")
 def content(pt):
-    """Heat capacity, conductivity times volume, and temperature; all stored too."""
+    """Heat capacity, conductivity times volume, and temperature, which are stored too."""
     (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
@@ -74,7 +72,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # Changed by fixes.
+    # for fixes to change
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -104,7 +102,7 @@ def mean_at(pt, node):
 
 
 class HeatContent(eq.NodalQuantity):
-    """Scatter heat capacity, and heat extrapolated by gradients."""
+    """Scatters heat capacity, and heat extrapolated by gradients."""
 
     not_at_corners = ("anything",)
     says = "heat to grid"
@@ -127,7 +125,6 @@ def supply(pt):
 
 
 def flow_at(pt, node):
-    """Heat per time to a node."""
     total = at_least_round_off(node.N) * pt.supply
     for axis in range(len(pt.flow)):
         total = fma(pt.flow[axis], node.grad_N[axis], total)
@@ -151,7 +148,7 @@ class TemperatureGradient(eq.Task):
         return x - x
 
     def gathered(task, node, total):
-        # Without the hoop part of an axisymmetric gradient: a scalar has none.
+        # a scalar has no hoop part
         return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
 
     def updated(task, pt, total, totals, fastest):
@@ -160,7 +157,7 @@ class TemperatureGradient(eq.Task):
 
 
 class Warming(eq.Task):
-    """Gather the change of nodal temperature; update the point's."""
+    """Gathers the change of nodal temperature, and updates the point's."""
 
     not_at_corners = ("anything",)
     says = "temperature"
@@ -192,7 +189,7 @@ class Warming(eq.Task):
         change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
         T = where(some, fma(pt.of(TemperatureShare)[0, p], change, T), T)
         store(pt.w.points.state, p, laws.with_temperature(law, pt.kin, state, T))
-        # Compared with the undeformed body.
+        # compared with the undeformed body
         faster = laws.jacobian(law, pt.kin, state) * inverse_stretch_squared(
             pt.w.frame, pt.kin, f, pt.dt
         )

@@ -1,6 +1,6 @@
-"""Forces on nodes: f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), f_p the force of fixes.
+"""Forces on nodes: f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), with the force f_p of fixes.
 
-In the total frame with reference volume, first Piola-Kirchhoff stress and reference gradients.
+The total frame has reference volume and gradients, and the first Piola-Kirchhoff stress.
 """
 
 from karamelo_py.compiler import real
@@ -16,8 +16,6 @@ from karamelo_py.points.transfers import forces_by_arms
 
 
 class Force(StepField):
-    """Force of fixes on a point."""
-
     shape = vector
     columns = ("bx", "by", "bz")
 
@@ -36,7 +34,7 @@ def minus_V_stress(pt):
 
 @eq.reads("force")
 def force_of_fixes(pt):
-    """Force (d,) of fixes; () if none acts."""
+    """Force (d,) of fixes, or ()."""
     force = pt.load(Force, pt.v)
     if not len(force):
         return ()
@@ -46,7 +44,7 @@ def force_of_fixes(pt):
 
 @eq.reads()
 def V_mean_stress(pt):
-    """V times mean Kirchhoff stress, and present volume (F-bar); else ()."""
+    """V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
     return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
 
 
@@ -56,7 +54,7 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Force at the point, and slope, where gradients are moments of weights (MLS)."""
+    """Force at the point and its slope, where gradients are moments of weights (MLS)."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

@@ -1,21 +1,20 @@
 """Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
-A point p of mass m gives node i the velocity a_ip = v_p + the part of its moment, with weight N_ip
-m. Nodes store the mean v_i, and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, stored per mass; points
-take it back by their weights, conserving it. On the way back points retain the mean and the moment
-of v_i, and lose m sum_i N_ip |v_i - v_p|^2 / 2 less what the moment holds. FLIP, v -> alpha v + (1
-- alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of
-the second.
+A point p of mass m gives node i, with weight N_ip m, the velocity a_ip: v_p plus its moment's part.
+Nodes take the mean v_i and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is stored per mass and
+returned by the same weights. On the way back points retain the mean and the moment of v_i, and lose
+m sum_i N_ip |v_i - v_p|^2 / 2 minus the energy of the moment. FLIP, v -> alpha v + (1 - alpha) P v
+with P to the nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of the second.
+AFLIP and its kin lose these sums with their moments, which follow the velocity.
 
-AFLIP and its kin lose these sums with their moments; the moments' energy comes and goes, as moments
-follow the velocity. XPIC leaves Q^m v of v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With
-r_k = Q^k v and the terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S
-w_k|^2 + 2 sum_(k >= [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each part is local and >= 0.
+XPIC removes Q^m v from v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and the
+terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >=
+[m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each term is local and >= 0.
 
 The change dv by forces is excluded: in musl, with strain from the re-mapped velocity, what points
 do not take does not strain them either, and a hot point alone in its cells would heat itself. The
-remainder is time integration, moments mapped differently after a move (not with splines), and that
-usl strains by dv.
+rest is time integration, moments mapped differently after a move (not with splines), and usl's
+strain by dv.
 """
 
 from collections import namedtuple
@@ -31,8 +30,8 @@ from karamelo_py.points import laws, transfers
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 OnePoint = namedtuple("OnePoint", "mass v moment")  # for `transfers.nodal_momentum`
-# Fraction of the mass at its nodes above which a point loses its moment, per dimension. One point
-# per cell, on nodes, has 0.594 with quadratic splines, less with other bases.
+# Mass fraction at its nodes (per dimension) above which a point loses its moment. One point per
+# cell, on nodes, has 0.594 with quadratic splines, less with other bases.
 ALONE = 0.6
 
 
@@ -46,7 +45,7 @@ BROUGHT = whole(EnergyLoss, scalar)
 
 
 class FrictionalHeat(StepField):
-    """Frictional heat per mass at a node, of contact and walls."""
+    """Frictional heat per mass at a node, from contact and walls."""
 
 
 @node_task
@@ -64,7 +63,7 @@ class KeepLoss(NamedTuple):
             for k in range(kin.dimension):
                 v = nodes.sums[n, of_momentum(kin) + k] * factor
                 kinetic += real(0.5, mass) * v * v
-            # For rigid motion the difference is round-off of either sign.
+            # for rigid motion the difference is round-off of either sign
             noise = real(8, mass) * round_off(mass) * kinetic
             lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
             lost[n, 2] = mass
@@ -84,7 +83,7 @@ def warm_node(rubbed, n, heat):
 
 
 def warm_by_friction(pt):
-    """Give a point frictional heat of its nodes, weighted."""
+    """Give a point the frictional heat of its nodes, by weight."""
     rubbed = field(pt.w.nodes.fields, FrictionalHeat)
     if rubbed is not None:
         (law, state), like = pt.law_and_state, pt.v[0]
@@ -99,13 +98,13 @@ def warm_by_friction(pt):
 
 
 def energy_of(mass, momentum):
-    """|momentum|^2 / (2 mass); 0 without mass."""
+    """|momentum|^2 / (2 mass), or 0 without mass."""
     least = real(1e-36, mass)
     return where(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
 
 
 def warm(pt, v):
-    """Heat a point by the energy lost to the nodes and back; `v`: their velocity before."""
+    """Heat a point by the energy lost to the nodes and back; `v` is their velocity before."""
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
@@ -120,9 +119,9 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Return the part of `moment` that a point of a gas retains: none if alone.
+    """Part of `moment` that a point of a gas retains: none if it is alone.
 
-    Nodes of no other point return its own moment: driven by its pressure, its volume would grow
+    Nodes seen by no other point return its moment: driven by its pressure, its volume would grow
     without bound. The energy of the rest heats it.
     """
     lost = field(pt.w.nodes.fields, EnergyLoss)
@@ -130,7 +129,7 @@ def in_company(pt, moment):
         return moment
     mass = pt.w.points.mass[pt.p]
     one, share = real(1, mass), mass - mass
-    for node in pt.nodes:  # the point's mass fraction at its nodes
+    for node in pt.nodes:  # mass fraction of the point at its nodes
         share += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
     kept = (one - share) / real(1 - ALONE**pt.kin.dimension, mass)
     return max(min(kept, one), mass - mass) * moment
@@ -176,7 +175,7 @@ def _before(node, like):
 
 
 def _gone(pt, v, moment):
-    """Return the kinetic energy per mass that a point lost to the nodes and back."""
+    """Kinetic energy per mass that a point lost to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

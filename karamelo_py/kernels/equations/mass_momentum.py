@@ -24,7 +24,7 @@ class Centre(SummedField):
 
 @eq.reads()
 def rigid_mass(pt):
-    """Mass of a rigid point with separate sums; else ()."""
+    """Mass of a rigid point with separate sums, or ()."""
     return (of_present(pt.p, pt.w.points.mass[pt.p]),) if eq.is_apart(pt.w) else ()
 
 
@@ -35,12 +35,12 @@ def place(pt):
 
 
 def momentum(pt, node):
-    """Momentum given to a node; affine around the point in APIC and its kin."""
+    """Momentum given to a node; APIC and its kin vary it around the point."""
     return nodal_momentum(node.transfer, pt, node)
 
 
 def affine_momentum(pt, w):
-    """Momentum at the point, and gradient, where affine."""
+    """Momentum at the point, and its gradient, if affine, else ()."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
@@ -49,7 +49,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatter mass and momentum; rigid points to their separate sums."""
+    """Scatters mass and momentum; those of rigid points go to separate sums."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"
@@ -70,7 +70,7 @@ class MassMomentum(eq.NodalQuantity):
 
 @eq.reads("moment")
 def moment_again(pt):
-    """The part of the moment mapped again after the move."""
+    """Moment mapped again after the move."""
     moment = eq.moment(pt)
     return (
         mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment

@@ -1,4 +1,4 @@
-"""Move: points take the nodal velocity, v_pic = sum_i N_i v*_i, and move with it."""
+"""Points take the nodal velocity, v_pic = sum_i N_i v*_i, and move with it."""
 
 from math import inf, nan
 
@@ -18,14 +18,14 @@ from karamelo_py.points.kinematics import dot
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN if none, or reflected."""
+    """Velocity before the last step; NaN if there is none, or after a reflection."""
 
     shape = vector
     start = nan
 
 
 class Move(Task):
-    """Gather v* and its change; update velocity, position and corners; report the move in cells."""
+    """Gathers v* and its change, updates velocity, position and corners, and reports the move."""
 
     not_at_corners = ("moments",)
     records = "update"
@@ -53,7 +53,7 @@ class Move(Task):
         y = x + step
         force = pt.load(Force, old)
         if len(force) and not laws.is_rigid(w.laws):
-            # Mean nodal velocity of the step: includes stress and constraints.
+            # mean nodal velocity of the step, after stress and constraints
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
@@ -62,7 +62,7 @@ class Move(Task):
         y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
         increase(pt.of(Bounces), pt.p, hits)
         store(pt.of(VelocityBefore), pt.p, old)
-        forget(pt.of(VelocityBefore), pt.p, hits)  # on the other side of the edge
+        forget(pt.of(VelocityBefore), pt.p, hits)  # beyond the edge
         store(w.points.v, pt.p, v)
         store(pt.of(transfers.Moment), pt.p, moment)
         store(w.places.y, pt.p, y)
@@ -82,7 +82,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the place `new` with moved corners, by gathered velocities if known."""
+    """The place `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

@@ -14,19 +14,19 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
 
 
 def node_task(tag: type) -> type:
-    """Register the function ``at_node`` of a task."""
+    """Class decorator: register the function ``at_node`` of a task."""
     at_node.on(tag)(vars(tag)["at_node"])
     return tag
 
 
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
-    """1 / mass of a node; 0 without mass."""
+    """1 / mass of a node, or 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of its velocity change that a node shows: < 1 if it is light."""
+    """Fraction of its velocity change that a node shows; < 1 if it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -35,11 +35,10 @@ def unlimited(seen, n, mass, light):
 
 
 class SquaredMass(SummedField):
-    """Sum of N m^2 at a node; over the sum of N m, its points' mean mass (USL)."""
+    """Sum of N m^2 at a node; divided by the sum of N m, its points' mean mass (USL)."""
 
     @staticmethod
     def needed(basis):
-        """Return True if a basis has light nodes that affect the gradient."""
         return basis.traits.steep_edge
 
 
@@ -60,7 +59,7 @@ class NodalUpdate(NamedTuple):
 
 @node_task
 class MomentumToVelocity(NamedTuple):
-    """MUSL's re-mapped velocity, from momentum in the velocity array."""
+    """MUSL's re-mapped velocity from momentum in the velocity array."""
 
     says = "re-mapped velocity"
     goes_through = ("sums", "velocity", "velocity")
@@ -73,7 +72,7 @@ class MomentumToVelocity(NamedTuple):
 
 @node_task
 class SumsToVelocity(NamedTuple):
-    """Velocity from momentum, before the update (USF)."""
+    """Velocity from momentum before the update (USF)."""
 
     says = "nodal velocity"
     goes_through = ("sums", "velocity")
@@ -88,9 +87,9 @@ class SumsToVelocity(NamedTuple):
 class UpdateToVelocity(NamedTuple):
     """The deforming velocity is v*, limited at light nodes (USL).
 
-    A point of mass m giving a node the fraction N gets back the strain of f dt / (N m): an
-    oscillation that grows if (c dt / h)^2 > N, in d directions at once. Nodes below `light` = d (c
-    dt / h)^2 times their points' mean mass are limited; the limit vanishes with the step.
+    A point of mass m that gives a node the fraction N gets back the strain of f dt / (N m): an
+    oscillation that grows if (c dt / h)^2 > N, in d directions at once. The limit acts below
+    `light` = d (c dt / h)^2 times the points' mean mass, and vanishes with the step.
     """
 
     light: float
@@ -98,7 +97,7 @@ class UpdateToVelocity(NamedTuple):
     goes_through = ("sums", "update", "velocity")
 
     def at_node(task, kin, nodes, n, dt):
-        # Only the gradient is limited: points take the whole change, conserving momentum.
+        # only the gradient is limited; points take the whole change, which conserves momentum
         one = real(1, dt)
         share = unlimited(
             field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light

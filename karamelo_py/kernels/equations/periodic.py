@@ -1,8 +1,7 @@
-"""Periodic directions: nodes that are one node of the body, a period apart.
+"""Periodic directions: nodes a period apart are images of one node of the body.
 
-The grid has `GHOSTS` cells more at both ends of a periodic direction. Points at an end give to
-nodes beyond it; the images of a node then all get the sum of what they have, in one order, so that
-whatever follows at nodes gives them the same bits. Points return to the cell after every `EVERY`
+The grid has `GHOSTS` more cells at both ends of a periodic direction. Images of a node get the same
+total, summed in one order, so that the same bits follow. Points return to the cell every `EVERY`
 steps (`karamelo_py.run.periodic`).
 """
 
@@ -24,21 +23,21 @@ class InUse(StepField):
 
 
 class Axis(NamedTuple):
-    first: int  # number of the first node
-    stride: int  # difference of node numbers
+    first: int  # node number
+    stride: int  # of node numbers
     count: int  # nodes along the axis
-    period: int  # cells
+    period: int  # in cells
 
 
 class Seam(NamedTuple):
-    """The periodic directions of a run; takes the place of processes in `Control.ranks`."""
+    """The periodic directions of a run, in `Control.ranks` instead of processes."""
 
     axes: tuple  # of `Axis`
 
 
 @counts.on(Seam)
 def _counts_seam(ranks, n):
-    """Return True for one of the images of a node."""
+    """True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
         place = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
@@ -48,7 +47,7 @@ def _counts_seam(ranks, n):
 
 @node_task
 class Join(NamedTuple):
-    """Sum what the images of a node have, and give it to all of them."""
+    """Sums over the images of a node, and gives all of them the total."""
 
     axis: Axis
 
@@ -76,7 +75,7 @@ class JoinVelocity(NamedTuple):
 
 
 def _is_lowest(axis, nodes, n):
-    """Return True for the first node in use among its images."""
+    """True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
     place = (int(n) - axis.first) // axis.stride % axis.count
@@ -106,6 +105,6 @@ def _join(axis, nodes, array, n):
 
 
 def ask_to_sort(s):
-    """Have the points sorted after every `EVERY` steps, when those outside return."""
+    """Have the points sorted every `EVERY` steps, when those outside return."""
     if (int(s.control.values[TIMESTEP]) + 1) % EVERY == 0:
         s.control.motion[0].drift = inf

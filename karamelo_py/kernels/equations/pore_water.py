@@ -1,22 +1,21 @@
-"""Water in the pores: what points give to nodes, drag in the nodes, and the flux back to points.
+"""Water in the pores: sums at nodes, drag between soil and water, and the flux back to points.
 
 One layer of points moves with the soil; the nodes have a second velocity (Jassim, Stolle & Vermeer
 2013; Bandara & Soga 2015). Per node i: mass of the water m = sum N m_w, its momentum, the volume V
 and the pores, the force of the pressure P = sum p V g and the outward area B = sum V g. The water
-takes the fraction n = pores / V of P - B p_b, the soil the rest, with p_b the given pressure at
-open nodes, else the mean pressure. Where a node is not open, no flux crosses B.
+takes the fraction n = pores / V of P - B p_b, the soil the rest. p_b is the prescribed pressure at
+open nodes, else the mean pressure; no flux crosses B at nodes that are not open.
 
 The flux j = m / V (v_w - v_s) is made at the nodes. Rate and force use the same gradients: at the
-cell centre with a linear basis, so that all points of a cell have one pressure rate, else at the
-points.
+cell centre with a linear basis (one pressure rate per cell), else at the points.
 
-With splines, pressures that no node sees would build up: p loses the part R = 1/20 of (1 - S)^2 p
-in a step, with S the mean through the nodes and back. The volume of pores follows, not the water.
+With splines, pressures that no node sees would build up: in a step p loses the part R = 1/20 of (1
+- S)^2 p, with S the mean through the nodes and back. The volume of pores follows, not the water.
 
 Drag D acts over the step as for a solid of constant acceleration: with b = dt D / m and f = (1 -
 exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then behaves
-like one of mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w, which is what fixes see:
-any fix that holds it has the reaction of soil and water.
+like one of mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixes see this, so a fix
+that holds it has the reaction of soil and water.
 """
 
 from math import exp, inf
@@ -44,7 +43,7 @@ from karamelo_py.points.laws.pore_water import (
 )
 from karamelo_py.points.transfers import nodal_momentum, updated_velocity
 
-RIM = 0.5  # of V / h: |B| above which a node of a spline is at the surface
+RIM = 0.5  # of V / h: |B| above which a spline's node is at the surface
 SMOOTHING = 0.05  # R
 SMALL = 1e-4  # b below which (1 - exp(-b)) / b is a series
 
@@ -53,8 +52,6 @@ SMALL = 1e-4  # b below which (1 - exp(-b)) / b is a series
 
 
 class RelativeVelocity(Field):
-    """Velocity of the water relative to the soil."""
-
     shape = vector
     columns = ("wx", "wy", "wz")
 
@@ -64,7 +61,7 @@ class RelativeVelocity(Field):
 
 
 class UnseenPressure(Field):
-    """Pressure less its mean through the nodes and back, one step earlier (splines)."""
+    """Pressure minus its mean through the nodes and back, one step earlier (splines)."""
 
     needed = RelativeVelocity.needed
 
@@ -76,7 +73,7 @@ class WaterSums(SummedField):
 
 
 class PoreSums(SummedField):
-    """Volume, volume of pores, volume times pressure, and its unseen part, drag, at a node."""
+    """Volume, volume of pores, volume times pressure, its unseen part, drag."""
 
     @staticmethod
     def shape(kin):
@@ -84,8 +81,6 @@ class PoreSums(SummedField):
 
 
 class PoreForce(SummedField):
-    """Force of the pressure at a node."""
-
     shape = vector
 
 
@@ -110,10 +105,10 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux (d,); outflow through a closed node per volume; outflow of an open one; pressures.
+    """Mass flux per area (d,); two outflows; two pressures.
 
-    The flux is per area. The first outflow stays in the points, the second is mass per time. The
-    pressures are the mean at the node and the mean of the unseen part.
+    The outflow through a closed node, per volume, stays in the points; that of an open node is a
+    mass per time. The pressures are the node's mean, and the mean of the unseen part.
     """
 
     @staticmethod
@@ -122,7 +117,7 @@ class Flux(Field):
 
 
 class GivenPressure(StepField):
-    """Pressure given at a node; NaN: none."""
+    """Prescribed pressure at a node; NaN: none."""
 
     start = float("nan")
 
@@ -141,14 +136,14 @@ def _is_wet(pt):
 
 
 def pore_N(node):
-    """Weight for volumes of water: at the cell centre with a linear basis."""
+    """Weight for volumes of water, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.N
     return real(0.5**node.kin.dimension, node.N)
 
 
 def pore_grad(node):
-    """Gradient for pressure and flux: at the cell centre with a linear basis."""
+    """Gradient for pressure and flux, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.grad_N
     d = node.kin.dimension
@@ -159,7 +154,7 @@ def pore_grad(node):
 
 @eq.reads("mass", "state", "material")
 def water(pt):
-    """Mass of the water of a point, (m,); () if it is dry."""
+    """Mass of a point's water, (m,); () if it is dry."""
     if not _is_wet(pt):
         return ()
     law, state = pt.law_and_state
@@ -169,7 +164,7 @@ def water(pt):
 
 @eq.reads("v", "relative velocity")
 def water_v(pt):
-    """Velocity of the water (d,); () if the point is dry."""
+    """Velocity of a point's water (d,); () if it is dry."""
     return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
 
 
@@ -217,8 +212,6 @@ def _momentum_at(pt, node):
 
 
 class WaterMomentum(eq.NodalQuantity):
-    """Scatter mass and momentum of the water."""
-
     says = "water to grid"
     takes = eq.of_point(water=water, water_v=water_v)
     gives = (
@@ -231,7 +224,7 @@ class WaterMomentum(eq.NodalQuantity):
 
 
 class WaterForce(eq.NodalQuantity):
-    """Scatter volumes, drag, and the force of the pressure."""
+    """Scatters volumes, drag, and the force of the pressure."""
 
     says = "pore pressure to grid"
     takes = eq.of_point(pores=pores)
@@ -279,8 +272,8 @@ def _is_wet_node(nodes, n):
 class ShareForces(NamedTuple):
     """Force on the water, and the node as fixes see it: with the water that drag carries along."""
 
-    rim: float  # |B| / V of nodes that are closed
-    surface: float  # and of nodes at the surface
+    rim: float  # |B| / V of closed nodes
+    surface: float  # |B| / V of nodes at the surface
 
     says = "forces on soil and water"
     goes_through = ("sums", "water sums", "pore sums", "pore force", "pore area", "water update")
@@ -325,7 +318,7 @@ class ShareForces(NamedTuple):
 
 @node_task
 class DragWater(NamedTuple):
-    """Relative velocity after the step, from what the soil does, which has its mass again."""
+    """Relative velocity after the step, from the soil's change; restores the soil's mass."""
 
     says = "drag"
     goes_through = ("sums", "update", "water sums", "pore sums", "water update")
@@ -384,7 +377,7 @@ class MakeFlux(NamedTuple):
 
 
 class MoveWater(eq.Task):
-    """Gather w* and its change after `Move`; update the velocity of the water."""
+    """Gathers w* and its change after `Move`; updates the water's velocity."""
 
     says = "velocity of the water"
     reads = ("x", "v", "state", "material", "relative velocity")
@@ -407,7 +400,7 @@ class MoveWater(eq.Task):
         at_nodes, change = total
         law, state = pt.law_and_state
         new = updated_velocity(pt.w.transfer, pt.load(RelativeVelocity, pt.v), at_nodes, change)
-        # What the nodes do not see is dragged here, at constant momentum of the point.
+        # Drag of what the nodes do not see, at constant momentum of the point.
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
@@ -419,7 +412,7 @@ class MoveWater(eq.Task):
 
 
 class Seep(eq.Task):
-    """Gather the flux before `Strain`; update water and pores, and the velocity of the water."""
+    """Gathers the flux before `Strain`; updates water, pores and the water's velocity."""
 
     says = "water that comes and goes"
     reads = ("x", "state", "material", "deformation gradient", "v", "relative velocity")
@@ -448,7 +441,7 @@ class Seep(eq.Task):
         spread, gradient, kept, (mean, again) = total
         law, old, f = pt.law_state_F
         frame, kin = pt.w.frame, pt.kin
-        # Per volume before deformation.
+        # per volume before deformation
         leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
         lost = laws.jacobian(law, kin, old) * (leaving - kept)
         content = old.content - pt.dt * lost / law.rho

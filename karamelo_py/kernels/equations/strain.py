@@ -1,4 +1,4 @@
-"""Strain: the law's state follows from the velocity gradient sum_i v_i grad N_i."""
+"""The law's state follows from the velocity gradient sum_i v_i grad N_i."""
 
 from math import inf, sqrt
 
@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import I, det, large, outer, zero
 
 
 class Strain(Task):
-    """Gather the velocity gradient; update the law's state."""
+    """Gathers the velocity gradient, and updates the law's state."""
 
     not_at_corners = ("moments",)
     records = "velocity"
@@ -80,7 +80,7 @@ class StrainInMove(Strain):
 
 
 class TrialStrain(Strain):
-    """Gather the gradient; store only its volume ratio (F-bar)."""
+    """Gathers the gradient, and stores only its volume ratio (F-bar)."""
 
     records = ""
     says = "trial volume"
@@ -103,7 +103,7 @@ class TrialStrain(Strain):
 
 
 class TrialStrainOfLastStep(TrialStrain):
-    """`TrialStrain` for `StrainOfLastStep`."""
+    pass
 
 
 def _is_known(task, w):
@@ -115,7 +115,7 @@ def add_gradient(node, grad_v):
 
 
 def increment(dt, grad_v):
-    """Return dl = dt grad v as numbers: F + dl sums two of them."""
+    """dl = dt grad v, rounded as numbers: F + dl sums two of them."""
     return grad_v._make(dt * grad_v)
 
 
@@ -129,19 +129,19 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Return by how many cells a point's domain reaches further."""
+    """Cells by which a point's domain reaches further."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 def _fastest_wave(pt, material, fastest):
-    """Return max(fastest, c + max |v_i - common_i|); finds c only if a bound is larger."""
+    """max(fastest, c + max |v_i - common_i|); finds c only if its bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter
     speed = (pt.v - w.common).largest()
     slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # notices NaN
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # also for NaN
         return fastest
     rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
     return where(fastest > rate, fastest, rate)

@@ -13,7 +13,7 @@ from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
 class SeriesTerm(namedtuple("SeriesTerm", "k"), eq.Task):
-    """Gather term `k` of the series, from 0."""
+    """Gathers term `k` of the series, from 0."""
 
     says = "term of the series to the points"
     reads = ("x",)
@@ -37,7 +37,7 @@ def term(pt):
 
 
 class SeriesBack(eq.NodalQuantity):
-    """Scatter mass times the term to the second vector of `Series`."""
+    """Scatters mass times the term to the second vector of `Series`."""
 
     says = "term of the series to the grid"
     takes = eq.of_point(mass=eq.mass, term=term)
