@@ -127,7 +127,7 @@ def updated(task: Tag, pt: PointView, total: tuple, totals: tuple, fastest: Numb
 
 @point_function()
 def load_of(quantity: Tag, pt: PointView) -> tuple:
-    """What a point scatters, unweighted."""
+    """Return the unweighted load of a point."""
 
 
 @point_function()
