@@ -95,6 +95,7 @@ class FakeHub:
         used = np.arange(3) < dimension
         self.folder, self.asked = Path(folder), set()
         self.domain = SimpleNamespace(
+            periodic=(),
             dimension=dimension,
             lo=np.where(used, -0.5, 0.0),
             hi=np.where(used, 0.5, 0.0),

@@ -51,7 +51,9 @@ def columns(path):
 def test_a_wave_comes_back(run_script):
     """A travelling wave after ten periods: phase and height, with and without a drift."""
     script = WAVE.format(way="FLIP, quadratic-spline, 1", N=64, drift="0") + DUMP
-    v = columns(final(run_script(script + "run_time(10)")))
+    dump = final(run_script(script + "run_time(10)"))
+    assert "BOX BOUNDS pp sm sm" in dump.read_text("utf-8")
+    v = columns(dump)
     waves = [np.mean(v["vx"] * f(2 * pi * v["x0"])) * 2e4 for f in (np.sin, np.cos)]
     assert abs(np.hypot(*waves) - 1) < 0.01
     assert abs(np.arctan2(waves[1], waves[0])) < 2 * pi * 10 * 0.004

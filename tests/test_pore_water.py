@@ -266,6 +266,12 @@ MISTAKES = [
     ({"water": "pore_water(clay, n=0.4)"}, (), "the permeability is given nowhere"),
     ({"water": "pore_water(clay, n=0.4, permeability=0)"}, (), "above 0"),
     ({"water": ""}, (), ""),
+    ({"water": 2 * (USUAL["water"] + "\n")}, (), "has pore water already"),
+    (
+        {"water": "pore_water(clay, n=0.4)", "tail": "fix(p, initial_pore_pressure, all, 0)"},
+        (),
+        "the permeability is given nowhere",
+    ),
     ({"water": "", "tail": "pore_water(clay, n=0.4, permeability=1)"}, (), "has this material"),
     ({"water": "", "tail": "fix(p, initial_pore_pressure, all, 0)"}, (), "no solid has water"),
 ]
@@ -283,3 +289,10 @@ def test_a_permeability_in_the_wrong_unit_is_doubted(run_interpreted):
     script = SCENE.format(**USUAL | {"water": "pore_water(clay, n=0.4, permeability=1e-14)"})
     err = run_interpreted(script).err
     assert re.search(r"conductivity is 1e-14 m/s.*\n(.*\n)*.*intrinsic=", err)
+
+
+def test_the_density_of_saturated_soil_is_doubted(run_interpreted):
+    """Of quartz, 2650 kg/m3, with 40 % of water: 1990 saturated, 1590 dry."""
+    saturated = SCENE.format(**USUAL).replace("1590", "1990")
+    assert "3.3 times as dense as water" in run_interpreted(saturated).err
+    assert "as dense as water" not in run_interpreted(SCENE.format(**USUAL)).err

@@ -131,7 +131,7 @@ def test_conversion(hub, annotation, text, expected):
         (InputFile, "nofile.txt", "does not exist"),
         (OutputFile, "nofolder/a.txt", "folder nofolder does not exist"),
         (float, "2 3", "operator is missing"),
-        (float, "value=3", "no argument to be given as 'value"),
+        (float, "value=3", "no argument is named 'value'"),
     ],
 )
 def test_misfits_mark_the_argument(hub, annotation, text, message):
@@ -214,7 +214,7 @@ def test_classes_defaults_varargs_and_keywords(hub):
         ("g", "vx is missing", None),
         ("", "group, vx are missing", None),
         ("g 1", "vx is missing", 3),
-        ("g, 1, vz=2", "no argument to be given as 'vz = ...'", 9),
+        ("g, 1, vz=2", "no argument is named 'vz'", 9),
         ("g, 1, glue=a, glue=b", "glue is given twice", 17),
         ("broken, 1", "it is broken", 11),
         ("gone, 1", "x.txt: No such file", None),

@@ -3,13 +3,14 @@
 from typing import Annotated
 
 from karamelo_py.language.signature import Positive
-from karamelo_py.points.laws import is_rigid
+from karamelo_py.points.laws import is_rigid, specific_volume
 from karamelo_py.run.lower.pore_water import PoreWater
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9  # porosities
+HEAVIEST = 3.2  # density of grains over that of water: soils have 2.6 to 2.8, saturated 3.5
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -90,6 +91,12 @@ def pore_water(
             argument="material",
             expected="a material that deforms",
         )
+    if material.fluid is not None:
+        raise ScriptError(
+            f"material '{material.id}' has pore water already",
+            argument="material",
+            expected="one pore_water for each material",
+        )
     if material.thin:
         message = "thin bodies have no pore water"
         raise ScriptError(message, argument="material", expected="plane strain or 1D strain")
@@ -112,5 +119,13 @@ def pore_water(
             f"the hydraulic conductivity is {conductivity:.3g} m/s, outside of all soils, from "
             f"{SLOWEST:g} to {FASTEST:g}",
             hint=f"{other}, if {given} is in the wrong unit",
+        )
+    dry = 1 / float(specific_volume(material.whole))
+    grains = dry / (1 - n) / rho
+    if grains > HEAVIEST:
+        hub.warn(
+            f"the grains of '{material.id}' would be {grains:.2g} times as dense as water: "
+            f"density {dry:g} over 1 - n",
+            hint="a material takes the dry density, (1 - n) times the density of its grains",
         )
     material.fluid = PoreWater(n, drag, K, rho, float(kozeny))

@@ -77,12 +77,12 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
     hint = turned or meant(word, by_name) or longer
-    if not hint and not all(p.keyword for p in expected):
+    if expected and not (hint or by_name):
         hint = f"leave out '{word} ='; == compares"
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
     choices = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
-    message = f"there is no argument to be given as '{word} = ...'"
+    message = f"no argument is named '{word}'"
     place = argument.place
     code = "arguments"
     return ScriptError(message, place=place, expected=choices, hint=hint, code=code, name=word)

@@ -56,6 +56,8 @@ class Dependents:
             self.undeleted.add(name.removeprefix("delete_"))
         if name in _SCENE or name in ("scheme", "set_dt"):
             self.names |= _RUNS
+        if name == "pore_water":
+            self.names |= {"pore_pressure", "initial_pore_pressure", *_RUNS}
         if name == "scheme":
             self.names.update(table()["implicit"].split())
         if name in _SCENE | _NAMED and statement.arguments:

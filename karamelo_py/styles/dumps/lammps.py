@@ -90,6 +90,7 @@ class LammpsDump(TableDump):
 
     def _snapshot(self) -> Iterator[bytes]:
         update, units = self.hub.update, self.hub.output.units
+        ends = ["pp" if k in self.hub.domain.periodic else "sm" for k in range(3)]
         lines = [
             *(["ITEM: UNITS", str(units)] if units else []),
             "ITEM: TIME",  # read_dump of LAMMPS expects it first
@@ -98,7 +99,7 @@ class LammpsDump(TableDump):
             str(update.step),
             "ITEM: NUMBER OF ATOMS",
             str(self.extent()[0]),
-            "ITEM: BOX BOUNDS sm sm sm",
+            f"ITEM: BOX BOUNDS {' '.join(ends)}",
             *(f"{lo:.10g} {hi:.10g}" for lo, hi in box(self.hub)),
             "ITEM: ATOMS " + " ".join(["id", "type", *self.columns, *[ELEMENT] * self.named]),
         ]
