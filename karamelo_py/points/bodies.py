@@ -17,13 +17,13 @@ class Hertz(NamedTuple):
 
 
 class MinimizePenetration(NamedTuple):
-    """Remove the overlap of two free points within one step, with Coulomb friction."""
+    """Removes the overlap of two free points within one step, with Coulomb friction."""
 
     friction: float
 
 
 def face(kin, volume, x):
-    """Face area of a cubic point: per unit thickness in 2D, per angle around an axis or centre."""
+    """Return a cubic point's face area: per thickness in 2D, per angle around an axis or centre."""
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:
@@ -81,13 +81,13 @@ class FrictionMemory(NamedTuple):
 
 
 def rub(mu, load, memory, stop):
-    """Coulomb friction with memory: return the force and the memory after the step.
+    """Return the force of Coulomb friction with memory, and the memory after the step.
 
     `stop` = m v/dt would stop a free point, but lets loaded points creep. So slip also stretches a
-    tangential spring as stiff as the normal contact, whose force `hold` is returned to the friction
-    cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Points bounce on a stiff
-    contact and the load pulses: a step may spend friction `unused` in earlier steps, up to mu times
-    the `mean` load. A point that always slides has mu times the load of each step.
+    spring as stiff as the normal contact, whose force `hold` is returned to the friction cone
+    (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Because points bounce on a stiff
+    contact, a step may spend friction `unused` in earlier steps, up to mu times the `mean` load. A
+    point that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

@@ -34,7 +34,7 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """Convert `dl` of the frame to the spatial increment dt grad v, with F before the step."""
+    """Convert the frame's `dl` to the spatial increment dt grad v, with F before the step."""
     # F + dt Fdot = (I + dt Fdot F^-1) F (exact)
     return dl if frame.moves else dl @ inv(f)
 
@@ -60,12 +60,11 @@ def pulled_back(frame, kin, g, f):
 
 
 def scaled_increment(frame, kin, dl, f, ratio):
-    """Scale `dl` so that the volume changes by `ratio`."""
     # updated: (I + dl) s - I; total: (F + dl) s - F
     s = power(ratio, 1 / len(dl.axes))
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
 def inverse_stretch_squared(frame, kin, f, like):
-    """Bound (h / size of the deformed cell)^2, the inverse smallest stretch squared."""
+    """Return a bound of (h / size of the deformed cell)^2."""
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

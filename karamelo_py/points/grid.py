@@ -111,7 +111,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """Return R L R with R = diag(signs), the mirrored tensor L (which may be empty)."""
+    """Return the mirrored tensor R L R, R = diag(signs), or an empty one."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

@@ -39,12 +39,12 @@ class BasisTraits(NamedTuple):
 
 @point_function()
 def locate(basis, kin, grid, place):
-    """Return the stencil of a point: data computed once per point for the functions below."""
+    """Return the stencil of a point, which the functions below share."""
 
 
 @point_function()
 def support(basis, kin):
-    """Number of nodes in a stencil; constant when compiled."""
+    """Return the number of nodes in a stencil, constant when compiled."""
 
 
 @point_function()
@@ -58,28 +58,28 @@ def entry(basis, kin, grid, stencil, k):
 
 @point_function()
 def reach(basis, kin, grid, stencil, k):
-    """X_I - x of the k-th node."""
+    """Return X_I - x of the k-th node."""
 
 
 @point_function()
 def affine_weight(basis, kin, grid, stencil, k):
-    """N_I D^-1 (X_I - x) for affine transfers, with D = sum_I N_I (X_I - x)(X_I - x)^T."""
+    """Return N_I D^-1 (X_I - x), where D = sum_I N_I (X_I - x)(X_I - x)^T."""
 
 
 @point_function(otherwise=True)
 def walled(basis, faces):
-    """The basis modified at walls inside the grid (`splines.AtWalls`)."""
+    """Return the basis modified at walls inside the grid (`splines.AtWalls`)."""
     return basis
 
 
 @point_function(otherwise=True)
 def mapped_again(basis, grid, moment):
-    """Affine moment used in MUSL's second mapping."""
+    """Return the affine moment for MUSL's second mapping."""
     return moment
 
 
 def without_moment(basis, grid, moment):
-    """No moment in MUSL's second mapping, because B D^-1 is unbounded where D vanishes.
+    """Return no moment for MUSL's second mapping: B D^-1 is unbounded where D vanishes.
 
     Points retain B, but their deformation omits it.
     """
@@ -88,12 +88,12 @@ def without_moment(basis, grid, moment):
 
 @point_function(otherwise=True)
 def first_node(basis, like):
-    """Offset to a position in cells that makes its integer part the first node."""
+    """Return the offset of a position in cells whose integer part is the first node."""
     return 0
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Number of components of a place after the position, in `d` dimensions."""
+    """Return the number of components of a place after the position, in `d` dimensions."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -106,35 +106,35 @@ def blank(basis, kin, x):
 
 @point_function(otherwise=True)
 def deformed(basis, kin, place, dl):
-    """`place` after its shape is deformed by dl = dt grad v."""
+    """Return `place` with its shape deformed by dl = dt grad v."""
     return place
 
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, place):
-    """Number of cells that the domain's corners, or the nodes they scatter to, may reach."""
+    """Return the cells that the domain's corners, or the nodes they scatter to, may reach."""
     return grid.h - grid.h
 
 
 @point_function(otherwise=True)
 def carried(basis, kin):
-    """Number of domain corners that move with the grid; constant when compiled."""
+    """Return the number of corners that the grid moves, constant when compiled."""
     return 0
 
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """Number of corners stored by position, right after the point's."""
+    """Return the number of corners stored by position after the point's."""
     return 0
 
 
 @point_function(otherwise=True)
 def carrier(basis, kin, grid, stencil, corner):
-    """Nodes and weights that move a corner: a :class:`Weighted`."""
+    """Return the nodes and weights that move a corner, a :class:`Weighted`."""
     return ()
 
 
 @point_function(otherwise=True)
 def carry(basis, kin, place, corner, displacement):
-    """`place` after one corner of the domain is displaced."""
+    """Return `place` with one corner of the domain displaced."""
     return place

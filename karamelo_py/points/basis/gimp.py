@@ -144,7 +144,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, place, direction, halves):
-    """Centre and ends of an uncut box in one direction, in cells, its half size within `halves`."""
+    """Return an uncut box in one direction: centre and ends in cells; `halves` bound it."""
     a = in_cells(grid, direction, place[direction])
     half = place[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -152,7 +152,7 @@ def box(grid, kin, place, direction, halves):
 
 
 def in_cell(lo, hi, j):
-    """Integrals of 1 and of node j + 1's hat over [lo, hi] within the cell after node j."""
+    """Integrate 1 and the hat of node j + 1 over [lo, hi] within the cell after node j."""
     p = max(lo - j, 0)
     q = min(hi - j, 1)
     length = max(q - p, 0)
@@ -160,7 +160,7 @@ def in_cell(lo, hi, j):
 
 
 def averaged_hats(cells, grid, first, lo, hi):
-    """Hats from node `first`, averaged over [lo, hi] in cells from that node."""
+    """Average hats from node `first` over [lo, hi], in cells from that node."""
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
     behind = [length - part for length, part in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
@@ -202,7 +202,7 @@ def _along_cpgimp_corners(basis, kin, grid, place, direction):
 
 
 def _end(at, first, top):
-    """Cell of a box's end counted from node `first`, at most `top`, and the position in it."""
+    """Return the cell of a box's end (`first` is 0, `top` the last), and the position in it."""
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i

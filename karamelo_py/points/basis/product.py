@@ -43,42 +43,41 @@ def along(basis, kin, grid, place, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """N D^-1 (X_I - x) of a line's nodes, if `along` leaves it out."""
+    """Return N D^-1 (X_I - x) of a line's nodes, if `along` leaves it out."""
     return line.affine
 
 
 @point_function(otherwise=True)
 def spacing(basis):
-    """Distance of adjacent nodes, in cells."""
     return 1
 
 
 @point_function(otherwise=True)
 def inverse_spread(basis, grid):
-    """(D^-1,) if D is constant away from walls (`evenly`), else ()."""
+    """Return (D^-1,) if D is constant away from walls (`evenly`), else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def evenly(basis, grid, stencil):
-    """True if a point's D^-1 is `inverse_spread`."""
+    """Return True if a point's D^-1 is `inverse_spread`."""
     return True
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """Gradient of a weight, followed by N / r (dN/dr at r = 0) per hoop direction."""
+    """Return a weight's gradient, then N / r (dN/dr at r = 0) for each hoop direction."""
     if kin.hoops:
         slopes = (*slopes, *[where(inv_r > 0, weight * inv_r, slopes[0])] * kin.hoops)
     return gradient(kin, slopes)
 
 
 def inverse_radius(r):
-    """1 / r, or 0 where it would overflow."""
+    """Return 1 / r, or 0 where it would overflow."""
     return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
 def radius(basis, grid, line):
-    """Radius that the weights reproduce: the point's, unless a wall cuts its domain."""
+    """Return the radius that the weights reproduce: the point's, unless a wall cuts its domain."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)
@@ -114,7 +113,7 @@ def item(values, k):
 
 
 def with_each_replaced(weights, others):
-    """Products of the weights with one direction's factor replaced by `others`, per direction."""
+    """Return products of the weights with one factor replaced by `others`, per direction."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 

@@ -23,7 +23,7 @@ class AtWalls(NamedTuple):
 
 @point_function(otherwise=True)
 def walls_of_cell(basis, kin, grid, place, direction):
-    """(lower face of the point's cell is a wall, upper face is), or ()."""
+    """Return (whether the lower face of the point's cell is a wall, the upper face), or ()."""
     return ()
 
 
@@ -33,7 +33,6 @@ def _walls_of_cell_at_walls(basis, kin, grid, place, direction):
 
 
 def hats(grid, a, cell, first, count):
-    """Hat functions of a cell for `count` nodes from `first`."""
     t, number = a - cell, cell - first
     weights = [where(number == k, 1 - t, where(number == k - 1, t, 0)) for k in range(count)]
     slope = grid.inv_h
@@ -128,7 +127,6 @@ class QuadraticSplineAtWalls(AtWalls):
 
 
 def of_splines(basis: type, of: type, functions: tuple) -> None:
-    """Give `of`, the class for walls inside the grid, the functions of `basis`."""
     of.traits = basis.traits
 
     @walled.on(basis)
@@ -219,10 +217,7 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
 
 
 def at_wall(grid, direction, a, cell, walls, *, inside):
-    """Line of a cell next to a wall; the fourth node has no weight.
-
-    Without walls `inside` the grid, only a one-cell grid is between two walls.
-    """
+    """Return the line of a cell at a wall; without walls `inside`, one cell has two."""
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
     between = hats(grid, a, cell, first, 4)  # between two walls
@@ -244,7 +239,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
 
 
 def next_to_wall(grid, t):
-    """N, dN/dx and N D^-1 (X - x) of the first three nodes from a wall `t` cells away.
+    """Return N, dN/dx and N D^-1 (X - x) of three nodes from a wall `t` cells away.
 
     The ghost node changes D to h^2 t (1 - t + t^2/3); t cancels out of N D^-1 (X - x).
     """

@@ -13,10 +13,7 @@ ENTRIES = 256  # of a table, per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Positions in cells from a node, and weights there averaged over the point domains, if any.
-
-    `half` is half the size of a point in cells.
-    """
+    """Return positions in cells from a node and the weights there, averaged over point domains."""
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
         hats = np.maximum(1 - np.abs(x), 0)

@@ -38,8 +38,6 @@ class Line(NamedTuple):
 
 
 class PlaneStrain(NamedTuple):
-    """2D plane strain, unit thickness."""
-
     word = "plane-strain"
     per = " per thickness"
     hoops = 0
@@ -98,7 +96,6 @@ KINEMATICS = {1: Line, 2: PlaneStrain, 3: Space}
 
 
 def free_from(kin):
-    """A direction in which a body can translate, which the radius is not."""
     return 1 if kin.hoops else 0
 
 
@@ -122,7 +119,6 @@ def product(factors):
 
 
 def dot(*vectors):
-    """sum_k a_k b_k (c_k ...)"""
     return total([product(components) for components in zip(*vectors, strict=True)])
 
 
@@ -130,9 +126,8 @@ class Elements(tuple):
     """Components that exist in a kinematics.
 
     `places`: (row, column) of each, from 0 (of vectors, the direction twice). `axes`: row indices.
-    Tensors also have `acting` (`places` with the direction in which a row acts: the radius for hoop
-    components) and `rows` (per direction, index and column of the components acting along it, the
-    last first).
+    Tensors have `acting`, `places` with the direction in which a row acts (radial for hoop
+    components), and `rows`, per direction the index and column of its components, the last first.
     """
 
     __slots__ = ()
@@ -169,7 +164,7 @@ class Elements(tuple):
         return self._make([-a for a in self])
 
     def with_diagonal(self, p):
-        """Add p I; p = 0 compiles to nothing."""
+        """Return the tensor plus p I; p = 0 compiles to nothing."""
         pairs = zip(self, self.places, strict=True)
         return self._make([a + p if i == j else a for a, (i, j) in pairs])
 
@@ -222,8 +217,6 @@ I = Isotropic(1)  # noqa: E741
 
 
 class Vector(Elements):
-    """A vector, or the gradient of a basis function."""
-
     __slots__ = ()
 
     def planar(self):
@@ -240,7 +233,7 @@ class Matrix(Elements):
     __slots__ = ()
 
     def dot(self, gradient):
-        """s_ij g_j, rounded once per term; hoop components act radially."""
+        """Return s_ij g_j, rounded once per term; hoop components act radially."""
         made = []
         for (k, j), *rest in self.rows:
             made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
@@ -261,7 +254,7 @@ class Tensor(Matrix):
     __slots__ = ()
 
     def __matmul__(self, other):
-        """a_ik b_kj, or a_ij b_j for a vector."""
+        """Return a_ik b_kj, or a_ij b_j for a vector."""
         if isinstance(other, Vector):
             d = self.kin.dimension
             rows = [zip(self[d * i : d * i + d], other, strict=False) for i in range(d)]
@@ -286,11 +279,11 @@ class Tensor(Matrix):
         return self
 
     def strain_at_end(self):
-        """Strain whose stress is added after the old stress is rotated, for small increments."""
+        """Return the strain for small increments: its stress is added to the rotated old stress."""
         return sym(self)
 
     def after(self, dl):
-        """(I + dl) F as F + dl F, which preserves the digits of small increments."""
+        """Return (I + dl) F as F + dl F, which preserves the digits of small increments."""
         a, b = dl.at(), self.at()
         return self._make(
             [
@@ -310,7 +303,7 @@ class Tensor(Matrix):
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
     def stretch(self):
-        """U = sqrt(F^T F) for det F != 0.
+        """Return U = sqrt(F^T F) for det F != 0.
 
         2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
         1984, J. Elasticity 14). 3D: Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
@@ -352,7 +345,7 @@ class Tensor(Matrix):
 
 
 def further_terms(squared):
-    """tan(x) / x - 1 - x^2 / 3 as a function of x^2, with error x^8/46."""
+    """Return tan(x) / x - 1 - x^2 / 3 from x^2, with error x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
@@ -374,13 +367,12 @@ def determinant(a, d):
 
 
 def squares(a, axes, i, j):
-    """a_ik a_jk, or 1 if the component is absent."""
     terms = [a[i, k] * a[j, k] for k in axes if (i, k) in a and (j, k) in a]
     return total(terms) if len(terms) else 1
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a large rotation; its strain and rotation come from ln(I + dl)."""
+    """dl of a large rotation, whose strain and rotation are ln(I + dl)."""
 
     __slots__ = ()
 
@@ -394,7 +386,7 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.logarithm
 
     def strain_at_end(self):
-        """Strain in the axes at the end: the added stress rotates by half the angle."""
+        """Return the strain in the axes at the end: the added stress rotates by half the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
@@ -402,10 +394,10 @@ algebra(LargeIncrement)
 
 
 def large(dl):
-    """ln(I + dl) = 2 artanh(G / 2) with the midpoint gradient G = 2 dl (2 I + dl)^-1.
+    """Return ln(I + dl) = 2 artanh(G / 2), with the midpoint gradient G = 2 dl (2 I + dl)^-1.
 
-    Odd powers of G are skew for a pure rotation (Hughes & Winget 1980), so truncation causes no
-    strain. The error is G^7/448.
+    For a pure rotation odd powers of G are skew (Hughes & Winget 1980): no strain by truncation.
+    The error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -425,11 +417,11 @@ class SymmetricTensor(Matrix):
         return total([self[i] for i in axes]) / len(axes)
 
     def turned(self, dl):
-        """R s R^T with the rotation R of the increment (Jaumann, objective).
+        """Return R s R^T with the rotation R of the increment (Jaumann, objective).
 
         R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
-        |w|^2/12): orthogonal to round-off, angle error |w|^5/120 (without the second term, as
-        Hughes & Winget 1980, |w|^3/12). A `LargeIncrement` has two more terms.
+        |w|^2/12), orthogonal to round-off, with angle error |w|^5/120 (Hughes & Winget 1980 without
+        the second term: |w|^3/12). A `LargeIncrement` has two more terms.
         """
         if self.kin.dimension == 1:
             return self
@@ -477,7 +469,7 @@ class SymmetricTensor(Matrix):
         return self._make([total([a[i, m] * r[j, m] for m in axes]) for i, j in self.places])
 
     def carried(self, dl):
-        """F s F^T with F = I + dl."""
+        """Return F s F^T with F = I + dl."""
         f, s = {(i, i): 1 for i in range(3)} | (I + dl).at(), self.at()
 
         def times_s(i, j):
@@ -490,13 +482,13 @@ class SymmetricTensor(Matrix):
         return self._make([component(i, j) for i, j in self.places])
 
     def largest_row_sum(self):
-        """max_i sum_j |s_ij|, a bound of the largest eigenvalue (Gershgorin)."""
+        """Return max_i sum_j |s_ij|, a bound of the largest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
         return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
 
     def smallest_row_difference(self):
-        """min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest eigenvalue (Gershgorin)."""
+        """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest (Gershgorin)."""
         a = self.at()
         rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
@@ -596,7 +588,6 @@ def det(f):
 
 
 def inv(f):
-    """F^-1 by Cramer's rule, for det F != 0."""
     a, d = f.at(), f.kin.dimension
     k = 1 / determinant(a, d)
     return f._make(
@@ -627,12 +618,12 @@ def inner(s, e):
 
 
 def von_mises(s):
-    """sqrt(3/2 s:s) of a deviator s: |s_xx - s_yy| in uniaxial stress."""
+    """Return sqrt(3/2 s:s) of a deviator s: |s_xx - s_yy| in uniaxial stress."""
     return sqrt(1.5 * inner(s, s))
 
 
 def outer(a, b):
-    """a_i b_j, with the hoop component a_r N/r if b has N/r."""
+    """Return a_i b_j, with the hoop component a_r N/r if b has N/r."""
     out = b.tensor._make([a[i] * b[j] for i, j in b.tensor.acting])
     if COMPILED:
         out.origin = add_outer, a, b

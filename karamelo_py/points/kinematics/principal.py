@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Return the unordered principal values (3,) and directions of a symmetric tensor."""
+    """Return the principal values (3,) of a symmetric tensor, unordered, and its directions."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -21,8 +21,7 @@ def principal(s):
 def from_principal(s, values, directions, slopes=None):
     """Build a tensor of the class of `s` from principal values and directions.
 
-    `slopes` (3,): derivatives of the values as functions of another tensor's; they give the limit
-    for equal values.
+    `slopes` (3,) are derivatives of the values as functions of another tensor's, for equal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -52,7 +51,7 @@ def principal_in_plane(s):
 
 
 def jacobi_rotation(a, b, c):
-    """Cosine, sine and tangent of the rotation that diagonalises [[a, c], [c, b]]."""
+    """Return cosine, sine and tangent of the rotation that diagonalises [[a, c], [c, b]]."""
     cotangent = (b - a) / where(c == 0, 1, c + c)
     t = 1 / (abs(cotangent) + sqrt(cotangent * cotangent + 1))
     t = where(c == 0, 0, where(cotangent < 0, -t, t))
@@ -93,7 +92,6 @@ def rotated(k, g, u, v):
 
 
 def real_principal(s):
-    """`principal` with real values where they are integers without strain."""
     values, directions = principal(s)
     return [1.0 * x for x in values], directions
 
@@ -124,7 +122,7 @@ class TurningFrame(NamedTuple):
 
 
 def in_frame(s, directions):
-    """Components in a frame: (3,) diagonal, and off-diagonal ones of the pairs."""
+    """Return components in a frame: (3,) diagonal, and off-diagonal ones of the pairs."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)

@@ -44,7 +44,7 @@ class Absent(NamedTuple):
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """Classes of a law (or table of laws) and its parts; they select kernels and arrays."""
+    """Return the classes of a law (or table of laws) and its parts; kernels depend on them."""
     parts = [law_kind(part) for part in law if isinstance(part, tuple)]
     return type(law), *(kind for part in parts for kind in part)
 
@@ -57,7 +57,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """True if the point function is defined for the law or one of its parts."""
+    """Return True if the point function is defined for the law or one of its parts."""
     kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
     return any(function.defined(kind) for kind in kinds)
 
@@ -97,7 +97,7 @@ def column(part: type, name: str, source: Callable | NamedTuple) -> None:
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """Map names of columns, those of the parts first, to tags for `shown`."""
+    """Map names of columns, the parts' first, to tags for `shown`."""
     kinds = reversed(law_kind(law)[1:])
     tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
     return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
@@ -115,7 +115,6 @@ def shown(tag, law, kin, state):
 
 @point_function(otherwise=True)
 def shown_by(law, kin, state, tag):
-    """Value of a column of the law, or of the law within."""
     return shown(tag, law, kin, state)
 
 
@@ -152,7 +151,7 @@ def initial_state(law, kin, like):
 
 @point_function()
 def advance(law, kin, state, dl, dt):
-    """State after a step dt with the increment dl = dt grad v."""
+    """Return the state after a step dt with the increment dl = dt grad v."""
 
 
 class FbarStep(NamedTuple):
@@ -168,7 +167,7 @@ def advance_fbar(law, kin, state, step):
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """det F times the Cauchy stress; nodal forces are its product with the reference volume."""
+    """Return det F times the Cauchy stress; forces take it times the reference volume."""
 
 
 @point_function()
@@ -178,61 +177,58 @@ def cauchy_stress(law, kin, state):
 
 @point_function(otherwise=True)
 def jacobian(law, kin, state):
-    """det F."""
+    """Return det F."""
     return state.J
 
 
 @point_function()
 def deformation(law, kin, state):
-    """F, if the state has it."""
+    pass
 
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """True if the law sums strains, so that load steps need their logarithm; constant when
-    compiled.
-    """
+    """Return True, constant when compiled, if load steps need the logarithm of the strain."""
     return True
 
 
 @point_function()
 def wave_speed_squared(law, kin, state):
-    """Squared speed of the fastest small disturbance, for the stable step."""
+    """Return the squared speed of the fastest small disturbance, for the stable step."""
 
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Upper bound of `wave_speed_squared`, if cheaper."""
+    """Return an upper bound of `wave_speed_squared`, if cheaper."""
     return wave_speed_squared(law, kin, state)
 
 
 @point_function(otherwise=True)
 def stretch_across(law, state):
-    """Thickness over the initial thickness."""
     return 1
 
 
 @point_function(otherwise=True)
 def is_round(law):
-    """True if a bar pulled along x contracts equally in y and z."""
+    """Return True if a bar pulled along x contracts equally in y and z."""
     return True
 
 
 @point_function(otherwise=True)
 def shear_part(law, kin, state):
-    """2 G / rho in `wave_speed_squared`, or more: thin bodies have slower waves."""
+    """Return the part 2 G / rho of `wave_speed_squared`, or more: thin bodies have slower waves."""
     return wave_speed_squared(law, kin, state)
 
 
 @number
 @point_function()
 def energy_density(law, kin, state):
-    """Stored energy per reference volume."""
+    """Return the stored energy per reference volume."""
 
 
 @point_function(otherwise=True)
 def constrained_velocity(law, v, v_grid):
-    """Velocity after a step: `v_grid`, or v for rigid bodies."""
+    """Return the velocity after a step: `v_grid`, or v for rigid bodies."""
     return v_grid
 
 
@@ -243,20 +239,20 @@ def is_rigid(law: tuple) -> bool:
 @number
 @point_function(otherwise=True)
 def dissipated_energy(law, kin, state):
-    """Dissipated energy per reference volume; undefined if the law dissipates none."""
+    """Return the dissipated energy per reference volume; undefined if the law dissipates none."""
     return specific_volume(law) - specific_volume(law)
 
 
 @number
 @point_function()
 def damage(law, kin, state):
-    """Damage from 0 (intact) to 1 (broken)."""
+    """Return the damage, 0 (intact) to 1 (broken)."""
 
 
 @number
 @point_function()
 def damage_initiation(law, kin, state):
-    """Damage initiation, which grows from 0; damage begins at 1."""
+    """Return the damage initiation, which grows from 0; damage begins at 1."""
 
 
 @number
@@ -272,25 +268,24 @@ def with_temperature(law, kin, state, T):
 
 @point_function(otherwise=True)
 def heat_capacity(law, like):
-    """Heat capacity per mass and kelvin; 0 for laws without temperature."""
+    """Return the heat capacity per mass and kelvin; 0 for laws without temperature."""
     return real(0, like)
 
 
 @point_function(otherwise=True)
 def lit(law, kin, state, since):
-    """State of an explosive a time `since` after lighting."""
+    """Return the state of an explosive a time `since` after lighting."""
     return state
 
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """State with `heat` more internal energy per reference volume, if it stores any."""
+    """Return the state with `heat` more internal energy per reference volume, if it stores any."""
     return state
 
 
 @point_function(otherwise=True)
 def conductivity(law, like):
-    """Conductivity: heat flux per gradient."""
     return real(0, like)
 
 
@@ -302,15 +297,14 @@ def elastic_strain(law, kin, state):
 @number
 @point_function()
 def plastic_strain(law, kin, state):
-    """Equivalent plastic strain."""
+    pass
 
 
 @point_function()
 def with_stress(law, kin, state, stress):
-    """State with this Cauchy stress (fix initial_stress)."""
+    """Return the state with this Cauchy stress (fix initial_stress)."""
 
 
 @point_function(otherwise=True)
 def specific_volume(law):
-    """Reference volume per mass."""
     return law.specific_volume

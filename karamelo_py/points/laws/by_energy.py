@@ -53,7 +53,7 @@ class _ProgramWriter:
         self.numbers: dict[float, int] = {}
 
     def code(self, root: Term) -> Code:
-        """Stack program of a formula; () for 0."""
+        """Return a formula's stack program; () for 0."""
         if is_number(root, 0):
             return ()
         made: list[tuple[str, Any]] = []
@@ -102,7 +102,6 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """Value of a program at `arguments`; 0 without a program."""
     if not len(code):
         return 0
     stack = ()
@@ -123,8 +122,6 @@ def evaluated(code, law, arguments):
 
 
 class ByEnergy(OfDeformation):
-    """Base of laws with a stored energy; one class per formula."""
-
     __slots__ = ()
     traits = LawTraits(rebounds=True)
     in_lanes = True
@@ -276,7 +273,7 @@ def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float
 
 
 def directional_stiffness(law: NamedTuple, stretches: Sequence[float], a: int) -> float:
-    """l_a^2 d2W/dl_a^2 at principal stretches: rho c^2 of a wave along direction `a`."""
+    """Return l_a^2 d2W/dl_a^2 at principal stretches, rho c^2 of a wave along direction `a`."""
     if isinstance(law, OfStretches):
         return stretches[a] ** 2 * evaluated(law.second[(0, 3, 5)[a]], law, stretches)
     squares = [x * x for x in stretches]
@@ -295,7 +292,7 @@ SCANNED = 0.5, 3.0  # stretches
 
 
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Path and stretch nearest to rest where a principal direction loses its stiffness."""
+    """Return path and stretch nearest to rest where a principal direction loses its stiffness."""
     unstable = []
     for path, stretches in PATHS.items():
         for end in SCANNED:
@@ -323,7 +320,7 @@ def squared(s):
 
 @point_function()
 def variables(law, F, b):
-    """I1, I2, J, and with fibres I4 and I6."""
+    """Return I1, I2, J, and with fibres I4 and I6."""
 
 
 @variables.on(OfInvariants)
@@ -386,7 +383,7 @@ def stiffness_of_matrix(law, b, at):
 
 
 def along_direction(law, at, x, rest):
-    """l^2 d2W/dl^2 of a stretch l = sqrt(x) if the squares of the other two sum to `rest`."""
+    """Return l^2 d2W/dl^2 of a stretch l = sqrt(x); the other two squares sum to `rest`."""
     J, at = at[2], (*at, 1, 1)
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]
@@ -429,7 +426,7 @@ CLOSE = 1e-5  # squared stretches this close count as equal
 
 
 def limits_of(law, at, slopes):
-    """Limits of (tau_a - tau_b) / (l_a^2 - l_b^2) for equal stretches."""
+    """Return limits of (tau_a - tau_b) / (l_a^2 - l_b^2) for equal stretches."""
     W11, W12, W13, W22, W23, W33 = [evaluated(code, law, at) for code in law.second]
     twice = (W11 + W22 - 2 * W12, W11 + W33 - 2 * W13, W22 + W33 - 2 * W23)
     each = zip(PAIRS, twice, strict=True)
@@ -458,7 +455,7 @@ def _shear_part_of_stretches(law, kin, state):
 
 
 def shear_between(law, at):
-    """Largest rho c^2 of shear waves, l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
+    """Return the largest rho c^2 of shear waves, l_a^2 (tau_a - tau_b) / (l_a^2 - l_b^2)."""
     slopes = [evaluated(code, law, at) for code in law.first]
     limits = limits_of(law, at, slopes)
     squares = []

@@ -163,7 +163,7 @@ def after_flow(law, trial, y, w):
 
 
 def residuals(law, trial, y, w):
-    """Residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
+    """Return residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
     q, p, pc = after_flow(law, trial, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
@@ -189,8 +189,8 @@ _NEWTON = 4
 def plastic_flow(law, q, p, pc):
     """Return the y and w that bring a trial with q and p back to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution is between
-    y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
+    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains, with its solution
+    between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # outside the surface, for unused lanes

@@ -16,7 +16,6 @@ from karamelo_py.script.errors import ScriptError
 
 @point_function(otherwise=True)
 def initial_damage(damage, like):
-    """Memory of an intact point."""
     return ()
 
 
@@ -40,7 +39,7 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """Damage initiation, which grows from 0; damage begins at 1."""
+    """Return the damage initiation, which grows from 0; damage begins at 1."""
 
 
 # lower triaxiality: most metals have no finite failure strain

@@ -77,5 +77,5 @@ def _cauchy_stress_of_deformation(law, kin, state):
 
 @laws.elastic_strain.on(OfDeformation)
 def _elastic_strain_of_deformation(law, kin, state):
-    """Green-Lagrange strain (F^T F - I) / 2."""
+    """Return the Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

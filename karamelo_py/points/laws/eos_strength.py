@@ -171,7 +171,7 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """True if the temperature affects no strength, pressure or damage, and is never read."""
+    """Return True if nothing reads the temperature or depends on it."""
     pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -236,13 +236,13 @@ FAST = 0.02  # of the wave speed; metals yield in faster impacts
 
 
 def _locks(law, scene):
-    """True if flow in load steps conserves volume, which linear cells cannot represent."""
+    """Return True if flow in load steps conserves volume, which linear cells cannot represent."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"place": scene.method.place}
 
 
 def _locks_at_impact(law, scene):
-    """True at impact in the total frame, where points never leave their linear cells."""
+    """Return True at impact in the total frame, where points never leave their linear cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"place": scene.method.place}
 
@@ -336,7 +336,6 @@ def _advance_fbar_eos_strength(law, kin, state, step):
 
 
 def rotated_with_point(law, kin, s, dl):
-    """Return the rotated deviatoric stress, and the strain that adds to it."""
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
@@ -355,7 +354,7 @@ def intact_pressure(law, j, m):
 
 
 def volume_energy(law, j, m):
-    """Volumetric energy of the intact material at its temperature."""
+    """Return the volumetric energy of the intact material at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = eos.compression_energy(law.eos, elastic, m.energy)
     energy += strengths.added_energy(law.strength, law, elastic, m)
@@ -368,7 +367,7 @@ def volume_energy(law, j, m):
 
 
 def full_pressure(law, j, m):
-    """Pressure in the stress; damage reduces tension only."""
+    """Return the pressure of the stress; damage reduces tension only."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * integrity_of(law, m.damage), p) + sum(m.viscous)
 
@@ -380,10 +379,10 @@ def sound(law, j, m):
 
 
 def sound_lost_to_damage(law, j, m):
-    """Squared wave speed lost to damage.
+    """Return the squared wave speed lost to damage.
 
-    A broken point in tension has no waves. Closed again at its initial volume it has the waves of
-    rubble; these always count, because it may close soon.
+    A broken point in tension has no waves, but may soon close: the waves of rubble at its initial
+    volume always count.
     """
     if isinstance(law.damage, Absent):
         return 0
@@ -487,7 +486,7 @@ def _shear_part_eos_strength(law, kin, state):
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Energy released by unloading at this temperature, without plastic work."""
+    """Return the energy that unloading at this temperature releases, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0

@@ -88,7 +88,7 @@ known_failure(
 
 
 def fibre(law, F, family):
-    """a0 a0 of a family, with the components of C."""
+    """Return a0 a0 of a family, with the components of C."""
     a = law[FIRST + 3 * family : FIRST + 3 * family + 3]
     made = F.symmetric
     return made._make([a[i] * a[j] for i, j in made.places])
@@ -115,7 +115,7 @@ def _kirchhoff_stress_of_fibres(law, kin, state):
 
 
 def stiffness_of_fibres(law, b, at):
-    """Stiffness of fibres, from |a n|^2 <= I4 for a unit vector n."""
+    """Return bounds of the fibres' stiffness; |a n|^2 <= I4 for a unit vector n."""
     # Slack fibres count with their stiffness at rest: the next step may stretch them.
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at

@@ -33,13 +33,13 @@ def initial_part(part, like):
 
 @point_function(otherwise=True)
 def part_after(part, memory, law, step, memories):
-    """Memory after a `StrainStep` that contains the updated s; `memories` are the other parts'."""
+    """Return the memory after a `StrainStep` with new s; `memories` are the other parts'."""
     return memory
 
 
 @point_function(otherwise=True)
 def part_pressure(part, memory):
-    """(p,), the added pressure, or ()."""
+    """Return (p,), the added pressure, or ()."""
     return ()
 
 
@@ -114,7 +114,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """Extend a law, for cells of size `h`, to store its plastic strain rate last."""
+    """Extend a law for cells of size `h` to store its plastic strain rate last."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

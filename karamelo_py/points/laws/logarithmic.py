@@ -15,7 +15,7 @@ class Logarithmic(NamedTuple):
 
 @point_function()
 def elastic_trial(strain, e, dl):
-    """Elastic strain `e` after an elastic increment, exact for steps of any size.
+    """Return the elastic strain `e` after an elastic increment, exact for steps of any size.
 
     V becomes the left stretch of (I + dl) V: 1/2 ln[(I + dl) exp(2 e) (I + dl)^T] (Simo 1992,
     "Algorithms for static and dynamic multiplicative plasticity that preserve the classical return

@@ -156,7 +156,7 @@ class Transverse(NamedTuple):
 
 
 def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
-    """Rotation (3, 3) with the material's axes as columns; angles in degrees."""
+    """Return the rotation (3, 3) with the material's axes as columns; angles are in degrees."""
 
     def about(axis: int, degrees: float) -> np.ndarray:
         i, j = [k for k in range(3) if k != axis]
@@ -169,7 +169,7 @@ def axes(angle: float, tilt: float, spin: float) -> np.ndarray:
 
 
 def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Stiffness (3, 3, 3, 3) from a matrix (6, 6), rotated by R."""
+    """Return the stiffness (3, 3, 3, 3) of a matrix (6, 6), rotated by R."""
     full = np.array(
         [[[[C[INDEX[i][j], INDEX[k][m]] for m in range(3)] for k in range(3)] for j in range(3)]
          for i in range(3)]
@@ -178,7 +178,7 @@ def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 def fastest(C: np.ndarray) -> float:
-    """Largest rho c^2 of plane waves: eigenvalues of C_ijkl n_j n_l over all directions n."""
+    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l, over all n."""
     z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
@@ -188,7 +188,7 @@ def fastest(C: np.ndarray) -> float:
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """True if a body in 2D or 1D would shear out of its plane or line."""
+    """Return True if a body in 2D or 1D would shear out of its plane or line."""
     inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
     shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
     return max(shears, default=0) > COUPLED * law.fastest

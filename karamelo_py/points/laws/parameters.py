@@ -14,7 +14,7 @@ LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 
 
 def lame_parameters(E: float, nu: float) -> tuple[float, float]:
-    """Return Lame's parameters lambda and G; ScriptError unless -1 < nu < 0.5."""
+    """Return Lame's parameters lambda and G; raise ScriptError unless -1 < nu < 0.5."""
     if not -1 < nu < 0.5:
         raise ScriptError(
             f"Poisson's ratio {nu:g} is impossible",
@@ -52,7 +52,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """Reference rate in 1 + `factor` ln(rate/epsdot0), which must not be 0 unless `factor` is."""
+    """Return epsdot0 of 1 + `factor` ln(rate/epsdot0); it may be 0 only if `factor` is."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -68,7 +68,7 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    Tables of laws pad it with its last number: a law that needs the length stores it separately.
+    Tables of laws pad it with its last number, so a law that needs the length stores it.
     """
 
     values: tuple[float, ...]

@@ -65,7 +65,7 @@ def _with_stress_saturated(law, kin, state, stress):
 
 
 def _terms(law, kin, state, of_skeleton):
-    """Squared skeleton speed, and trace and determinant of the undrained two-phase problem."""
+    """Return the squared skeleton speed, and trace and determinant of the two-phase problem."""
     dry = 1 / (laws.specific_volume(law) * laws.jacobian(law, kin, state))
     n = porosity(law, kin, state)
     slow, water = of_skeleton(law.law, kin, state.skeleton), law.K / n
@@ -99,7 +99,7 @@ def _pore_pressure_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def porosity(law, kin, state):
-    """Porosity over the present volume."""
+    """Return the porosity over the present volume."""
 
 
 @porosity.on(Saturated)
@@ -110,7 +110,7 @@ def _porosity_saturated(law, kin, state):
 @laws.number
 @laws.point_function()
 def water_content(law, kin, state):
-    """Mass of the water per volume before deformation."""
+    """Return the mass of the water per volume before deformation."""
 
 
 @water_content.on(Saturated)
@@ -119,12 +119,11 @@ def _water_content_saturated(law, kin, state):
 
 
 def with_pore_pressure(law, kin, state, p):
-    """State with the water pressure `p`."""
     return state._replace(content=state.pores * exponential(p / law.K))
 
 
 def drag_per_volume(law, kin, state):
-    """Drag per volume and relative velocity: n^2 rho g / k with the present permeability k."""
+    """Return n^2 rho g / k, the drag per volume and relative velocity, with the present k."""
     n = porosity(law, kin, state)
     k = n * n * n / ((1 - n) * (1 - n)) * ((1 - law.n) * (1 - law.n) / (law.n * law.n * law.n))
     return law.drag * n * n / (1 + law.kozeny * (k - 1))

@@ -22,13 +22,12 @@ def initial_heat(temperature, like):
 
 @point_function(otherwise=True)
 def heated(temperature, heat, work):
-    """`heat` after plastic work per mass."""
     return heat
 
 
 @point_function(otherwise=True)
 def thermal_pressure(temperature, heat):
-    """(p,), the thermal pressure, or ()."""
+    """Return (p,), the thermal pressure, or ()."""
     return ()
 
 
@@ -41,7 +40,7 @@ def at_temperature(heat, T):
 
 
 def homologous(heat, Tr, Tm):
-    """(T - Tr) / (Tm - Tr), limited to 0 to 1."""
+    """Return (T - Tr) / (Tm - Tr), limited to 0 to 1."""
     return min(max((heat.T - Tr) / (Tm - Tr), 0), 1)
 
 

@@ -39,7 +39,7 @@ class State(NamedTuple):
 
 
 def with_strain_across(law, kin, dl, q):
-    """The body's increment `dl` with q across it, for the wrapped law."""
+    """Return the body's increment `dl` with q across it, for the wrapped law."""
     if isinstance(dl, LargeIncrement):
         step = with_strain_across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
@@ -107,7 +107,7 @@ def _wave_speed_bound_thin(law, kin, state):
 
 
 def _slower(law, kin, state, squared):
-    """Squared wave speed of a body that is free across.
+    """Return the squared wave speed of a body that is free across.
 
     Without strain across, Hooke's law has 2 G + lambda; a plate has 2 G + 2 G lambda / (2 G +
     lambda) = E / (1 - nu^2), a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.
@@ -138,7 +138,7 @@ def _with_stress_thin(law, kin, state, stress):
 @laws.number
 @laws.point_function()
 def thickness(law, kin, state):
-    """Thickness over the initial thickness."""
+    """Return the thickness over the initial thickness."""
 
 
 @thickness.on(Thin)

@@ -46,7 +46,7 @@ class ElasticMaterial:
 
 
 def strained(law: Any, component: int) -> Any:
-    """Stress over strain after a small increment of one component of F from rest."""
+    """Return stress over strain after a small increment of one component of F from rest."""
     space, size = Space(), 1e-6
     dl = tensor(space, [size * (component == k) for k in range(9)])
     state = laws.advance(law, space, laws.initial_state(law, space, 1.0), dl, 1.0)
@@ -155,7 +155,7 @@ def internal_stress(memory, kin):
 
 
 def lost_stress(law, kin, s, branches):
-    """Relaxed deviatoric Kirchhoff stress, from the elastic deviator s."""
+    """Return the relaxed deviatoric Kirchhoff stress, from the elastic deviator s."""
     return relaxed_part(law.branches) * s - dev(internal_stress(branches, kin))
 
 
@@ -165,7 +165,7 @@ def mean_decay(x):
 
 
 def weight_before(x):
-    """Weight a of the old |h|^2 in the integral of |h|^2 dt/tau, exact in decay; x - a after."""
+    """Return the weight a of the old |h|^2 in its integral over dt/tau; the new one's is x - a."""
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))
@@ -188,7 +188,7 @@ def decayed(branches, memory, dl, added, dt):
 
 
 def strain_of(dl):
-    """Almansi's strain of I + dl, conjugate to Kirchhoff stress at the end of the step."""
+    """Return Almansi's strain of I + dl, conjugate to the Kirchhoff stress after the step."""
     back = dl @ inv(I + dl)
     return sym(back) - 0.5 * sym(back.transposed() @ back)
 

@@ -18,7 +18,6 @@ class ArtificialViscosity(NamedTuple):
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:
-    """The part with these coefficients, unless both are 0."""
     return {"viscosity": ArtificialViscosity(Q1, Q2, 0.0)} if Q1 > 0 or Q2 > 0 else {}
 
 
@@ -29,12 +28,12 @@ def viscous_pressure(viscosity, rate, density, sound):
 
 
 def viscous_speed(viscosity, q, density, sound):
-    """nu / h = Q1 h |d| + Q2 c with the kinematic viscosity nu, from q / rho >= Q1 (h d)^2."""
+    """Return nu / h = Q1 h |d| + Q2 c, the viscosity nu over h, from q / rho >= Q1 (h d)^2."""
     return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
 
 
 def damped(squared, a):
-    """Square of c' = sqrt(c^2 + a^2) + a with a = nu / h.
+    """Return the square of c' = sqrt(c^2 + a^2) + a, a = nu / h.
 
     Viscosity nu damps the shortest wave of a cell by xi = nu / (c h): c dt / h falls to sqrt(1 +
     xi^2) - xi (Belytschko et al. 2014, eq. 6.3.10), as if c were c'.

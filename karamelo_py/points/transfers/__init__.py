@@ -29,7 +29,7 @@ class Moment(Field):
 
 
 def flip_coefficient(transfer) -> float:
-    """Fraction of its velocity that a point retains per step; 0 for PIC."""
+    """Return the fraction of its velocity that a point retains per step; 0 for PIC."""
     return transfer.alpha if transfer.traits.retains else 0.0
 
 
@@ -44,13 +44,13 @@ def updated_velocity(transfer, v, v_pic, dv):
 
 @point_function(otherwise=True)
 def in_step(transfer, kept):
-    """The transfer for a step in which points retain the fraction `kept`."""
+    """Return the transfer for a step in which points retain the fraction `kept`."""
     return transfer
 
 
 @point_function()
 def lost_fractions(transfer, like):
-    """Fractions (2,) of the kinetic energy removed by mapping to the nodes and back that are lost.
+    """Return the lost fractions (2,) of the energy removed by mapping to the nodes and back.
 
     The rest returns with the data stored by points. If undefined, the loss is not recorded.
     """
@@ -58,25 +58,25 @@ def lost_fractions(transfer, like):
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """Velocity that moves a point; `v` is its velocity after the step, `j` its `known_volume`."""
+    """Return the velocity that moves a point, from `v` after the step and its `known_volume` j."""
     return v_pic
 
 
 @point_function(otherwise=True)
 def known_volume(transfer, law, kin, state):
-    """det F of a point if the transfer needs it, else ()."""
+    """Return det F of a point if the transfer needs it, else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def nodal_momentum(transfer, pt, node):
-    """Momentum that a point `pt` (`mass`, `v`, `moment`) gives to a node."""
+    """Return the momentum that a point `pt` (`mass`, `v`, `moment`) gives to a node."""
     return node.N * pt.mass * pt.v
 
 
 @point_function(otherwise=True)
 def affine_velocity(transfer, moment, inverse_d):
-    """C if a point gives a node at X the velocity v + C (X - x), else ().
+    """Return C if a point gives a node at X the velocity v + C (X - x), else ().
 
     `inverse_d` is (D^-1,), or () if D varies.
     """
@@ -85,7 +85,6 @@ def affine_velocity(transfer, moment, inverse_d):
 
 @point_function(otherwise=True)
 def zero_moment(transfer, kin, like):
-    """Moment of a point at rest; empty if none is stored."""
     return ()
 
 
@@ -96,7 +95,7 @@ def add_moment(transfer, node, v, moment):
 
 @point_function(otherwise=True)
 def by_arms(transfer, inverse_d):
-    """(a,) if the stored tensor is a sum_I N_I v*_I (X_I - x)^T, else (); `inverse_d` as above."""
+    """Return (a,) if the stored tensor is a sum_I N_I v*_I (X_I - x)^T, else ()."""
     return ()
 
 
@@ -107,13 +106,13 @@ def gradient_weight(transfer, node):
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """True if `gradient_weight` is N_I D^-1 (X_I - x); constant when compiled."""
+    """Return True, constant when compiled, if `gradient_weight` is N_I D^-1 (X_I - x)."""
     return False
 
 
 @point_function(otherwise=True)
 def straining(transfer, kin, gradient):
-    """Gradient gathered for the strain with the velocity; () if points store it."""
+    """Return the gradient to gather with the velocity, or () if points store it."""
     return gradient
 
 

@@ -119,7 +119,7 @@ def _lost_fractions_flip(transfer, like):
 
 
 def warn_of_vibrations(transfer: type) -> None:
-    """usl damps vibrations and needs no warning."""
+    """Warn about large vibrations, which only usl damps."""
     known_failure(
         transfer,
         "large vibrations",
@@ -139,7 +139,7 @@ def warn_of_vibrations(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """The loss per revolution accumulates."""
+    """Return True if the loss per revolution accumulates over several."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
@@ -147,8 +147,8 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
     """Warn about bodies that rotate freely many times.
 
     Points move with the grid velocity u but store v: each step changes the angular momentum by the
-    sum of m u x v dt. Measured on disks in 2D with E 100 times the rotational energy, 4 and 8 cells
-    across the radius; R4, splines and linear basis.
+    sum of m u x v dt (2D disks, E 100 times the rotational energy, 4 and 8 cells across the radius;
+    R4, splines and linear basis).
     """
     known_failure(
         transfer,
@@ -170,13 +170,13 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """True for a lag of 3 % or more, over a radian or more."""
+    """Return True for a lag of 3 % or more, over a radian or more."""
     lag = scene.lag
     return lag.fraction > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
-    """Energy loss of a free rotation: twice (1 - alpha) of the lag per step."""
+    """Return the energy loss of a free rotation, twice (1 - alpha) of the lag per step."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.turns > BARELY:
         return None

@@ -36,10 +36,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Affine transfers measure arms from the weighted centre x = sum_I N_I X_I, which differs from the
-    point if corners are beyond the grid or the domain is no parallelogram or parallelepiped. Linear
-    momentum is exact; angular momentum is exact about the centres, and about the points varies by
-    0.1 % of its variation with FLIP (a spinning square, Q4).
+    Affine transfers measure arms from the centre x = sum_I N_I X_I, not the point, if corners are
+    beyond the grid or the domain is no parallelogram or parallelepiped. Angular momentum is then
+    exact about the centres, and about the points varies by 0.1 % of its variation with FLIP (a
+    spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -85,12 +85,12 @@ CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 @point_function()
 def domain(basis, kin, place):
-    """Corners x_c, weights w_c and gradients g_c."""
+    """Return corners x_c, weights w_c and gradients g_c."""
 
 
 @point_function()
 def upright(basis, kin, place):
-    """True if the Jacobian is positive at every corner, so that the domain is not folded."""
+    """Return True if the Jacobian is positive at every corner: the domain is not folded."""
 
 
 class Corner(NamedTuple):
@@ -119,7 +119,7 @@ class AtCorners(NamedTuple):
 
 
 def along_cell(grid, direction, x):
-    """Cell of a corner in one direction, position in it (0 to 1), and their sum.
+    """Return a corner's cell in one direction, its position there (0 to 1), and their sum.
 
     Corners beyond the grid move to its face, so that weights sum to one.
     """
@@ -160,7 +160,7 @@ def pairs_of_spread(kin):
 
 
 def spread_of(kin, grid, weight, corner, centre):
-    """Contribution of a corner to D: w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
+    """Return a corner's part of D, w [(x_c - x)(x_c - x)^T + h^2 r (1 - r)]."""
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):

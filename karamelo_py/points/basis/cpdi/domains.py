@@ -44,7 +44,6 @@ def half_edges(kin, place):
 
 
 def reciprocals(kin, edges, factor):
-    """Cofactors of the edges by rows, times `factor`."""
     d = kin.dimension
     a = {(e, i): edges[e][i] for e in range(d) for i in range(d)}
     return [vector(kin, [factor * cofactor(a, d, e, i) for i in range(d)]) for e in range(d)]
@@ -225,10 +224,7 @@ def _cross(a, b):
 
 
 def _at_gauss(a, b, c, d):
-    """Interpolate bilinearly from (-,-), (+,-), (-,+), (+,+) to the Gauss points.
-
-    By symmetry this also distributes from Gauss points to corners.
-    """
+    """Interpolate bilinearly from (-,-), (+,-), (-,+), (+,+) to the Gauss points, or back."""
     e, f = _mix(NEAR, a, FAR, b), _mix(FAR, a, NEAR, b)
     g, h = _mix(NEAR, c, FAR, d), _mix(FAR, c, NEAR, d)
     return (
@@ -253,7 +249,7 @@ def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
 
 
 def _edges(place):
-    """Half edges in each direction, ordered in the other two as in `_at_gauss`."""
+    """Return half edges in each direction, ordered in the other two as in `_at_gauss`."""
     at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):

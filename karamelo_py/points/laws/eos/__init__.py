@@ -24,37 +24,37 @@ class VolumeStep(NamedTuple):
 
 @point_function(otherwise=True)
 def compressed(eos, memory, step, heating):
-    """Memory after a `VolumeStep`; `heating` is plastic and viscous work per reference volume."""
+    """Return the memory after a `VolumeStep`; `heating` is plastic and viscous work per volume."""
     return memory
 
 
 @point_function(otherwise=True)
 def initial_loss(eos, like):
-    """(0,) if the equation of state dissipates energy, or ()."""
+    """Return (0,) if the equation of state dissipates energy, else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def crush_work(eos, before, after, step):
-    """Work dissipated by crushing pores between two memories."""
+    """Return the work dissipated by crushing pores between two memories."""
     return 0
 
 
 @point_function(otherwise=True)
 def ignited(eos, memory, since):
-    """(memory,) of an explosive a time `since` after lighting, or ()."""
+    """Return (memory,) of an explosive a time `since` after lighting, else ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """(heat,), the part of `heat` that the memory takes as internal energy, or ()."""
+    """Return (heat,), the part of `heat` that becomes internal energy in the memory, or ()."""
     return ()
 
 
 @point_function(otherwise=True)
 def stored_heat(eos, loss):
-    """Dissipated energy contained in `compression_energy`."""
+    """Return the dissipated energy that `compression_energy` contains."""
     return loss - loss
 
 
@@ -70,17 +70,17 @@ def bulk_modulus(eos, j, memory, heat):
 
 @point_function()
 def compression_energy(eos, j, memory):
-    """Integral of p dj from j to 1, per reference volume."""
+    """Return the integral of p dj from j to 1, per reference volume."""
 
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """Volume ratio at the pressure p, or nearest to it."""
+    """Return the volume ratio at the pressure p, or nearest to it."""
 
 
 @point_function(otherwise=True)
 def at_pressure(eos, j, memory, p, heat):
-    """Volume ratio and memory of a point with the pressure p (fix initial_stress)."""
+    """Return volume ratio and memory of a point with the pressure p (fix initial_stress)."""
     return ratio_at_pressure(eos, p, heat), memory
 
 

@@ -377,7 +377,7 @@ def burnt(eos, memory):
 
 
 def cold(eos, j):
-    """Pressure of the products without energy, and its slope by J."""
+    """Return the pressure of the products without energy, and its slope by J."""
     p = slope = 0
     for C, R in ((eos.A, eos.R1), (eos.B, eos.R2)):
         part, ratio = C * exponential(-R * j), eos.omega / (R * j)

@@ -120,7 +120,7 @@ def _initial_energy_p_alpha(eos, like):
 
 
 def on_curve(eos, p):
-    """Distension on the crush curve, and its slope."""
+    """Return the distension on the crush curve, and its slope."""
     left = min(max((eos.ps - p) / (eos.ps - eos.pe), 0), 1)
     open_pores = (eos.alpha0 - 1) * power(left, eos.n)
     some = left > 0

@@ -121,7 +121,7 @@ known_failure(
 
 
 def tangent_from(eos, j):
-    """Compression 1 - J beyond which the pressure is linear."""
+    """Return the compression 1 - J beyond which the pressure is linear."""
     return where(_STEEPEST < eos.S, _STEEPEST / max(eos.S, _STEEPEST), _STEEPEST)
 
 

@@ -63,7 +63,7 @@ def initial_memory(strength, like):
 
 @point_function(otherwise=True)
 def respond(strength, law, kin, step, memories):
-    """Deviatoric stress, memory, and work per volume that is not stored, after a `StrainStep`.
+    """Return deviatoric stress, memory and unstored work per volume after a `StrainStep`.
 
     `memories` holds the memories of all parts of the `law`.
     """
@@ -72,12 +72,12 @@ def respond(strength, law, kin, step, memories):
 
 @point_function()
 def shear_response(strength, kin, step, memory, heat):
-    """As `respond`, for strengths that need nothing from other parts."""
+    """Respond like `respond`, for strengths that need nothing from other parts."""
 
 
 @point_function()
 def pressure_response(strength, kin, trial, strain):
-    """Deviatoric stress and pressure on or inside the yield surface, from a `FrictionTrial`.
+    """Return deviatoric stress and pressure on or inside the yield surface, from a `FrictionTrial`.
 
     `strain` is the equivalent plastic strain.
     """
@@ -85,12 +85,12 @@ def pressure_response(strength, kin, trial, strain):
 
 @point_function()
 def fbar_fraction(strength, memory):
-    """Fraction of the averaged F-bar pressure used by a pressure-dependent yield surface."""
+    """Return the fraction of F-bar's averaged pressure that a yield surface uses."""
 
 
 @point_function(otherwise=True)
 def initial_loss(strength, like):
-    """(0,) if the strength dissipates energy, or ()."""
+    """Return (0,) if the strength dissipates energy, else ()."""
     return ()
 
 
@@ -100,31 +100,30 @@ def no_loss_yet(strength, like):
 
 @point_function(otherwise=True)
 def elastic_ratio(strength, memory, j):
-    """Elastic part of the volume ratio j, which determines pressure."""
+    """Return the elastic part of the volume ratio j, which determines pressure."""
     return j
 
 
 @point_function(otherwise=True)
 def added_pressure(strength, memory):
-    """Pressure added to the equation of state's."""
+    """Return the pressure added to the equation of state's."""
     return 0
 
 
 @point_function(otherwise=True)
 def added_energy(strength, law, elastic, memories):
-    """Energy of the added pressure at the elastic volume ratio."""
+    """Return the energy of the added pressure at the elastic volume ratio."""
     return 0
 
 
 @point_function(otherwise=True)
 def shear_modulus(strength):
-    """Shear stiffness, for the wave speed."""
     return strength.G
 
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """Squared wave speed raised by viscosity, which reduces the stable step."""
+    """Return the squared wave speed raised by viscosity, which reduces the stable step."""
     return squared
 
 
@@ -135,13 +134,13 @@ def shear_strain(strength, kin, s):
 
 @point_function(otherwise=True)
 def shear_energy(strength, kin, s):
-    """Energy stored by elastic shear, per present volume."""
+    """Return the energy of elastic shear per present volume."""
     return 0.25 / strength.G * inner(s, s)
 
 
 @point_function(otherwise=True)
 def equivalent_plastic_strain(strength, memory):
-    """Sum of sqrt(2/3 d:d) of the plastic strain increments d."""
+    """Return the sum of sqrt(2/3 d:d) over plastic strain increments d."""
     return 0
 
 

@@ -32,9 +32,9 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Return cohesion, friction and dilation.
+    """Return cohesion, friction and dilation, linear from the peak to the residual.
 
-    Linear from the peak to the residual; a step uses the values at its beginning.
+    A step uses the values at its beginning.
     """
     weakened = min(strain * strength.softening, 1)
     intact = 1 - weakened
@@ -44,24 +44,24 @@ def surface(strength, strain):
 
 
 def lowest_pressure(strength, strain):
-    """Return -cohesion / friction or the strength's bound."""
+    """Return -cohesion / friction, or the strength's bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """Lowest pressure if the yield surface ends at `lowest`."""
+    """Return the lowest pressure if the yield surface ends at `lowest`."""
     return lowest
 
 
 def fraction_by_dilatancy(strength, memory):
-    """Fraction b of the averaged F-bar pressure used by the yield surface.
+    """Return the fraction b of F-bar's averaged pressure that the yield surface uses.
 
     Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
     stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with the
-    sines f of friction and d of dilatancy. b = 0 makes it negative for a between d and f (pressure
-    grows in stripes, and strength falls); b = (f - d)/(f (1 - d)) makes it a square.
+    sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f
+    (pressure grows in stripes, and strength falls); with b = (f - d)/(f (1 - d)) it is a square.
     """
     f, d = sines_after(strength, memory.ep)
     # the sine of a steep cone in plane strain may exceed 1
@@ -75,7 +75,7 @@ def sines_after(strength, strain):
 
 @point_function(otherwise=True)
 def sines(strength, friction, dilation):
-    """Sines of friction and dilatancy of a yield surface in plane strain."""
+    """Return the sines of friction and dilatancy in plane strain."""
     return friction, dilation
 
 
@@ -161,13 +161,13 @@ def _locks(strength, scene):
 
 
 def little_dilatancy(strength):
-    """Sine of friction in plane strain, or 0 with enough dilatancy."""
+    """Return the sine of friction in plane strain, or 0 with enough dilatancy."""
     f, d = sines_after(strength, 0.0)
     return f if d < ENOUGH * f * (1 - 1e-9) else 0.0
 
 
 def _vibrates(strength, scene):
-    """Facts of a point at its limit whose strain cycles release more work than they take.
+    """Return facts if strain cycles of a point at its limit release more work than they take.
 
     Without dilatancy they release (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """

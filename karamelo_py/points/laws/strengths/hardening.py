@@ -97,20 +97,18 @@ def before_flow(strength, memory, heat):
 
 @point_function()
 def flow_stress(strength, before, increment, dt):
-    """Flow stress and its slope after a plastic strain `increment` in a step dt, from a
-    `FlowState`.
-    """
+    """Return the flow stress and its slope after a plastic strain `increment` in a step dt."""
 
 
 @point_function(otherwise=True)
 def precompute(strength, memory, heat):
-    """Part of the flow stress that does not depend on the step's increment."""
+    """Return the part of the flow stress that does not depend on the increment."""
     return ()
 
 
 @point_function(otherwise=True)
 def first_guess(strength, before, q, slope):
-    """First guess of the plastic strain (0 for q below the flow stress), and a bound k.
+    """Return a first guess of the plastic strain (0 for q below the flow stress), and a bound k.
 
     `slope` is 3 G. After a change c, Newton's method changes the strain by at most about k c^2.
     """
@@ -119,21 +117,20 @@ def first_guess(strength, before, q, slope):
 
 @point_function(otherwise=True)
 def updated_memory(strength, memory, increment, dt):
-    """Memory after a step; the plastic strain increment may be 0."""
+    """Return the memory after a step, whose plastic strain increment may be 0."""
     return memory._replace(ep=memory.ep + increment)
 
 
 def onto_yield_surface(trial, q, flow, x):
-    """Reduce the deviatoric stress `trial` from q to `flow` if the plastic strain x grows."""
     yields = x > 0
     return where(yields, flow / where(yields, q, 1), 1) * trial
 
 
 def radial_return(strength, kin, step, memory, heat):
-    """Radial return: scale the trial deviatoric stress by flow/q (Wilkins 1964).
+    """Scale the trial deviatoric stress by flow/q (radial return, Wilkins 1964).
 
     This is the `shear_response` of strengths with ``G``, a `flow_stress` and ``ep`` in the memory;
-    q is the von Mises stress of the elastic trial.
+    q is the trial's von Mises stress.
     """
     trial = elastic_trial(strength.G, step.s, step.strain)
     q = von_mises(trial)
@@ -151,8 +148,8 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x and the flow stress does not, so x is unique for any step size.
-    Newton's method is safeguarded by bisection.
+    The left side falls with x, the flow stress does not: x is unique for any step size. Newton's
+    method is safeguarded by bisection.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms

@@ -81,7 +81,7 @@ SIGNIFICANT = 0.05  # of the fluid's viscosity
 
 
 def _viscosity(strength, scene):
-    """Kinematic viscosity, or 0 if shear spreads over less than a cell in the run."""
+    """Return the kinematic viscosity, or 0 if shear spreads over less than a cell in the run."""
     laws = [solid.material.whole for solid in scene.hub.solids.values()]
     viscous = [law for law in laws if parameter(law, "strength") is strength]
     nu = max((float(strength.mu * specific_volume(law)) for law in viscous), default=0.0)

@@ -126,10 +126,10 @@ def power_of_strain(factor, exponent, strain):
 
 
 def power_law(factor, exponent, strain, value, increment):
-    """factor (strain + increment)^exponent and its slope, 0 at zero strain.
+    """Return factor (strain + increment)^exponent and its slope, 0 at zero strain.
 
-    For small x = increment / strain, `value`, the power without the increment, is multiplied by a
-    short series of (1 + x)^n.
+    `value` is the power without the increment; for small x = increment / strain it is multiplied by
+    a series of (1 + x)^n.
     """
     near = max(exponent, 1) * increment <= _NEAR * strain
     x = increment / where(strain > 0, strain, 1)
@@ -144,7 +144,7 @@ def power_law(factor, exponent, strain, value, increment):
 
 
 def power_law_guess(exponent, strain, hard, excess, slope):
-    """`first_guess` from two derivatives of the power law `hard` (Chebyshev's method).
+    """Return `first_guess` from two derivatives of the power law `hard` (Chebyshev's method).
 
     `excess`, stress minus flow stress, falls by `slope` with the strain.
     """

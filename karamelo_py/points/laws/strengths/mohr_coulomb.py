@@ -88,9 +88,9 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, yield_surface, G, K):
     """Return the principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    To a plane, to an edge if that changes their order, or failing that to the apex (Simpson 2017,
-    section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi), sin(phi),
-    sin(psi).
+    They return to a plane, to an edge if that changes their order, or else to the apex (Simpson
+    2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
+    sin(phi), sin(psi).
     """
     k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G

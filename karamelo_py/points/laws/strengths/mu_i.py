@@ -162,5 +162,5 @@ def _respond_mu_i(strength, law, kin, step, memories):
 
 
 def yields_early_with_fbar(strength):
-    """True for friction with little dilatancy: averaged stress yields at the point's pressure."""
+    """Return True for friction with little dilatancy, which yields at the point's pressure."""
     return isinstance(strength, MuI) or little_dilatancy(strength) > 0
