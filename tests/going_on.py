@@ -197,6 +197,9 @@ ELASTIC = {
     "i": "viscoelastic, a, 0.3, 0.01, 0.2, 0.1",
     "j": "arruda-boyce, 2, 40, 5, 100",
     "k": "holzapfel, 2, 40, 20, 1, 100, fibre=(0.6, 0.8, 0)",
+    "l": "mullins, d, 2, 5",
+    "m": "hyperelastic, 2, 0.06*T*(I1*J^(-2/3) - 3) + 50*(J - 1)^2, cp=1, kappa=0",
+    "n": "viscoelastic, m, 0.3, 0.01, wlf=(17, 52, 293)",
 }
 
 

@@ -258,6 +258,20 @@ def test_functions_without_a_form_for_lanes_are_computed_one_by_one():
     assert LAWS[FORMULA].in_lanes and not ready(1000, form, G=G, lam=LAM).in_lanes
 
 
+def test_entropic_rubber_stiffens_with_temperature(run_interpreted):
+    """mu = 700 T: twice the stress at twice the temperature; I3 is J^2."""
+    text = """energy = 700
+material(r, hyperelastic, 1e3, energy*T*(I1*I3^(-1/3) - 3) + 1e7*(J - 1)^2, cp=9, kappa=0, T={})
+load_path(p, 1, exx=0.2, eyy=-0.2/1.2)
+element(e, r, p, kinematics=plane-strain)"""  # fmt: skip
+    found = []
+    for T in (300, 600):
+        folder = run_interpreted(text.format(T), folder=str(T)).folder
+        found.append(np.genfromtxt(folder / "element_e.txt", names=True)[-1])
+    assert found[0]["T"] == 300 and found[0]["q"] > 1e5
+    assert found[1]["q"] == pytest.approx(2 * found[0]["q"], rel=1e-10)
+
+
 def test_rest_is_without_stress_and_energy():
     for law in (*LAWS.values(), Ogden.given(1, 5, 0.6, 1.3), Yeoh.given(1, 9, 1, -0.1, 0.1)):
         state = initial_state(law, SPACE, 1.0)
@@ -334,6 +348,8 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(run_script, law,
         ("(I1*J^(-2/3) - 3)", "the bulk modulus", "K/2*(J - 1)^2"),
         ("l1^2 + l2^2 - log(J^2)", "change places", "each of l1, l2 and l3"),
         ("I9", "unknown name 'I9'", "I1, I2, J"),
+        ("T*(I1 - 3 - 2*log(J)) + (J - 1)^2", "the material has no temperature", "cp=..., kappa="),
+        ("if(I1 < 3, 0, I1 - 3)", "< has no derivative", "sqrt"),
         ("3", "constant", "a formula of I1"),
         ("x*(I1 - 3)", "cannot depend on x", "a formula of I1"),
         ('"I1 - 3"', "is text", "without quotes"),

@@ -6,13 +6,20 @@ from conftest import INPUTS
 from laws import isochoric, mises, pressure_of, start, stress, stretched, worked
 
 from karamelo_py.points.kinematics import Space
-from karamelo_py.points.laws import damage, dissipated_energy, energy_density, jacobian
+from karamelo_py.points.laws import (
+    damage,
+    dissipated_energy,
+    energy_density,
+    jacobian,
+    with_temperature,
+)
 from karamelo_py.points.laws.eos import LinearPressure, VolumeStep, compressed
 from karamelo_py.points.laws.eos.p_alpha import PAlpha
-from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.eos_strength import EosStrength, volume_energy
 from karamelo_py.points.laws.spall import TulerButcher
 from karamelo_py.points.laws.strengths.ceramics import JohnsonHolmquist2
 from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.temperatures import PlasticWork
 
 SPACE = Space()
 K, ALPHA, PE, PS = 37.0, 1.25, 0.05, 1.2
@@ -124,6 +131,18 @@ def test_broken_ceramic_opens_without_tension_and_closes_before_it_presses():
     state = stretched(law, SPACE, state, -1e-3 * np.eye(3), 40)
     assert state.m.strength.opened == 1
     assert pressure_of(law, SPACE, state) > 1
+
+
+def test_broken_warm_ceramic_opens_at_no_pressure_and_stores_nothing():
+    """Thermal pressure acts on the elastic part of the volume; the gaps store no energy."""
+    law = CERAMIC._replace(temperature=PlasticWork(0.0, 1.0, 0.0, 0.01, 300.0, 2000.0))
+    state = stretched(law, SPACE, start(law, SPACE), isochoric(2e-3), 40)
+    state = with_temperature(law, SPACE, state, 350.0)
+    for n in (50, 100):
+        state = stretched(law, SPACE, state, 1e-3 * np.eye(3), n)
+        assert pressure_of(law, SPACE, state) == pytest.approx(0, abs=1e-9)
+        volume = volume_energy(law, state.J, state.m)
+        assert volume == pytest.approx(-0.5 * 0.5**2 / BULK, rel=1e-6)
 
 
 def test_spall_takes_the_time_of_tuler_and_butcher():

@@ -1,19 +1,22 @@
 """Material viscoelastic: closed forms of linear viscoelasticity (Christensen 1982; Ferry 1980)."""
 
 import re
-from math import exp, pi
+from math import erf, exp, log, pi, sqrt
 
 import numpy as np
 import pytest
 from tensors import every_kinematics, flat, rotation
 
+from karamelo_py.compiler import on_numbers
+from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.language.arguments import Named
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Space, tensor
 from karamelo_py.points.laws.hencky import Hencky
 from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.mullins import Mullins, distortional_energy
 from karamelo_py.points.laws.neo_hookean import NeoHookean
-from karamelo_py.points.laws.viscoelastic import Viscoelastic
+from karamelo_py.points.laws.viscoelastic import Viscoelastic, Wlf
 
 SPACE, G = Space(), 1e6 / 2.8
 TERMS = ((0.3, 0.01), (0.2, 1.0))
@@ -136,6 +139,98 @@ def test_stress_rotates_with_the_body_and_a_turn_takes_no_energy(kind):
     assert after == pytest.approx(before, rel=1e-9)
 
 
+# --- Mullins effect (Ogden & Roxburgh 1999) ------------------------------------------------------
+
+SOFTENS = Mullins(NeoHookean.given(1000, 1e6, 0.4), 2.0, 1e5, 0.1)
+
+
+def stretched_by(law, kin, state, logarithms):
+    """An increment of principal stretches, exact in F."""
+    return laws.advance(law, kin, state, flat(kin, np.diag(np.exp(logarithms)) - np.eye(3)), 0.01)
+
+
+@every_kinematics
+def test_rubber_softens_below_its_largest_energy(kin):
+    """dev tau = eta dev tau_e, eta = 1 - erf((Wm - W)/(m + beta Wm))/r; the mean stress stays."""
+    law, state = SOFTENS, laws.initial_state(SOFTENS, kin, 1.0)
+    way = np.array([0.5, 0, 0]) if kin.dimension == 1 else np.array([0.5, -0.3, 0])
+    state = stretched_by(law, kin, state, way)
+    assert state.eta == 1
+    peak = distortional_energy(law.elastic, kin, state.elastic)
+    state = stretched_by(law, kin, state, -0.5 * way)
+    W = distortional_energy(law.elastic, kin, state.elastic)
+    eta = 1 - erf((peak - W) / (1e5 + 0.1 * peak)) / 2
+    whole = np.array(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
+    mean = np.pad(np.full(3, sum(whole[:3]) / 3), (0, len(whole) - 3))
+    found = laws.kirchhoff_stress(law, kin, state)
+    assert 0.5 < eta < 0.99
+    G, J = law.elastic.G, laws.jacobian(law, kin, state)
+    # The distortion of neo-Hookean has a mean stress, too: G (I1/3 - J^(2/3)).
+    b = 3 * sum(np.array(state.elastic.F.left_cauchy_green())[:3]) / 9
+    mean[:3] -= (1 - eta) * G * (b - J ** (2 / 3))
+    assert np.allclose(found, mean + eta * (whole - np.pad(np.full(3, sum(whole[:3]) / 3),
+                       (0, len(whole) - 3))), rtol=0, atol=1e-10 * 1e6)  # fmt: skip
+
+
+def test_a_loop_loses_its_area_once_and_warms_the_rubber():
+    warm = NeoHookean.given(1000, 1e6, 0.4, 2000, 0.2)
+    law, n = Mullins.given(Elastic(warm), 2.0, 1e5), 400
+    state, areas = laws.initial_state(law, SPACE, 1.0), []
+    way = np.array([1.0, -0.5, -0.5]) / n
+    for sign in (1, -1, 1, -1):
+        area = 0.0
+        for _ in range(n):
+            before = np.array(laws.kirchhoff_stress(law, SPACE, state))
+            state = stretched_by(law, SPACE, state, sign * way)
+            after = np.array(laws.kirchhoff_stress(law, SPACE, state))
+            area += 0.5 * sign * (before + after)[:3] @ way
+        areas.append(area)
+    lost = laws.dissipated_energy(law, SPACE, state)
+    assert areas[0] + areas[1] == pytest.approx(lost, rel=1e-4)
+    assert areas[2] + areas[3] == pytest.approx(0, abs=1e-4 * lost)
+    assert laws.energy_density(law, SPACE, state) == pytest.approx(0, abs=1e-6 * lost)
+    # phi of Ogden & Roxburgh at no energy
+    z = areas[0] / 1e5
+    phi = 0.5e5 * (z * erf(z) - (1 - exp(-z * z)) / sqrt(pi))
+    assert lost == pytest.approx(phi, rel=1e-4)
+    assert laws.temperature(law, SPACE, state) == pytest.approx(lost / (1000 * 2000), rel=1e-9)
+
+
+def test_the_tangent_of_softened_rubber():
+    """Against differences of fourth order; the wave speed bounds it."""
+    state = stretched_by(SOFTENS, SPACE, laws.initial_state(SOFTENS, SPACE, 1.0), [0.5, -0.2, -0.2])
+    state = stretched_by(SOFTENS, SPACE, state, [-0.2, 0.1, 0.1])
+
+    def tau(e):
+        return np.array(stress(SOFTENS, stretched_by(SOFTENS, SPACE, state, [e, 0, 0])))
+
+    def after(dl):
+        return laws.cauchy_stress(SOFTENS, SPACE, laws.advance(SOFTENS, SPACE, state, dl, 1.0))
+
+    h = 1e-3
+    slope = (8 * (tau(h) - tau(-h)) - tau(2 * h) + tau(-2 * h)) / (12 * h)
+    exact = on_numbers(after)(seeded(tensor(SPACE, (0.0,) * 9)))
+    assert np.allclose([slopes_of(x, 9)[0] for x in exact], slope, rtol=0, atol=1e-8 * 1e6)
+    J = laws.jacobian(SOFTENS, SPACE, state)
+    stiffness = J * slope[0] + laws.kirchhoff_stress(SOFTENS, SPACE, state)[0]
+    assert laws.wave_speed_squared(SOFTENS, SPACE, state) * 1000 >= stiffness
+
+
+def test_warm_polymers_relax_sooner():
+    """By log10 a = -C1 (T - Tr)/(C2 + T - Tr) (Williams, Landel & Ferry 1955), and warm up."""
+    base = NeoHookean.given(1000, 1e6, 0.4, 2000, 0.2)
+    law = Viscoelastic.given(Elastic(base), 0.4, 2.0, wlf=Wlf(17.44, 51.6, 373.0))
+    state = laws.initial_state(law, SPACE, 1.0)
+    state = laws.with_temperature(law, SPACE, state, 383.0)
+    state = sheared(law, state, 1e-3, 1e-12)
+    a = 10 ** (-17.44 * 10 / 61.6)
+    state = sheared(law, state, 0.0, 2.0 * a * log(2))
+    assert stress(law, state)[3] == pytest.approx(1e-3 * G * 0.8, rel=1e-5)
+    lost = laws.dissipated_energy(law, SPACE, state)
+    assert lost == pytest.approx(0.5 * 0.4 * G * 1e-6 * 0.75, rel=1e-4)
+    assert laws.temperature(law, SPACE, state) - 383 == pytest.approx(lost / 2e6, rel=1e-3)
+
+
 BAR = """
     method(tlmpm, FLIP, linear, 1)
     dimension(1, 0, 1, 1/8)
@@ -186,9 +281,29 @@ def test_relaxation_below_the_step_is_reported(run_interpreted):
         ("wood, 0.3, 1", "no isotropic elastic solid"),
         ("damper, 0.3, 1", "no isotropic elastic solid"),
         ("nothing, 0.3, 1", "unknown material"),
+        ("rubber, 0.3, 1, wlf=(17, 52, 300)", "no temperature that could shift times"),
+        ("warm, 0.3, 1, wlf=(17, 52)", "'(17, 52)' is no shift"),
+        ("warm, 0.3, 1, wlf=(17, -52, 300)", "above 0"),
     ],
 )
 def test_constants_that_no_body_has(run_interpreted, line, says):
     wood = "material(wood, orthotropic, 1, 9, 1, 1, 0.3, 0.3, 0.4, 1, 1, 1)\n"
+    wood += "material(warm, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)\n"
     said = run_interpreted(f"{RUBBER}{wood}material(m, viscoelastic, {line})\n", status=1).err
-    assert says in said and "Traceback" not in said
+    assert says in said and "Traceback" not in said and "^" in said
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("rubber, 1, 9", "r = 1 would leave less than no stress"),
+        ("rubber, 2, -9", "above 0"),
+        ("stiff, 2, 9", "no energy that could soften"),
+        ("wood, 2, 9", "no isotropic elastic solid"),
+    ],
+)
+def test_rubber_that_cannot_soften(run_interpreted, line, says):
+    others = "material(wood, orthotropic, 1, 9, 1, 1, 0.3, 0.3, 0.4, 1, 1, 1)\n"
+    others += "material(stiff, linear, 1, 9, 0.3)\n"
+    said = run_interpreted(f"{RUBBER}{others}material(m, mullins, {line})\n", status=1).err
+    assert says in said and "^" in said

@@ -1,37 +1,34 @@
 """Hyperelastic laws from a formula of the stored energy, differentiated when the law is defined.
 
-The class of the law holds the structure of the formula, so kernels contain it as code; its numbers
-are parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
-whole exponents. Formulas of invariants are computed in lanes; of principal stretches, or with
-`ONE_BY_ONE`, point by point.
+Formulas of invariants are computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by
+point (`karamelo_py.points.laws.formulas`).
 """
 
-from collections import namedtuple
 from collections.abc import Sequence
-from hashlib import sha256
 from itertools import combinations
-from math import cos, cosh, isfinite, sin, sinh, sqrt, tan, tanh
+from math import isfinite, sqrt
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import importable, point_function, real, where
-from karamelo_py.compiler.powers import exponential, logarithm, power
+from karamelo_py.compiler import point_function, where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, total, tr
 from karamelo_py.points.kinematics.principal import PairLimits, from_principal, real_principal
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
-from karamelo_py.script import terms
-from karamelo_py.script.derivatives import (
-    OF_ONE,
-    derivative,
-    is_number,
-    plus,
-    replaced,
-    times,
-    to_power,
+from karamelo_py.points.laws.formulas import (
+    COMPARED,
+    KNOWN,
+    Code,
+    ProgramWriter,
+    check_operations,
+    evaluated,
+    in_lanes,
 )
+from karamelo_py.points.laws.thermoelastic import warmed_elastic
+from karamelo_py.script import terms
+from karamelo_py.script.derivatives import derivative, plus, replaced, times, to_power
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.terms import Term, constant
@@ -39,86 +36,6 @@ from karamelo_py.script.terms import Term, constant
 INVARIANTS = ("I1", "I2", "J")
 FIBRES = ("I4", "I6")  # squared stretches of two fibre families
 STRETCHES = ("l1", "l2", "l3")
-WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
-
-ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not in lanes
-OF_TWO = ("+", "-", "*", "/", "^", "max", "min", ">=")
-
-Code = tuple[tuple[str, Any], ...]  # a stack program: (operation, operand)
-
-
-class _ProgramWriter:
-    def __init__(self, names: Sequence[str]):
-        self.names = names
-        self.numbers: dict[float, int] = {}
-
-    def code(self, root: Term) -> Code:
-        """Return a formula's stack program; () for 0."""
-        if is_number(root, 0):
-            return ()
-        made: list[tuple[str, Any]] = []
-        self._append(root, made)
-        return tuple(made)
-
-    def _append(self, term: Term, made: list) -> None:
-        operation, operands = term.operation, term.operands
-        if operation == "name":
-            made.append(("name", self.names.index(term.value)))
-        elif operation == "number":
-            made.append(("number", self.numbers.setdefault(term.value, len(self.numbers))))
-        elif operation == "^" and operands[1].value in WHOLE:
-            self._append(operands[0], made)
-            made.append(("whole power", int(operands[1].value)))
-        else:
-            for operand in operands:
-                self._append(operand, made)
-            made.append((operation, None))
-
-
-def applied(operation, a, b):
-    if operation in ("+", "-"):
-        return a + b if operation == "+" else a - b
-    if operation in ("*", "/"):
-        return a * b if operation == "*" else a / b
-    if operation in ("max", "min"):
-        return max(a, b) if operation == "max" else min(a, b)
-    if operation == ">=":
-        return where(a >= b, real(1, a), real(0, a))
-    return power(a, b)
-
-
-def function_of(name):
-    return {
-        "sqrt": sqrt, "exp": exponential, "log": logarithm, "sin": sin, "cos": cos, "tan": tan,
-        "tanh": tanh, "sinh": sinh, "cosh": cosh,
-    }[name]  # fmt: skip
-
-
-def whole_power(a, n):
-    made = a
-    for _ in range(abs(n) - 1):
-        made = made * a
-    return made if n > 0 else 1 / made
-
-
-def evaluated(code, law, arguments):
-    if not len(code):
-        return 0
-    stack = ()
-    for operation, operand in code:
-        if operation == "name":
-            stack = (arguments[operand], *stack)
-        elif operation == "number":
-            stack = (law[law.start + operand], *stack)
-        elif operation == "whole power":
-            stack = (whole_power(stack[0], operand), *stack[1:])
-        elif operation in OF_TWO:
-            stack = (applied(operation, stack[1], stack[0]), *stack[2:])
-        elif operation == "neg":
-            stack = (-stack[0], *stack[1:])
-        else:
-            stack = (function_of(operation)(stack[0]), *stack[1:])
-    return stack[0]
 
 
 class ByEnergy(OfDeformation):
@@ -130,6 +47,11 @@ class ByEnergy(OfDeformation):
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
     second: ClassVar[tuple[Code, ...]]  # by aa, ab, ac, bb, bc, cc
+
+
+@warmed_elastic.on(ByEnergy)
+def _warmed_elastic_by_energy(law, T):
+    return law._replace(T=T) if hasattr(law, "T") else law
 
 
 class OfInvariants(ByEnergy):
@@ -163,23 +85,18 @@ IN_STRETCHES = {
 }
 
 
-def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> NamedTuple:
+def law_of(
+    rho: float, energy: Expression, directions: Sequence[float] = (), T: float = 293.0
+) -> NamedTuple:
     """Build the law with this stored energy per reference volume.
 
-    `directions` holds unit vectors a0 and b0 if the formula contains I4 or I6. Raise ScriptError
-    for operations without a derivative, stress or no stiffness at rest, and formulas that
-    distinguish principal directions.
+    `directions` holds unit vectors a0 and b0 if the formula contains I4 or I6, `T` the temperature
+    at rest. Raise ScriptError for operations without a derivative, stress or no stiffness at rest,
+    and formulas that distinguish principal directions.
     """
-    term = energy._term
-    for one in terms.in_order(term):
-        smooth = one.operation in OF_ONE or one.operation in ("number", "name", *OF_TWO[:-1])
-        if not smooth:
-            raise ScriptError(
-                f"{one.operation} has no derivative that a stress could come from",
-                argument="energy",
-                expected=f"a formula with + - * / ^ and {', '.join(sorted({*OF_ONE} - {'neg'}))}",
-            )
-    stretched = replaced(term, IN_STRETCHES)
+    term = replaced(energy._term, {"I3": to_power(Term("name", (), "J"), 2)})
+    check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
+    stretched = replaced(term, {**IN_STRETCHES, "T": constant(T)})
     slopes = [derivative(stretched, name) for name in STRETCHES]
     curves = [derivative(slopes[0], name) for name in STRETCHES[:2]]
     lam, G, at_rest = _judged(stretched, slopes, curves)
@@ -188,7 +105,7 @@ def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> 
         names, kind, term = STRETCHES, OfStretches, replaced(term, IN_STRETCHES)
     elif directions:
         kind = OfFibres
-    writer = _ProgramWriter((*names, *FIBRES))
+    writer = ProgramWriter((*names, *FIBRES))
     first = [derivative(term, name) for name in names]
     second = [derivative(first[names.index(a)], b) for k, a in enumerate(names) for b in names[k:]]
     codes: dict[str, Any] = {
@@ -198,11 +115,13 @@ def law_of(rho: float, energy: Expression, directions: Sequence[float] = ()) -> 
     }
     if directions:
         codes |= _along_fibres(term, writer)
-    made = _class_of(kind, codes, len(writer.numbers))
-    return made(1 / rho, lam, G, at_rest, *directions, *writer.numbers)
+    codes["in_lanes"] = kind.in_lanes and in_lanes(codes["energy"])
+    values = (1 / rho, lam, G, at_rest, *directions)
+    fields = dict(zip((*FIELDS, *kind.directions), values, strict=True))
+    return writer.law(kind, fields, codes, T=T)
 
 
-def _along_fibres(term: Term, writer: _ProgramWriter) -> dict[str, Any]:
+def _along_fibres(term: Term, writer: ProgramWriter) -> dict[str, Any]:
     slopes = [derivative(term, name) for name in FIBRES]
     for name, slope in zip(FIBRES, slopes, strict=True):
         tension = terms.evaluated(slope, dict.fromkeys((*INVARIANTS, *FIBRES), 1.0).__getitem__)
@@ -219,19 +138,6 @@ def _along_fibres(term: Term, writer: _ProgramWriter) -> dict[str, Any]:
         "twice_along": tuple(map(writer.code, curves)),
         "mixed": tuple(tuple(map(writer.code, row)) for row in mixed),
     }
-
-
-def _class_of(kind: type, codes: dict, count: int) -> type:
-    name = f"{kind.__name__}_{sha256(repr((codes, count)).encode()).hexdigest()[:16]}"
-
-    def made() -> type:
-        names = (*FIELDS, *kind.directions)
-        fields = namedtuple(name, (*names, *[f"number{k}" for k in range(count)]))
-        traits = {**codes, "start": len(names), "__slots__": (), "__module__": __name__}
-        traits["in_lanes"] = kind.in_lanes and ONE_BY_ONE.isdisjoint(dict(codes["energy"]))
-        return type(name, (kind, fields), traits)
-
-    return importable(__name__, name, made)
 
 
 def value_at(root: Term, stretches: Sequence[float]) -> float:

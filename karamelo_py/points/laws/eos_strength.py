@@ -363,7 +363,7 @@ def volume_energy(law, j, m):
     if len(m.heat):  # the equation of state's thermal pressure
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
-    return energy + warm * (1 - j)
+    return energy + warm * (1 - elastic)
 
 
 def full_pressure(law, j, m):

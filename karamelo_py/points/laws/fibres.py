@@ -8,13 +8,13 @@ from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.laws.by_energy import (
     FIELDS,
     OfFibres,
-    evaluated,
     invariants,
     shear_of_matrix,
     stiffness_of_matrix,
     stress_of_matrix,
     variables,
 )
+from karamelo_py.points.laws.formulas import evaluated
 from karamelo_py.points.laws.hyperelastic import VOLUME, Direction, Fields, ready
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 

@@ -15,13 +15,15 @@ from karamelo_py.points.laws.by_energy import (
     OfInvariants,
     law_of,
 )
-from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.formulas import FormulaOf
+from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.thermoelastic import expanding
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.parser import parse_text
 
-SEEDS = (*INVARIANTS, *FIBRES, *STRETCHES)
+SEEDS = (*INVARIANTS, "I3", *FIBRES, *STRETCHES, "T")
 
 
 class Direction:
@@ -39,30 +41,22 @@ class Direction:
         return tuple(one / hypot(*components) for one in components)
 
 
-class EnergyFormula:
+class EnergyFormula(FormulaOf):
     """Script argument: a stored energy of invariants or principal stretches."""
 
-    script_kind: ClassVar[str] = "a formula of I1, I2, J, I4 and I6, or of l1, l2, l3 and J"
+    script_kind: ClassVar[str] = "a formula of I1, I2, I3, J, I4, I6 and T, or of l1, l2, l3 and J"
+    names = SEEDS
+    what = "the energy"
+    expected = "a formula of I1, I2 and J, or of l1, l2 and l3"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Expression:
-        value = argument.value_with(SEEDS)
-        if isinstance(value, str):
-            raise ScriptError(
-                f"'{value}' is text", place=argument.place, expected="the formula without quotes"
-            )
-        energy = Expression(value)
-        if others := energy.names.difference(SEEDS):
-            raise ScriptError(
-                f"the energy cannot depend on {min(others)}",
-                place=argument.place,
-                expected="a formula of I1, I2 and J, or of l1, l2 and l3",
-            )
-        if energy.is_constant:
+        energy = super().from_script(hub, argument)
+        if not energy.names - {"T"}:
             raise ScriptError(
                 "the energy is a constant: the body has no stress",
                 place=argument.place,
-                expected="a formula of I1, I2 and J, or of l1, l2 and l3",
+                expected=cls.expected,
             )
         return energy
 
@@ -78,18 +72,24 @@ class HyperelasticFormula(OfInvariants, Fields):
     rho
         Density before deformation.
     energy
-        Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, J = det
-        F, with C = F^T F, and of I4 and I6, the squared stretches of two families of fibres; or of
-        the principal stretches l1, l2, l3 and J. Script variables are numbers. At rest I1 = I2 = 3,
-        the others 1.
+        Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, I3 =
+        det C, J = det F, with C = F^T F, and of I4 and I6, the squared stretches of two families of
+        fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Script
+        variables are numbers. At rest I1 = I2 = 3, the others 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6.
+    cp, kappa, alpha
+        Heat capacity per mass, conductivity and coefficient of linear expansion of a material with
+        a temperature, as for neo-hookean.
+    T
+        Temperature at which the formula is checked, and initial one unless the solid sets it.
 
     Example
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
     material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(1, 1, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
+    material(warm, hyperelastic, 1000, 700*T*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2, cp=2000, kappa=0.2)
 
     Notes
     -----
@@ -105,7 +105,7 @@ class HyperelasticFormula(OfInvariants, Fields):
     """
 
     __slots__ = ()
-    syntax = "rho, energy[, fibre=(x, y, z)][, fibre2=(x, y, z)]"
+    syntax = "rho, energy[, fibre=(x, y, z)][, fibre2=(x, y, z)][, cp=, kappa=][, alpha=][, T=293]"
 
     @classmethod
     def given(
@@ -115,7 +115,17 @@ class HyperelasticFormula(OfInvariants, Fields):
         *,
         fibre: Direction | None = None,
         fibre2: Direction | None = None,
+        cp: AboveZero | None = None,
+        kappa: FromZero | None = None,
+        alpha: float = 0.0,
+        T: FromZero = 293.0,
     ) -> Any:
+        if "T" in energy.names and cp is None:
+            raise ScriptError(
+                "the energy depends on T, and the material has no temperature",
+                argument="energy",
+                expected="cp=..., kappa=... after the formula",
+            )
         directions = {"I4": fibre, "I6": fibre2}
         for option, (name, direction) in zip(("fibre", "fibre2"), directions.items(), strict=True):
             if name in energy.names and direction is None:
@@ -124,7 +134,8 @@ class HyperelasticFormula(OfInvariants, Fields):
                 message = f"the energy does not contain {name}"
                 raise ScriptError(message, argument=option, expected=f"a formula with {name}")
         one = fibre or fibre2
-        return law_of(rho, energy, (*(fibre or one), *(fibre2 or one)) if one else ())
+        unit = (*(fibre or one), *(fibre2 or one)) if one else ()
+        return expanding(law_of(rho, energy, unit, T), cp, kappa, alpha, T)
 
 
 class _Numbers:

@@ -2,6 +2,7 @@
 
 from typing import Any, NamedTuple
 
+from karamelo_py.compiler import point_function
 from karamelo_py.language.rules import suggestion
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, symmetric_tensor
@@ -42,7 +43,10 @@ suggestion(
 )
 
 
-def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> NamedTuple:
+def expanding(
+    law: Any, cp: float | None, kappa: float | None, alpha: float, T: float = 0.0
+) -> NamedTuple:
+    """`law` with a temperature, initially `T` unless its solid sets it; unchanged without cp."""
     if cp is None or kappa is None:
         if cp is not None:
             raise ScriptError(
@@ -52,7 +56,7 @@ def expanding(law: Any, cp: float | None, kappa: float | None, alpha: float) -> 
             )
         return law
     bulk = law.lam + 2 / 3 * law.G
-    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, 0.0))
+    return Thermoelastic(law, Expansion(cp, kappa, alpha, 3 * bulk * alpha, T))
 
 
 laws.column(Expansion, "T", laws.temperature)
@@ -73,8 +77,30 @@ class State(NamedTuple):
     T: Any
 
 
+@point_function(otherwise=True)
+def warmed_elastic(elastic, T):
+    """The elastic law at the temperature T."""
+    return elastic
+
+
 def expansion_pressure(law, state):
     return thermal_pressure(law.heat, (state.T,))[0]
+
+
+def is_warm(law):
+    return isinstance(law, Thermoelastic) or (hasattr(law, "elastic") and is_warm(law.elastic))
+
+
+def heated_by(law, kin, state, loss):
+    """State warmed by energy `loss` per reference volume; unchanged without a temperature."""
+    if not is_warm(law):
+        return state
+    warmer = loss * laws.specific_volume(law) / laws.heat_capacity(law, loss)
+    return laws.with_temperature(law, kin, state, laws.temperature(law, kin, state) + warmer)
+
+
+def of_elastic(function, law, kin, state, *more):
+    return function(warmed_elastic(law.elastic, state.T), kin, state.elastic, *more)
 
 
 @laws.initial_state.on(Thermoelastic)
@@ -84,32 +110,41 @@ def _initial_state_thermoelastic(law, kin, like):
 
 @laws.advance.on(Thermoelastic)
 def _advance_thermoelastic(law, kin, state, dl, dt):
-    return State(laws.advance(law.elastic, kin, state.elastic, dl, dt), state.T)
+    return State(of_elastic(laws.advance, law, kin, state, dl, dt), state.T)
 
 
 @laws.cauchy_stress.on(Thermoelastic)
 def _cauchy_stress_thermoelastic(law, kin, state):
-    return laws.cauchy_stress(law.elastic, kin, state.elastic) - expansion_pressure(law, state) * I
+    return of_elastic(laws.cauchy_stress, law, kin, state) - expansion_pressure(law, state) * I
 
 
 @laws.kirchhoff_stress.on(Thermoelastic)
 def _kirchhoff_stress_thermoelastic(law, kin, state):
     p = laws.jacobian(law, kin, state) * expansion_pressure(law, state)
-    return laws.kirchhoff_stress(law.elastic, kin, state.elastic) - p * I
+    return of_elastic(laws.kirchhoff_stress, law, kin, state) - p * I
 
 
 laws.hand_on(
     Thermoelastic, "elastic", "elastic", (
-        laws.jacobian, laws.deformation, laws.wave_speed_squared, laws.wave_speed_bound,
-        laws.by_rates, laws.specific_volume,
+        laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
     ),
 )  # fmt: skip
+
+
+@laws.wave_speed_squared.on(Thermoelastic)
+def _wave_speed_squared_thermoelastic(law, kin, state):
+    return of_elastic(laws.wave_speed_squared, law, kin, state)
+
+
+@laws.wave_speed_bound.on(Thermoelastic)
+def _wave_speed_bound_thermoelastic(law, kin, state):
+    return of_elastic(laws.wave_speed_bound, law, kin, state)
 
 
 @laws.energy_density.on(Thermoelastic)
 def _energy_density_thermoelastic(law, kin, state):
     j = laws.jacobian(law, kin, state)
-    elastic = laws.energy_density(law.elastic, kin, state.elastic)
+    elastic = of_elastic(laws.energy_density, law, kin, state)
     return elastic + expansion_pressure(law, state) * (1 - j)
 
 

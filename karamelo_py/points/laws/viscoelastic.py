@@ -1,5 +1,6 @@
 """Material viscoelastic."""
 
+from math import log
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from karamelo_py.points.kinematics import (
 )  # fmt: skip
 from karamelo_py.points.laws import Absent, LawTraits, law_traits
 from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import ScriptError
 
 SMALL = 0.01  # step over relaxation time, below which a series is exact
@@ -62,6 +64,41 @@ def is_isotropic(law: Any) -> bool:
     return max(map(np.ptp, (along, shears, max(along) * np.array(even)))) < 1e-3 * max(along)
 
 
+class Wlf(NamedTuple):
+    """Shift of relaxation times with temperature, and kind of its argument (C1, C2, Tr)."""
+
+    in_lanes = True
+    script_kind = "the constants (C1, C2, Tr)"
+
+    C1: float
+    C2: float
+    Tr: float
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        values = [one.value(hub) for one in argument.listed()]
+        numbers = [one for one in values if isinstance(one, float)]
+        if not len(values) == len(numbers) == 3:
+            message = f"'{argument.text}' is no shift"
+            raise ScriptError(message, place=argument.place, expected=cls.script_kind)
+        if not min(numbers[:2]) > 0:
+            message = "C1 and C2 of a shift are above 0"
+            raise ScriptError(message, place=argument.place, expected="such as (17.44, 51.6, Tg)")
+        return cls(*numbers)
+
+
+DECADES = 30.0  # of the shift; the formula ends at T = Tr - C2
+
+
+def shifted(shift, dt, T):
+    """The step dt over the shift of times at temperature T."""
+    if isinstance(shift, Absent):
+        return dt
+    above = T - shift.Tr
+    decades = shift.C1 * above / max(shift.C2 + above, 1e-6 * shift.C2)
+    return dt * exponential(log(10) * min(max(decades, -DECADES), DECADES))
+
+
 class Branch(NamedTuple):
     in_lanes = True
 
@@ -81,11 +118,16 @@ class Viscoelastic(NamedTuple):
     pairs
         g and tau of each term: relaxing fraction of the instantaneous shear stiffness, relaxation
         time.
+    wlf
+        C1, C2, Tr: a material with a temperature T relaxes in tau a, log10 a = -C1 (T - Tr)/(C2 + T
+        - Tr) (Williams, Landel & Ferry 1955).
 
     Example
     -------
     material(rubber, neo-hookean, 1000, 1e6, 0.4)
     material(damper, viscoelastic, rubber, 0.3, 0.01, 0.2, 1)
+    material(warm, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)
+    material(polymer, viscoelastic, warm, 0.3, 1, wlf=(17.44, 51.6, 373))
 
     Notes
     -----
@@ -96,8 +138,8 @@ class Viscoelastic(NamedTuple):
     exp(-t/tau))); the volume response is elastic.
 
     With the shear modulus G at rest, each branch adds |h|^2/(4 g G) to the strain energy and
-    dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``). Fix initial_stress starts from
-    a relaxed body, with 1 - sum g of the stiffness.
+    dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``), which heats a material with a
+    temperature. Fix initial_stress starts from a relaxed body, with 1 - sum g of the stiffness.
 
     See Also
     --------
@@ -109,11 +151,15 @@ class Viscoelastic(NamedTuple):
 
     elastic: Any
     branches: Any
+    shift: Any = Absent()
 
-    syntax = "elastic, g1, tau1[, g2, tau2, ...]"
+    syntax = "elastic, g1, tau1[, g2, tau2, ...][, wlf=(C1, C2, Tr)]"
 
     @classmethod
-    def given(cls, elastic: ElasticMaterial, *pairs: AboveZero):
+    def given(cls, elastic: ElasticMaterial, *pairs: AboveZero, wlf: Wlf | None = None):
+        if wlf and not is_warm(elastic.whole):
+            message = f"material '{elastic.id}' has no temperature that could shift times"
+            raise ScriptError(message, argument="wlf", expected="an elastic law with cp and kappa")
         if not pairs or len(pairs) % 2:
             raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
         if not sum(pairs[::2]) < 1:
@@ -122,7 +168,7 @@ class Viscoelastic(NamedTuple):
         branches, G = Absent(), strained(elastic.whole, 1)[3]
         for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
             branches = Branch(g, tau, 0.25 / (g * G), branches)
-        return cls(elastic.whole, branches)
+        return cls(elastic.whole, branches, wlf or Absent())
 
 
 known_failure(
@@ -204,11 +250,13 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     elastic = laws.advance(law.elastic, kin, state.elastic, dl, dt)
     before = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
     after = dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
+    dt = shifted(law.shift, dt, laws.temperature(law.elastic, kin, elastic))
     branches, loss = decayed(law.branches, state.branches, plain, after - before.carried(plain), dt)
     # work that the relaxed stress does not do
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
     gone = state.gone + loss + 0.5 * inner(lost, strain_of(plain))
+    elastic = heated_by(law.elastic, kin, elastic, loss)
     return State(elastic, branches, state.loss + loss, gone)
 
 
@@ -231,7 +279,7 @@ def _energy_density_viscoelastic(law, kin, state):
 @laws.dissipated_energy.on(Branch)
 @laws.dissipated_energy.on(Viscoelastic)
 def _dissipated_energy_viscoelastic(law, kin, state):
-    return state.loss
+    return state.loss + laws.dissipated_energy(law.elastic, kin, state.elastic)
 
 
 laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)

@@ -16,6 +16,7 @@ from karamelo_py.points.laws.strengths import (
     respond,
 )
 from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yield_surface
+from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
 LEAST_STRAIN = 1e-9  # failure strain
@@ -121,6 +122,7 @@ def _added_pressure_johnson_holmquist(strength, memory):
 def _added_energy_johnson_holmquist(strength, law, elastic, memories):
     # (p + dP)^2/(2 K) - p^2/(2 K)
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
+    p += sum(thermal_pressure(law.temperature, memories.heat))
     added = memories.strength.bulking
     return 0.5 * added * (2 * p + added) / stiffness_at_rest(law, memories)
 
@@ -149,9 +151,10 @@ def _respond_johnson_holmquist(strength, law, kin, step, memories):
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
     lowest = -strength.T * (1 - memory.damage)
-    whole = ratio_at_pressure(law.eos, lowest - memory.bulking, heat)
+    warm = sum(thermal_pressure(law.temperature, heat))
+    whole = ratio_at_pressure(law.eos, lowest - memory.bulking - warm, heat)
     opened = max(step.j / whole, 1)
-    p_eos = pressure(law.eos, step.j / opened, memories.energy, heat)
+    p_eos = pressure(law.eos, step.j / opened, memories.energy, heat) + warm
     p = p_eos + memory.bulking
     intact, broken, above = limits(strength, p, rate_factor(strength, step))
     q, flow = von_mises(trial), intact - memory.damage * (intact - broken)
