@@ -10,7 +10,7 @@ from conftest import INPUTS
 from scipy import stats
 
 from karamelo_py.app.cli import main
-from karamelo_py.app.studies import sampling, sensitivity, uncertainty
+from karamelo_py.app.studies import sampling, sensitivity, surrogate, uncertainty
 from karamelo_py.script.errors import ScriptError
 
 SCRIPT = """
@@ -116,6 +116,27 @@ def test_indices_of_ishigami():
         assert one.low - 5e-3 < exact < one.high + 5e-3 and one.high - one.low < 0.15
 
 
+def test_indices_of_a_fit():
+    """Ishigami & Homma 1990 by 400 runs; a quadratic of normals, known in closed form, by 30.
+
+    x + y^2 + x z of standard normals has the variances 1 of x, 2 of y^2 and 1 of x z.
+    """
+    three = laws(*[f"{name}=uniform({-np.pi}, {np.pi})" for name in "abc"])
+    (rows,), ((name, wrong),) = surrogate.indices(three, ishigami, 400, 1)
+    assert name == "thin-plate splines" and wrong < 0.2
+    exact = (0.3139, 0.5576), (0.4424, 0.4424), (0, 0.2437)
+    for pair, known in zip(rows, exact, strict=True):
+        assert [one.value for one in pair] == pytest.approx(known, abs=0.06)
+    normals = laws(*[f"{name}=normal(0, 1)" for name in "abc"])
+    (rows,), ((name, wrong),) = surrogate.indices(
+        normals, lambda x: (x[0] + x[1] ** 2 + x[0] * x[2])[None], 30, 1
+    )
+    assert name == "a quadratic polynomial" and wrong < 1e-9
+    exact = (0.25, 0.5), (0.5, 0.5), (0, 0.25)
+    for pair, known in zip(rows, exact, strict=True):
+        assert [one.value for one in pair] == pytest.approx(known, abs=0.07)
+
+
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sample_of_a_linear_function(folder, capsys):
     """v = a + 2 b of normals: mean 1 + 4, deviation sqrt(0.1^2 + 4 0.05^2), P(v > 5) = 1/2."""
@@ -184,6 +205,10 @@ def test_sensitivity_of_a_linear_function(folder, capsys):
     out = capsys.readouterr().out
     assert "first" in out and "-n 8 makes them narrower" in out
     assert len(pandas.read_csv("sobol.csv")) == 16
+    assert main(["sensitivity", "in.lin", *words, "-method", "fit", "-n", "6", "-o", "f.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "v_x: a linear function predicts a run from the others within" in out
+    assert re.search(r"^b +0\.[78]", out, re.M) and "6 runs" in out
 
 
 @pytest.mark.parametrize(
@@ -212,6 +237,10 @@ def test_samples_that_are_refused(folder, capsys, words, says):
         (["-var", "a=normal(1, 1)"], "sensitivity compares random variables"),
         (["-var", "a=normal(1, 1)", "-var", "b=1,2", "-var", "b=normal(0, 1)"], "several values"),
         (["-var", "a=normal(1, 1)", "-var", "b=normal(1, 1)", "-n", "5"], "a power of 2"),
+        (
+            ["-var", "a=normal(1, 1)", "-var", "b=normal(1, 1)", "-method", "fit", "-n", "5"],
+            "-n 6 or more for 2 variables",
+        ),
     ],
 )
 def test_sensitivities_that_are_refused(folder, capsys, words, says):

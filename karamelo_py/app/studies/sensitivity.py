@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from karamelo_py.app.options import positive
-from karamelo_py.app.studies import variables
+from karamelo_py.app.studies import surrogate, variables
 from karamelo_py.app.studies.case import worded
 from karamelo_py.app.studies.records import recorded, value, write
 from karamelo_py.app.studies.sampling import (
@@ -33,7 +33,11 @@ sobol: the fraction of the variance that a variable explains by itself (first), 
 interactions (total), with intervals of 95 % (Saltelli et al. 2010); n (d + 2) runs of d variables.
 morris: the mean size of the change of the result over the range of a variable, between quantiles
 of 1 and 99 % (mu*), and the deviation of the changes (sigma): curvature and interaction (Morris
-1991; Campolongo et al. 2007); n (d + 1) runs. Runs that are known are not repeated."""
+1991; Campolongo et al. 2007); n (d + 1) runs.
+fit: the indices of sobol of a function fitted to n runs, where runs are dear: a polynomial or
+thin-plate splines, by the smallest error of predicting each run from the others, which is printed.
+Runs that are known are not repeated."""
+DOUBTED = 0.2  # error of a fit over the deviation of the runs
 LEVELS = 4  # of morris
 ENDS = 0.01, 0.99  # quantiles
 
@@ -119,7 +123,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="results: log columns as for sweep",
     )  # fmt: skip
     parser.add_argument(
-        "-method", choices=("sobol", "morris"), default="sobol", help="indices (sobol)"
+        "-method", choices=("sobol", "morris", "fit"), default="sobol", help="indices (sobol)"
     )
     parser.add_argument("-n", type=positive, default=64, help="runs of each kind (64)")
     parser.add_argument("-seed", type=int, default=1, help="of the samples (1)")
@@ -146,15 +150,17 @@ def run(options: Namespace) -> int:
     options.var += [f"{name}={word}" for name, (word,) in fixed.items()]
     plan = variables.family(options)
     items = recorded(",".join(options.record), plan.script, plan.values)
-    runs = options.n * (len(found) + (2 if options.method == "sobol" else 1))
+    runs = options.n * {"sobol": len(found) + 2, "morris": len(found) + 1, "fit": 1}[options.method]
     facts = {"random": described(found), "method": options.method, "n": options.n}
     study = open_study(options, plan, out, items, strict=True, most=runs, facts=facts)
     results = results_of(study, found, {name: word for name, (word,) in fixed.items()})
     laws = [one.law for one in found]
-    method: Callable = {"sobol": sobol, "morris": morris}[options.method]
-    indices = method(laws, results, options.n, options.seed)
+    method: Callable = {"sobol": sobol, "morris": morris, "fit": surrogate.indices}[options.method]
+    indices, fits = method(laws, results, options.n, options.seed), []
+    if options.method == "fit":
+        indices, fits = indices
     write(out, list(study.rows.values()))
-    heads = ["first", "total"] if options.method == "sobol" else ["mu*", "sigma"]
+    heads = ["mu*", "sigma"] if options.method == "morris" else ["first", "total"]
     for item, rows in zip(items, indices, strict=True):
         table = plain_table(["variable"], heads, f"\n{item.word}")
         for one, pair in zip(found, rows, strict=True):
@@ -164,6 +170,10 @@ def run(options: Namespace) -> int:
         terminal().print(table)
         if options.method == "sobol":
             _doubt(rows, options.n)
+    for item, (name, wrong) in zip(items, fits, strict=False):
+        print(f"{item.word}: {name} predicts a run from the others within {wrong:.2g} deviations")
+        if wrong > DOUBTED:
+            print(f"that is too much for these indices: -n {2 * options.n}, or -method sobol")
     print(f"{plural(len(study.rows), 'run')}; the table is {out}")
     return 0
 
