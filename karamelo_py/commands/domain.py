@@ -9,7 +9,7 @@ from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
-from karamelo_py.scene.domain import Domain, require_domain, require_grid
+from karamelo_py.scene.domain import Domain, require_grid
 from karamelo_py.scene.group import ALL, KINDS, NOTHING_THERE
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE
@@ -208,7 +208,7 @@ def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) ->
     --------
     dimension, group, solid
     """
-    require_domain(hub)
+    hub.require_domain()
     hub.regions.add(ID, style_of(hub, "region", ID, style, arguments))
 
 
@@ -288,7 +288,7 @@ def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> No
             expected="method(...) before the first solid, such as method(ulmpm, FLIP, linear, 1)",
             hint=in_own_words(hub.interpreter, "method_modify"),
         )
-    require_domain(hub)
+    hub.require_domain()
     hub.solids.refuse(ID)
     if not registry.knows("solid", kind):
         # Forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).

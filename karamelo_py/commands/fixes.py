@@ -6,7 +6,6 @@ from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument
 from karamelo_py.language.unknown import MEANINGS
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_fix
@@ -269,5 +268,5 @@ def _file(hub: Hub, catalogue: Any, ID: str, item: Any, style: str) -> None:
 
 
 def _component(hub: Hub, formula: Expression, direction: str) -> Expression:
-    d = require_domain(hub).dimension
+    d = hub.require_domain().dimension
     return Expression(formula if "xyz".index(direction) < d else 0.0)

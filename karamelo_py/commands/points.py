@@ -9,15 +9,15 @@ from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.output.fields import ColumnFormula
 from karamelo_py.scene.boundary import take_away
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import per_direction
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import Region, check_radius
 from karamelo_py.scene.solid import Solid, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction, vector
+from karamelo_py.styles.fixes.formulas import vector
 
 
 class Solids(tuple):
@@ -259,7 +259,7 @@ def populate_cylindrical_coordinates(
         expected = "populate_cylindrical_coordinates before the first run"
         raise ScriptError(message, argument="solid", expected=expected, code="too-late")
     refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
-    values = FORMS.read(hub, lattice, require_domain(hub).dimension)
+    values = FORMS.read(hub, lattice, hub.require_domain().dimension)
     placed = _polar(values, dict(zip(values, (a.place for a in lattice), strict=True)))
     if not region.unknown:
         placed = _kept(hub, region, placed)
@@ -328,7 +328,7 @@ def _count(value: float, name: str, place) -> int:
 
 
 def _kept(hub: Hub, region: Region, placed: Placement) -> Placement:
-    domain = require_domain(hub)
+    domain = hub.require_domain()
     wanted = region.inside(placed.x0)
     in_domain = domain.contains(placed.x0)
     kept = wanted & in_domain

@@ -2,7 +2,6 @@
 
 from karamelo_py.commands.thin import refuse_uneven
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -77,7 +76,7 @@ INSTEAD = {1: "cylindrical(true) or spherical(true)", 2: "axisymmetric(true)"}
 
 
 def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) -> None:
-    domain, d, name = require_domain(hub), kin.dimension, kin.word
+    domain, d, name = hub.require_domain(), kin.dimension, kin.word
     same = isinstance(domain.kin, type(kin))
     if active and domain.dimension != d:
         message = f"{name} scenes have {SPACES[d]}, not {domain.dimension}"

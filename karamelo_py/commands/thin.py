@@ -4,7 +4,6 @@ from typing import Annotated
 
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import is_rigid, is_round, law_parts, law_traits, parameter
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
@@ -71,7 +70,7 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 
 
 def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float) -> None:
-    domain = require_domain(hub)
+    domain = hub.require_domain()
     if domain.dimension != dimension:
         message = f"the scene has {domain.dimension} dimensions, not {dimension}"
         expected = f"dimension({dimension}, ...) before {command}(true)"

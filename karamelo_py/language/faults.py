@@ -29,8 +29,14 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
     except KNOWN:
         raise
     except FAILURES as error:
-        message = f"{cause_of(error)}{place_in(code, error)}"
-        raise fault(name, f"{where}: {message}", place, TRACEBACK) from error
+        raise of_style(error, name, where, code, place) from error
+
+
+def of_style(
+    error: BaseException, name: str, where: str, code: Any, place: Place | None
+) -> ScriptError:
+    message = f"{cause_of(error)}{place_in(code, error)}"
+    return fault(name, f"{where}: {message}", place, TRACEBACK)
 
 
 def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:

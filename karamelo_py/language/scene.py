@@ -38,6 +38,9 @@ class Scene(Protocol):
     def lattices(self) -> list:
         """The grids of the scene."""
 
+    def require_domain(self) -> Any:
+        """The domain; ScriptError if the script has none yet."""
+
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""
 

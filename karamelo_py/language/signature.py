@@ -19,9 +19,8 @@ from functools import cache
 from itertools import chain, repeat
 from typing import Any, Literal, get_type_hints
 
-from karamelo_py.language import explain, registry
+from karamelo_py.language import explain, faults, registry
 from karamelo_py.language.arguments import NULL, Argument, with_gap
-from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.kinds import (
     AtLeast,
     Constraint,
@@ -38,7 +37,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import renamed
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile",
@@ -199,16 +198,21 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
     """As `call`, with values; faults are reported as its author's."""
-    if not inspect.isclass(target):
-        if target.__module__.startswith(registry.PREFIX):
-            return target(hub, *values, **named)
-        with as_script_error(name, "it", target, hub.place):
-            return target(hub, *values, **named)
-    with as_script_error(name, "__init__", target, hub.place):
+    is_class = inspect.isclass(target)
+    try:
         if not is_record(target):
             return target(hub, *values, **named)
-        made = getattr(target, "given", target)(*values, **named)
+        made = (
+            target.given(*values, **named) if hasattr(target, "given") else target(*values, **named)
+        )
         return made.checked() if hasattr(made, "checked") else made
+    except faults.KNOWN:
+        raise
+    except FAILURES as error:
+        if not is_class and not registry.is_foreign(target):
+            raise  # a fault of the program
+        where = "__init__" if is_class else "it"
+        raise faults.of_style(error, name, where, target, hub.place) from error
 
 
 def _bind(

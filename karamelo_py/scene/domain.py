@@ -85,27 +85,24 @@ def _around(hub: Scene, dimension: int) -> str | None:
     return f"{line} is as large as this {words[0]}; what moves needs more room"
 
 
-def require_domain(hub: Scene) -> Domain:
-    if hub.domain is None:
-        if announced := hub.announced_dimension:
-            ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
-            raise ScriptError(
-                f"the domain has no size yet: dimension({announced}) only says how many "
-                "directions there are",
-                expected=f"create_domain({', '.join(ends)}, h) before this line, or in its place "
-                f"dimension({announced}, {', '.join(ends)}, h)",
-                hint=_around(hub, announced),
-            )
-        raise ScriptError(
-            "there is no domain yet",
-            expected="dimension(...) before this line, such as "
-            "dimension(2, xmin, xmax, ymin, ymax, h)",
+def no_domain(hub: Scene) -> ScriptError:
+    if announced := hub.announced_dimension:
+        ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
+        return ScriptError(
+            f"the domain has no size yet: dimension({announced}) only says how many "
+            "directions there are",
+            expected=f"create_domain({', '.join(ends)}, h) before this line, or in its place "
+            f"dimension({announced}, {', '.join(ends)}, h)",
+            hint=_around(hub, announced),
         )
-    return hub.domain
+    return ScriptError(
+        "there is no domain yet",
+        expected="dimension(...) before this line, such as dimension(2, xmin, xmax, ymin, ymax, h)",
+    )
 
 
 def require_grid(hub: Scene) -> Domain:
-    domain = require_domain(hub)
+    domain = hub.require_domain()
     if domain.h is None:
         raise ScriptError(
             "the grid has no cell size yet",

@@ -16,6 +16,7 @@ from karamelo_py.output.fields import Fields
 from karamelo_py.output.record import RunRecord
 from karamelo_py.output.schedule import Output
 from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.domain import Domain, no_domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.schemes.musl import MUSL
@@ -260,6 +261,11 @@ class Hub:
             self.update.method,
             *self.solids.values(),
         )
+
+    def require_domain(self) -> Domain:
+        if self.domain is None:
+            raise no_domain(self)
+        return self.domain
 
     def forget_simulation(self) -> None:
         self._simulation = None

@@ -24,7 +24,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output.units import NUMBER
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Place, ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import SUFFIXES
 
@@ -35,6 +35,7 @@ __all__ = [
     "PointsView",
     "heat_hook",
     "node_hook",
+    "per_direction",
     "point_hook",
     "vector_hook",
 ]
@@ -183,6 +184,36 @@ class Fix(Publisher):
                 view.write_back()
 
         return call
+
+
+def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False) -> tuple:
+    """Require one formula (or NULL, unless `all_given`) per direction of the domain.
+
+    Further components may be NULL or zero, as in published inputs.
+    """
+    d = hub.require_domain().dimension
+    axes = "xyz"[:d]
+    wanted = ", ".join(name + axis for axis in axes)
+    if len(formulas) < d:
+        raise ScriptError(
+            f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
+            expected=wanted + " (NULL leaves a component alone)" * (not all_given),
+            code="arguments",
+        )
+    if len(formulas) > 3:
+        message = f"{len(formulas)} components, and space has 3 directions"
+        raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
+    for extra in formulas[d:]:
+        if extra is not None and not (extra.is_constant and extra.constant == 0):
+            raise ScriptError(
+                f"more components than the {plural(d, 'dimension')} of the domain",
+                expected=f"{wanted} (a further one may only be NULL or 0)",
+                hint=f"the last direction here is {axes[-1]}"
+                + ": gravity is a component of it" * (name == "b"),
+            )
+    if all(formula is None for formula in formulas[:d]):
+        hub.warn("all components are NULL: it leaves everything alone")
+    return tuple(formulas[:d])
 
 
 class Compute(Publisher):

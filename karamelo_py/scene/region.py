@@ -10,7 +10,6 @@ from karamelo_py.kernels.surfaces import Outside
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 
 EXTERIOR = "exterior"
@@ -39,7 +38,7 @@ class Region(Named):
         parts: "Sequence[Region]" = (),
     ):
         self.hub = hub
-        self.domain = require_domain(hub)
+        self.domain = hub.require_domain()
         self.exterior = exterior
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)

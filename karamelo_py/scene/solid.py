@@ -11,7 +11,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, parameter, specific_volume
 from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
-from karamelo_py.scene.domain import Domain, require_domain
+from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.lattice import CHUNK
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.placement import MAX_POINTS, Placement
@@ -58,7 +58,7 @@ class Solid(Named):
         T0: float | None,
         glued_to: "Solid | None" = None,
     ):
-        self.domain = require_domain(hub)
+        self.domain = hub.require_domain()
         for name, value in (("h", h), ("T0", T0)):
             if value is not None:
                 finite(hub, value, name)

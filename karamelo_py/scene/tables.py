@@ -10,7 +10,6 @@ import numpy as np
 from karamelo_py.language.kinds import TableFile
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.reading import read_text
 from karamelo_py.script.terms import number_of
@@ -48,7 +47,7 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
     from karamelo_py.output import snapshots  # with XML, for dumps only
 
     *_, last = snapshots.read(path)
-    domain = require_domain(hub)
+    domain = hub.require_domain()
     axes = "xyz"[: domain.dimension]
     columns = {
         name: values.astype(float)

@@ -7,7 +7,7 @@ import numpy as np
 
 from karamelo_py.kernels.surfaces import Joined, Surface
 from karamelo_py.language.signature import Positive
-from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_domain
+from karamelo_py.scene.domain import RELATIVE_TOLERANCE
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.data import Mesh
@@ -43,7 +43,7 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
 
 def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> None:
     """Warn of a shape much larger or smaller than the domain, probably in other units."""
-    domain, used = require_domain(hub), slice(len(lo))
+    domain, used = hub.require_domain(), slice(len(lo))
     size, room = float((hi - lo).max()), float((domain.hi - domain.lo)[used].max())
     if CELLS * (domain.h or 0.0) < size < OUT * room:
         return
@@ -123,7 +123,7 @@ class MeshRegion(Enclosed):
     ):
         if group == EXTERIOR and exterior is None:
             group, exterior = None, EXTERIOR
-        domain = require_domain(hub)
+        domain = hub.require_domain()
         dimension = domain.dimension
         mesh = read(file, dimension, hub.settings.trusts, domain.h / 2)
         parts = elements_of(mesh, dimension, group, lower=group is not None)
@@ -180,7 +180,7 @@ class STL(Enclosed):
     """
 
     def __init__(self, hub: Hub, file: MeshFile, exterior: Literal["exterior"] | None = None):
-        if require_domain(hub).dimension != 3:
+        if hub.require_domain().dimension != 3:
             message = "a surface encloses space in 3D only"
             hint = "in 2D, region(ID, mesh, file) takes a mesh of triangles or quadrilaterals"
             raise ScriptError(message, expected="dimension(3, ...)", hint=hint)
@@ -242,7 +242,7 @@ class MeshSolid(Solid):
         group: str | int | None = None,
         GlueToSolid: Solid | None = None,
     ):
-        domain = require_domain(hub)
+        domain = hub.require_domain()
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.file = file
         mesh = read(file, domain.dimension, hub.settings.trusts, h / 2)

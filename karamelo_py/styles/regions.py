@@ -9,7 +9,6 @@ from karamelo_py.kernels.surfaces import Common, Convex, HalfSpace, Joined, Outs
 from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene import region
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -100,7 +99,7 @@ class BlockRegion(Primitive):
 
     def __init__(self, hub: Hub, *bounds: Argument):
         numbers, exterior = region.split_exterior(bounds)
-        ends = tuple(self.forms.read(hub, numbers, require_domain(hub).dimension).values())
+        ends = tuple(self.forms.read(hub, numbers, hub.require_domain().dimension).values())
         self.slabs = [(k // 2, *ends[k : k + 2]) for k in range(0, len(ends), 2)]
         for axis, *slab in self.slabs:
             region.check_order(*slab, _NAMES, 2 * axis)
@@ -140,7 +139,7 @@ class Cylinder(Primitive):
 
     def __init__(self, hub: Hub, *shape: Argument):
         numbers, exterior = region.split_exterior(shape)
-        dimension = require_domain(hub).dimension
+        dimension = hub.require_domain().dimension
         values = self.forms.read(hub, numbers, dimension)
         names = tuple(values)
         self.radius = values["R"]
@@ -185,7 +184,8 @@ class Sphere(Primitive):
 
     def __init__(self, hub: Hub, *shape: Argument):
         numbers, exterior = region.split_exterior(shape)
-        *centre, self.radius = self.forms.read(hub, numbers, require_domain(hub).dimension).values()
+        d = hub.require_domain().dimension
+        *centre, self.radius = self.forms.read(hub, numbers, d).values()
         region.check_radius(self.radius, argument=len(centre))
         self.across, self.centre = range(len(centre)), np.array(centre)
         lo, hi = self.centre - self.radius, self.centre + self.radius
@@ -227,7 +227,7 @@ class Plane(Primitive):
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
-        d = require_domain(hub).dimension
+        d = hub.require_domain().dimension
         values = np.array([*self.forms.read(hub, numbers, d).values()])
         self.middle, normal = values[:d], values[d:]
         length = np.linalg.norm(normal)
@@ -276,7 +276,7 @@ class Union(region.Region):
 
     def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
         parts = (first, second, *more)
-        used = slice(0, require_domain(hub).dimension)
+        used = slice(0, hub.require_domain().dimension)
         super().__init__(
             hub,
             self.low.reduce([part.box_lo[used] for part in parts]),
@@ -335,7 +335,7 @@ class Difference(region.Region):
     """
 
     def __init__(self, hub: Hub, first: region.Region, second: region.Region, *more: region.Region):
-        used, parts = slice(0, require_domain(hub).dimension), (first, second, *more)
+        used, parts = slice(0, hub.require_domain().dimension), (first, second, *more)
         super().__init__(hub, first.box_lo[used], first.box_hi[used], parts=parts)
 
     def contains(self, x: np.ndarray) -> np.ndarray:

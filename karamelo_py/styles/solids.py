@@ -11,7 +11,6 @@ from karamelo_py.language.signature import AtLeast, Positive
 from karamelo_py.output.point_table import AXES
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.laws import initial_state, specific_volume
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.machine_memory import room_for_points
 from karamelo_py.scene.material import Material
@@ -82,7 +81,7 @@ class RegionSolid(Solid):
         points: Literal["regular", "gauss", "cut"] | None = None,
         GlueToSolid: Solid | None = None,
     ):
-        domain = require_domain(hub)
+        domain = hub.require_domain()
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.region = region
         self.ppc = ppc
@@ -210,7 +209,7 @@ class PointsSolid(Solid):
         volume: Annotated[float, Positive] | None = None,
         GlueToSolid: Solid | None = None,
     ):
-        domain = require_domain(hub)
+        domain = hub.require_domain()
         self.warm = "T" in table.columns
         super().__init__(hub, material, h, T0, GlueToSolid)
         self.table, d = table.name, domain.dimension

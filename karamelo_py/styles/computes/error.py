@@ -9,7 +9,6 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument, TableFile
 from karamelo_py.output.point_table import AXES, COMPONENTS, PointTable
 from karamelo_py.output.quantity import Quantity
-from karamelo_py.scene.domain import require_domain
 from karamelo_py.scene.group import ALL, ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute
@@ -43,7 +42,7 @@ class PointField:
         name = argument.words(fields)
         if name not in fields:
             raise unknown(f"unknown field '{name}'", name, fields, place=argument.place)
-        ends = AXES[: require_domain(hub).dimension] if name in VECTORS else COMPONENTS
+        ends = AXES[: hub.require_domain().dimension] if name in VECTORS else COMPONENTS
         letter = (VECTORS | TENSORS).get(name)
         return cls(name, tuple(letter + end for end in ends) if letter else (name,))
 

@@ -11,13 +11,13 @@ from karamelo_py.output.point_table import from_solids, places_before
 from karamelo_py.scene.clipping import EDGE, surface
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView
+from karamelo_py.scene.modify import Fix, PointsView, per_direction
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
-from karamelo_py.styles.fixes.formulas import per_direction, vector
+from karamelo_py.styles.fixes.formulas import vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 AT_ONCE = 4_000_000  # distances of faces and points

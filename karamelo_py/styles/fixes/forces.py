@@ -22,10 +22,10 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import ignited
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook
+from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook, per_direction
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction, vector
+from karamelo_py.styles.fixes.formulas import vector
 
 ACCELERATION = Powers(1, 0, -2)
 TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium; no other system has them

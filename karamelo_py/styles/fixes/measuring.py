@@ -5,9 +5,8 @@ import numpy as np
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import AnyGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import FIRST, USUAL, Fix, node_hook, point_hook
+from karamelo_py.scene.modify import FIRST, USUAL, Fix, node_hook, per_direction, point_hook
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction
 
 
 def force_of_nodes(mass, v, v_star, force, value, before, kick, share):

@@ -9,10 +9,10 @@ from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.output.units import FORCE
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook
+from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook, per_direction
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import AXES, judge_friction, per_direction, unlike
+from karamelo_py.styles.fixes.formulas import AXES, judge_friction, unlike
 
 
 def prescribe(mass, v, v_star, force, value, before, kick, share):

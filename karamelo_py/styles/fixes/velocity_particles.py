@@ -10,10 +10,10 @@ from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import places_before
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView, point_hook
+from karamelo_py.scene.modify import Fix, PointsView, per_direction, point_hook
 from karamelo_py.script.errors import plural
 from karamelo_py.script.expressions import FIRST, Expression
-from karamelo_py.styles.fixes.formulas import AXES, per_direction, unlike
+from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
 ALIKE = 1e-6  # of a velocity, or of the wave speed; smaller differences are ignored

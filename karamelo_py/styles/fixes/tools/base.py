@@ -11,12 +11,12 @@ from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.laws import parameter
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import per_direction
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import PointForces
-from karamelo_py.styles.fixes.formulas import per_direction
 
 
 class ToolFix(PointForces):

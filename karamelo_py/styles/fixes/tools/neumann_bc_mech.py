@@ -4,9 +4,10 @@ import numpy as np
 
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import per_direction
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction, vector
+from karamelo_py.styles.fixes.formulas import vector
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
 

@@ -1,9 +1,8 @@
 """fix damp_nodes: nodes are held back by a force, inside the compiled loop."""
 
 from karamelo_py.scene.group import NodeGroup
-from karamelo_py.scene.modify import Fix, node_hook
+from karamelo_py.scene.modify import Fix, node_hook, per_direction
 from karamelo_py.script.expressions import Expression
-from karamelo_py.styles.fixes.formulas import per_direction
 
 
 def damp(mass, v, v_star, force, value, before, kick, share):
