@@ -34,6 +34,7 @@ from karamelo_py.scene.views import set_columns
 from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, instead, nearest
 from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
+from karamelo_py.styles.fixes.python import called_as
 
 SCRIPT = "the name of a script, or its text: statements, as in name = 1"
 _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
@@ -410,7 +411,7 @@ class Simulation:
 
     def _word(self, value: Any) -> str:
         if callable(value) and not isinstance(value, type):
-            name = f"{getattr(value, '__name__', 'function').strip('<>')}_{next(self._numbers)}"
+            name = f"{called_as(value).strip('<>')}_{next(self._numbers)}"
             self.hub.functions[name] = value
             return name
         if isinstance(value, Mapping) or hasattr(value, "to_dict"):

@@ -8,6 +8,7 @@ from karamelo_py.advice import known_failures
 from karamelo_py.advice.narrator import Narrator
 from karamelo_py.advice.report import report
 from karamelo_py.language.kinds import kind_of
+from karamelo_py.language.replay import may_differ
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
@@ -370,6 +371,4 @@ def read_restart(hub: Hub, file: str) -> None:
     restart_file.Restart(chosen).take(hub, outputs=False)
 
 
-for _command in (set_dt, dt_factor, restart):
-    # Harmless when a run resumes from a file.
-    _command.may_differ = True
+may_differ(set_dt, dt_factor, restart)

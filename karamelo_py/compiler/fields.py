@@ -115,9 +115,17 @@ def columns_of(kind: type) -> tuple[str, ...]:
     return _trait(kind, "columns")
 
 
+def start_of(kind: type) -> Any:
+    return _trait(kind, "start")
+
+
+def fields_of(owner: Any, attribute: str) -> tuple[type, ...]:
+    return getattr(owner, attribute, ())
+
+
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
     """List fields in ``point_fields`` or ``node_fields`` of `owners`, each once."""
-    return tuple(dict.fromkeys(kind for owner in owners for kind in getattr(owner, attribute, ())))
+    return tuple(dict.fromkeys(kind for owner in owners for kind in fields_of(owner, attribute)))
 
 
 def rows_of_points(

@@ -249,9 +249,13 @@ def _says_sweep(row: Sweep, setup: Any) -> str:
     return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
 
 
+def says_of(task: Any) -> str | None:
+    return getattr(task, "says", None)
+
+
 _SAYS: dict[type, Any] = {
     Sweep: _says_sweep,
-    NodeTask: lambda row, setup: getattr(row.task, "says", None),
+    NodeTask: lambda row, setup: says_of(row.task),
     SceneTask: lambda row, setup: row.says if len(row.rows(setup)) else None,
 }
 

@@ -11,7 +11,7 @@ imported before use.
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib.machinery import PathFinder
@@ -64,8 +64,8 @@ def names(family: str) -> list[str]:
     return sorted(_families().get(family, {}), key=lambda name: (name.lower(), name))
 
 
-def is_foreign(kind: type) -> bool:
-    return not kind.__module__.startswith(PREFIX)
+def is_foreign(style: type | Callable) -> bool:
+    return not style.__module__.startswith(PREFIX)
 
 
 def knows(family: str, name: str) -> bool:

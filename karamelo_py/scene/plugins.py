@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import Undefined, places_of
-from karamelo_py.compiler.fields import columns_of
+from karamelo_py.compiler.fields import columns_of, fields_of, start_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.heat import Supply
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
@@ -206,7 +206,8 @@ def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
     if not isinstance(traits, wanted):
         return f"its traits are {traits!r}, and no {wanted.__name__}(...)"
     names = wanted._fields  # type: ignore[attr-defined]
-    for name in sorted(set(dir(kind)) - {"traits", *getattr(kind, "_fields", ())}):
+    fields = kind._fields if issubclass(kind, tuple) else ()  # type: ignore[attr-defined]
+    for name in sorted(set(dir(kind)) - {"traits", *fields}):
         close = [] if name.startswith("_") else get_close_matches(name, names, 1, ALIKE)
         if close:
             return f"{name} is one of its traits: traits = {wanted.__name__}({close[0]}=...)"
@@ -215,7 +216,7 @@ def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
 
 def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> None:
     for attribute in ("point_fields", "node_fields"):
-        kinds = getattr(owner, attribute, ())
+        kinds = fields_of(owner, attribute)
         if not isinstance(kinds, tuple):
             error = f"{attribute} has to be a tuple of classes, as in ({_shown(kinds)},)"
             raise faults.fault(name, error, place)
@@ -256,7 +257,7 @@ def _wrong_field(kind: Any) -> str:
 def _wrong_size(kind: type, domain: Any) -> str:
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
-        size, start = kind.shape(kin), getattr(kind, "start", 0.0)
+        size, start = kind.shape(kin), start_of(kind)
         if not isinstance(size, int) or size < 1:
             return f": its shape gives {size!r}, not a number of components"
         if callable(start) and len(start(kin)) != size:

@@ -91,7 +91,9 @@ _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
 def _type(part: Any) -> str:
-    return getattr(part, "type", "")
+    from lark import Token
+
+    return part.type if isinstance(part, Token) else ""
 
 
 class _Stop(NamedTuple):

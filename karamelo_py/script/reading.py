@@ -28,10 +28,9 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
     OSError if it is not regular or cannot be read.
     """
     piped = _PIPED.fullmatch(str(path)) is not None
-    # Opening a pipe without a writer would block.
-    flags = os.O_RDONLY | getattr(os, "O_BINARY", 0)
-    flags |= 0 if piped else getattr(os, "O_NONBLOCK", 0)
-    with open(os.open(path, flags), "rb") as file:
+    # Opening a pipe without a writer would block; Windows has no such flag.
+    more = 0 if piped else vars(os).get("O_NONBLOCK", 0)
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | more)) as file:
         mode = os.fstat(file.fileno()).st_mode
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(0, "it is a folder")

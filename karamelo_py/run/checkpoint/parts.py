@@ -24,10 +24,13 @@ import numpy as np
 
 from karamelo_py.kernels.step import DONE
 from karamelo_py.language.faults import fault
+from karamelo_py.output.rhythm import Rhythmic
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Publisher
 from karamelo_py.script.errors import ScriptError
 
+WITH_STYLE = (Publisher, Rhythmic)
 OUTPUTS = ("dump", "log", "curve", "restart")
 CLOCK_VALUES = ("time", "timestep", "dt")  # values that belong to the arrays of a state
 
@@ -88,7 +91,8 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
     yield ("method", "", ""), hub.update.method
     for catalogue in hub.catalogues:
         for ID, part in catalogue.items():
-            yield (catalogue.kind, ID, getattr(part, "style", "") or type(part).__name__), part
+            style = part.style if isinstance(part, WITH_STYLE) else ""
+            yield (catalogue.kind, ID, style or type(part).__name__), part
     for curve in hub.output.plots.values():
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
@@ -109,8 +113,8 @@ def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> 
             try:
                 memory[name] = plain(value, arrays)
             except TypeError as error:
-                who, place = type(part).__name__, getattr(part, "place", None)
-                why = fault(who, f"remembers: {name} is {error}", place)
+                place = part.place if isinstance(part, WITH_STYLE) else None
+                why = fault(type(part).__name__, f"remembers: {name} is {error}", place)
                 memory[name] = Unwritable(_copied(value), why)
     return memory
 

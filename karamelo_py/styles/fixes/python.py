@@ -58,7 +58,7 @@ class PythonFunction:
                 hint=no_file
                 or (None if exists else f"{module}.py is not in {folder}, nor installed"),
             ) from error
-        if not callable(getattr(imported, function, None)):
+        if not callable(vars(imported).get(function)):
             functions = [key for key, value in vars(imported).items() if callable(value)]
             close = nearest(function, functions)
             message = f"the module {module} has no function '{function}'"
@@ -134,7 +134,7 @@ class Python(Fix):
                 expected=f"one of {', '.join(fit)}",
             )
         if wrong := misfit(function, 1):
-            message = f"{_name(function)} cannot be called with one argument: {wrong}"
+            message = f"{called_as(function)} cannot be called with one argument: {wrong}"
             expected = "a function of one argument, the points or nodes of the group"
             raise ScriptError(message, argument="function", expected=expected)
         super().__init__(hub, group)
@@ -160,7 +160,7 @@ class Python(Fix):
         if forgotten:
             self.warned = True
             self.hub.warn(
-                f"fix python: {_name(self.function)} has changed {', '.join(forgotten)}, and "
+                f"fix python: {called_as(self.function)} has changed {', '.join(forgotten)}, and "
                 "restart files do not contain that: a restarted run will differ",
                 place=self.place,
                 hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
@@ -175,7 +175,7 @@ class Python(Fix):
         except FAILURES as error:
             message = f"{cause_of(error)}{place_in(self.function, error)}"
             failure = ScriptError(
-                f"fix python: {_name(self.function)}: {message}",
+                f"fix python: {called_as(self.function)}: {message}",
                 place=self.place,
                 hint="\n  ".join(["mend the function there:", *steps_to(error)]),
             )
@@ -197,8 +197,8 @@ class Python(Fix):
         other = next((one for one in others if one != first), None)
         if other is not None:
             raise ScriptError(
-                f"fix python: {_name(self.function)} returns {first} on one process and {other} "
-                "on another",
+                f"fix python: {called_as(self.function)} returns {first} on one process and "
+                f"{other} on another",
                 place=self.place,
                 hint="each has a part of the points: sum by points.total(values) or "
                 "nodes.total(values), the same on all, or leave point_by_point out",
@@ -212,7 +212,7 @@ class Keeper:
     """
 
     def __init__(self, function: Callable):
-        owner = getattr(function, "__self__", function)
+        owner = function.__self__ if inspect.ismethod(function) else function
         self.place = f"the class {type(owner).__name__}"
         self.data = vars(owner) if hasattr(owner, "__dict__") else {}
         if inspect.isfunction(owner):
@@ -255,5 +255,5 @@ def _sum_of(value: Any) -> int:
         return 0
 
 
-def _name(function: Any) -> str:
+def called_as(function: Any) -> str:
     return getattr(function, "__name__", type(function).__name__)
