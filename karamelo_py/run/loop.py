@@ -7,12 +7,11 @@ from dataclasses import InitVar, dataclass, field
 from math import inf, isfinite, isnan
 from pathlib import Path
 from types import FrameType
-from typing import Any
 
 import numpy as np
 
 from karamelo_py.run.backend import Backend
-from karamelo_py.run.listening import Listener
+from karamelo_py.run.listening import Listener, Trouble
 from karamelo_py.run.mpi.comm import check_same_run
 from karamelo_py.run.rollback import RollBack, Stopped
 from karamelo_py.run.timings import Timings
@@ -53,7 +52,7 @@ class RunLoop:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
         self.timings = Timings(self.hub)
 
-    def tell(self, event: Callable[[Listener], Any]) -> Any:
+    def tell(self, event: Callable[[Listener], Trouble | None]) -> Trouble | None:
         answers = [event(listener) for listener in (*self.hub.listeners, self.advice)]
         return next((answer for answer in answers if answer is not None), None)
 

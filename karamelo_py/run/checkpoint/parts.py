@@ -35,12 +35,13 @@ OUTPUTS = ("dump", "log", "curve", "restart")
 CLOCK_VALUES = ("time", "timestep", "dt")  # values that belong to the arrays of a state
 
 Key = tuple[str, str, str]  # family, ID and style
+Memory = dict[str, Any]  # of a part, in JSON types
 
 
 class PartStates(NamedTuple):
     """The memories of parts and the published values of a state, in JSON types."""
 
-    parts: dict[Key, dict[str, Any]]
+    parts: dict[Key, Memory]
     arrays: list[np.ndarray]  # indexed by the numbers in `parts`
     values: dict[str, float]
 
@@ -101,8 +102,8 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
     yield ("log", "", ""), hub.output.log
 
 
-def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> dict[str, Any]:
-    memory: dict[str, Any] = {}
+def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> Memory:
+    memory: Memory = {}
     for name in named(part):
         value = getattr(part, name)
         if named(value):
@@ -119,7 +120,7 @@ def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> 
     return memory
 
 
-def give_state(part: object, state: dict[str, Any], arrays: list[np.ndarray]) -> None:
+def give_state(part: object, state: Memory, arrays: list[np.ndarray]) -> None:
     for name in named(part):
         kept, present = state.get(name, part), getattr(part, name)
         if isinstance(kept, dict) and "part" in kept:
@@ -149,14 +150,14 @@ class Unwritable:
     kept: object
     fault: ScriptError
 
-    def value(self) -> Any:
+    def value(self) -> object:
         return _copied(self.kept)
 
     def plain(self) -> Any:
         raise self.fault
 
 
-def _copied(value: object) -> Any:
+def _copied(value: object) -> object:
     try:
         return copy.deepcopy(value)
     except Exception:  # any object

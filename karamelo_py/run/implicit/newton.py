@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,6 +11,7 @@ from karamelo_py.kernels.arrays import Tag
 from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import MOST_MOVED, Equations, Moduli
+from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -65,7 +65,7 @@ class Newton:
         scheme: Tag,
         equations: Equations,
         free: np.ndarray,
-        inertia: Any,
+        inertia: Rest | Motion,
         pushing: list[Contact | PushingTool],
         external: np.ndarray,
         dt: float,

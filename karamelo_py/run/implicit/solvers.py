@@ -4,12 +4,11 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import MatrixRankWarning, splu
+from scipy.sparse.linalg import MatrixRankWarning, SuperLU, splu
 
 AMG_FROM = 5000  # unknowns above which multigrid beats a direct solver
 AMG_FROM_IN_3D = 2000
@@ -70,7 +69,7 @@ def release(kept: dict) -> None:
     kept.clear()
 
 
-def changed_sign(factors: Any) -> bool:
+def changed_sign(factors: SuperLU) -> bool:
     moved = np.empty_like(factors.perm_r)
     moved[factors.perm_c] = factors.perm_r
     n = len(moved)

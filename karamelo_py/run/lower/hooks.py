@@ -1,7 +1,7 @@
 """Hooks of the fixes: tables of compiled ones for kernels, and those in Python."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -197,7 +197,7 @@ class ActingFixes:
 
         return called.CalledHooks(self.compiled, address_of_python(act, called.CALL))
 
-    def act(self, function: Callable, s: Setup, stage: int, *arguments: Any) -> None:
+    def act(self, function: Callable, s: Setup, stage: int, *arguments: object) -> None:
         """Call Python hooks of a stage, on the setup of all processes if they need all points."""
         if stage not in self.in_python:
             return
