@@ -7,7 +7,6 @@ from karamelo_py.kernels.equations.periodic import InUse
 from karamelo_py.language import registry
 from karamelo_py.language.by_dimension import Forms, number
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.replay import may_differ
 from karamelo_py.language.signature import Argument, style_of
 from karamelo_py.language.unknown import SHAPES, filled, in_own_words
 from karamelo_py.scene.domain import Domain, require_grid
@@ -185,7 +184,7 @@ def set_periodic(hub: Hub, directions: list[int]) -> None:
     domain.periodic, domain.node_fields = tuple(sorted(set(directions))), (InUse,)
 
 
-may_differ(boundary)  # a run that points leave can resume with boundary(delete)
+registry.may_differ(boundary)  # a run that points leave can resume with boundary(delete)
 
 
 def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) -> None:

@@ -2,7 +2,7 @@
 
 import math
 
-from karamelo_py.language.replay import may_differ
+from karamelo_py.language import registry
 from karamelo_py.language.signature import Argument
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Quit
@@ -45,7 +45,7 @@ def print_(hub: Hub, first: Argument, *more: Argument) -> None:
     hub.console.say(", ".join(parts))
 
 
-may_differ(print_)
+registry.may_differ(print_)
 
 
 def value(hub: Hub, expression: Expression) -> float:

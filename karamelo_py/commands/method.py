@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.replay import may_differ
 from karamelo_py.language.signature import Argument, Parameter, variants_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
@@ -149,7 +148,7 @@ def scheme(
 
 
 # A resumed run may use another solver.
-may_differ(scheme, keywords=("tolerance", "iterations", "solver", "limit"))
+registry.may_differ(scheme, keywords=("tolerance", "iterations", "solver", "limit"))
 
 
 def precision(hub: Hub, kind: Literal["double", "single"]) -> None:

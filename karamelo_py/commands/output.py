@@ -6,7 +6,6 @@ from typing import Literal
 from karamelo_py.language import registry, signature
 from karamelo_py.language.arguments import NUMBER
 from karamelo_py.language.kinds import StyleOf
-from karamelo_py.language.replay import may_differ
 from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import PlottedCurve
@@ -290,4 +289,4 @@ def units(
     hub.output.units = Units(length, mass, time, temperature)
 
 
-may_differ(dump, delete_dump, set_output, log, log_modify, plot, save_plot, units)
+registry.may_differ(dump, delete_dump, set_output, log, log_modify, plot, save_plot, units)

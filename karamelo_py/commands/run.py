@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 from karamelo_py.advice import known_failures
 from karamelo_py.advice.narrator import Narrator
 from karamelo_py.advice.report import report
+from karamelo_py.language import registry
 from karamelo_py.language.kinds import kind_of
-from karamelo_py.language.replay import may_differ
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
@@ -371,4 +371,4 @@ def read_restart(hub: Hub, file: str) -> None:
     restart_file.Restart(chosen).take(hub, outputs=False)
 
 
-may_differ(set_dt, dt_factor, restart)
+registry.may_differ(set_dt, dt_factor, restart)

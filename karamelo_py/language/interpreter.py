@@ -10,7 +10,7 @@ from typing import Any
 from karamelo_py.language import registry, signature, unknown
 from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.presets import Presets
-from karamelo_py.language.replay import Record, Replay, differences
+from karamelo_py.language.replay import Record, Replay
 from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
@@ -219,7 +219,7 @@ class Interpreter:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
         is_command = registry.knows("command", name)
         command = registry.find("command", name) if is_command else None
-        differs = differences(command)
+        differs = registry.differences(command)
         if isinstance(differs, bool):
             return self._execute(statement)
         text, replay = statement.spelled(differs), self.replay

@@ -28,6 +28,7 @@ BUILT_IN = Path(__file__).parents[1] / "styles.toml"
 _CLASS = re.compile(r"([^\W\d]\w*)(?:\.[^\W\d]\w*)*\.([^\W\d]\w*)")
 
 _loaded: dict[tuple[str, str], Any] = {}
+_differences: dict[Any, bool | tuple[str, ...]] = {}
 
 
 @cache
@@ -177,6 +178,15 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         expected=one_of(name, names(family), family) if styles else f"no {family} is installed",
         hint=hint,
     )
+
+
+def may_differ(*commands: Callable, keywords: bool | tuple[str, ...] = True) -> None:
+    """Allow other statements of `commands` (or other values of `keywords`) when a run resumes."""
+    _differences.update(dict.fromkeys(commands, keywords))
+
+
+def differences(command: Callable | None) -> bool | tuple[str, ...]:
+    return _differences.get(command, ())
 
 
 def foreign() -> list[tuple[str, str]]:

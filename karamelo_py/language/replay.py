@@ -1,29 +1,17 @@
 """Repeat a script up to the state at which an earlier run stopped."""
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import nan
-from typing import Any
 
 from karamelo_py.script.errors import Place, ScriptError
 
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
-_differences: dict[Any, bool | tuple[str, ...]] = {}
-
-
-def may_differ(*commands: Callable, keywords: bool | tuple[str, ...] = True) -> None:
-    """Allow other statements of `commands` (or other values of `keywords`) when a run resumes."""
-    _differences.update(dict.fromkeys(commands, keywords))
-
-
-def differences(command: Callable | None) -> bool | tuple[str, ...]:
-    return _differences.get(command, ())
 
 
 @dataclass
 class Record:
-    """Statements executed so far, except those that only control output (:func:`may_differ`).
+    """Statements executed so far, except those that only control output (:func:`registry.may_differ`).
 
     `values` has the results of value(...) by statement number.
     """
