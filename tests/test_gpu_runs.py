@@ -242,7 +242,7 @@ def test_what_is_refused_is_said_before_the_run(run_interpreted):
     later = run_interpreted(squares("run(1)", *lines), "--gpu", folder="later", status=1)
     assert "fix force_particles 'F'" in later.err and not (later.folder / "log.mpm").exists()
     said = run_interpreted(SERIAL["load steps"], "--gpu", status=1).err
-    assert "a GPU takes no steps of scheme quasi-static" in said
+    assert "scheme quasi-static does not support --gpu" in said
     assert "    7 | scheme(quasi-static)" in said
     said = run_interpreted(squares("run(1)"), "--gpu", "--ranks", "2", status=1).err
     assert said.startswith("error: --gpu: one GPU has all of a scene, and 2 processes would divide")

@@ -433,7 +433,7 @@ METHODS = [
     ("scheme(quasi-static)", "scheme(newmark, 0.1, 0.5)", "gamma/2"),
     ("scheme(quasi-static)", "scheme(newmark, rho=1.1)", "rho"),
     ("scheme(quasi-static)", "scheme(newmark, 0.25, rho=0.8)", "rho alone"),
-    ("scheme(quasi-static)", "scheme(quasi-static)\n    precision(single)", "double precision"),
+    ("scheme(quasi-static)", "scheme(quasi-static)\n    precision(single)", "precision(single)"),
 ]  # fmt: skip
 
 

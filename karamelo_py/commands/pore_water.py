@@ -97,9 +97,6 @@ def pore_water(
             argument="material",
             expected="one pore_water for each material",
         )
-    if material.thin:
-        message = "thin bodies have no pore water"
-        raise ScriptError(message, argument="material", expected="plane strain or 1D strain")
     for solid in hub.solids.values():
         if solid.material is material:
             raise ScriptError(

@@ -1,5 +1,6 @@
 """Output quantities from the state of points."""
 
+from collections.abc import Callable
 from typing import Any
 
 from karamelo_py.compiler import at_hand, index, kernel, where
@@ -39,36 +40,33 @@ def export(quantity, times_volume, matter, out):
         )
 
 
-def _impose(change, matter, rows, values):
-    """Set the state of the points in `rows` to ``change(law, kin, state, value)``."""
-    kin, points, laws = at_hand(matter)
-    for k in range(rows.size):
-        p = index(rows[k])
-        law, state = state_at(kin, points, laws, p)
-        store(points.state, p, change(law, kin, state, values[k]))
+def imposing(change: Callable) -> Any:
+    """Make a kernel that sets the state of points to ``change(law, kin, state, value)``.
+
+    It takes a `Matter`, the rows of the points, and values by point.
+    """
+
+    @kernel
+    def impose(matter, rows, values):
+        kin, points, laws = at_hand(matter)
+        for k in range(rows.size):
+            p = index(rows[k])
+            law, state = state_at(kin, points, laws, p)
+            store(points.state, p, change(law, kin, state, values[k]))
+
+    return impose
 
 
-@kernel
-def impose_stress(matter, rows, components, stress):
-    """Set ``components`` (6,) of the Cauchy stress of the points in `rows` to ``stress`` (n, 6)."""
-
-    def changed(law, kin, state, wanted):
-        old = law_functions.cauchy_stress(law, kin, state)
-        new = [where(components[c], wanted[c], x) for c, x in enumerate(old)]
-        return law_functions.with_stress(law, kin, state, tuple(new))
-
-    _impose(changed, matter, rows, stress)
+def _with_some_stress(law, kin, state, wanted):
+    old = law_functions.cauchy_stress(law, kin, state)
+    new = [where(wanted[len(old) + c] > 0, wanted[c], x) for c, x in enumerate(old)]
+    return law_functions.with_stress(law, kin, state, tuple(new))
 
 
-@kernel
-def impose_temperature(matter, rows, temperature):
-    _impose(law_functions.with_temperature, matter, rows, temperature)
-
-
-@kernel
-def impose_lighting(matter, rows, since):
-    """Light the points in `rows`, at times ``since`` (n,) ago."""
-    _impose(law_functions.lit, matter, rows, since)
+# Values: the components of Cauchy stress, then 1 for each to be set, else 0.
+impose_stress = imposing(_with_some_stress)
+impose_temperature = imposing(law_functions.with_temperature)
+impose_lighting = imposing(law_functions.lit)  # values: time since the point was lit
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler import at_hand, index, kernel, point_function
-from karamelo_py.compiler.fields import field, store
+from karamelo_py.compiler import point_function
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays, hook_loop
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.equations import pore_water as pores
@@ -12,8 +12,8 @@ from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAg
 from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
+from karamelo_py.kernels.export import imposing
 from karamelo_py.kernels.table import NoCompany, NodeTask, Processor, company_of, take
-from karamelo_py.kernels.views import state_at
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -101,12 +101,4 @@ _accompany(NodalUpdate, WithUpdate())
 _accompany(Move, WithMove())
 _accompany(Strain, WithStrain())
 
-
-@kernel
-def impose_pore_pressure(matter, rows, pressure):
-    """Set the pressure of the water of the points in these rows."""
-    kin, points, laws = at_hand(matter)
-    for k in range(rows.size):
-        p = index(rows[k])
-        law, state = state_at(kin, points, laws, p)
-        store(points.state, p, with_pore_pressure(law, kin, state, pressure[k]))
+impose_pore_pressure = imposing(with_pore_pressure)

@@ -23,7 +23,6 @@ from karamelo_py.kernels.equations.periodic import Join, JoinVelocity, Seam, ask
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.transfers import stores_moment
-from karamelo_py.points.transfers.xpic import XPIC
 
 
 class Processor(NamedTuple):
@@ -372,7 +371,7 @@ def hold_axis(s: Setup) -> tuple:
 
 def sum_series(s: Setup) -> tuple:
     """Replace the velocity change by XPIC's new velocity."""
-    if not isinstance(s.transfer, XPIC):
+    if not s.transfer.traits.series:
         return ()
     # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
     terms = Repeated(lambda s: s.transfer.order - 1, _next_term)

@@ -1,7 +1,7 @@
-"""Rules that parts of a scene declare: known failures, needless costs, causes of energy gain.
+"""Declarations of parts: restrictions, known failures, needless costs, causes of energy gain.
 
-A part is a basis, transfer, scheme, method, field, law or part of a law, or a fix. Rules are
-declared next to it, also in plug-ins::
+A fix, a scheme (in its traits) or a fluid has `Restrictions`: what it does not support. Rules are
+declared next to a basis, transfer, scheme, method, field, law or part of a law, or fix::
 
     known_failure(
         PIC, "angular momentum", when=lambda pic, scene: scene.turns, reason="PIC removes 1 % or
@@ -17,11 +17,79 @@ noise over the tolerable amount.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf
 from typing import Any, NamedTuple
 
+from karamelo_py.script.errors import Place, ScriptError
+
 When = Callable[[Any, Any], Any]
+
+
+AS_WRITTEN = {"method": "method({}, ...)", "scheme": "scheme({})"}
+FLAT = "1D", "plane-strain", "3D"  # kinematics
+HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
+
+
+class Feature(NamedTuple):
+    """A choice of a scene, such as its basis, or an option in use, whose `name` is empty."""
+
+    kind: str
+    name: str
+    words: str  # in messages
+    instead: str = ""  # what to use instead of the option
+    place: Place | None = None
+
+
+class Restrictions(NamedTuple):
+    """Restrictions of a capability. What they do not mention is supported.
+
+    Parameters
+    ----------
+    option
+        Kind of the capability in the restrictions of others.
+    instead
+        How to do without it.
+    only
+        Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
+    without, but
+        Options that are not supported; and those to replace otherwise than by their ``instead``.
+    """
+
+    option: str
+    instead: str
+    only: Mapping[str, Collection[str]] = {}
+    without: Collection[str] = ()
+    but: Mapping[str, str] = {}
+
+    def exclude(self, feature: Feature) -> bool:
+        if feature.name:
+            return feature.name not in self.only.get(feature.kind, (feature.name,))
+        return feature.kind in self.without or feature.kind in self.but
+
+    def error(self, subject: Feature, feature: Feature) -> ScriptError:
+        """Return the error of a capability, with its words and place, about a feature."""
+        kind = feature.kind
+        known = [AS_WRITTEN.get(kind, "{}").format(name) for name in self.only.get(kind, ())]
+        instead = ", ".join(known[:-1]) + " or " * (len(known) > 1) + "".join(known[-1:])
+        return ScriptError(
+            f"{subject.words} does not support {feature.words}",
+            place=feature.place or subject.place,
+            expected=self.but.get(kind) or instead or feature.instead,
+        )
+
+
+def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:
+    """Refuse what the declarations exclude, each pair once, all in one message."""
+    errors: dict[frozenset[str], ScriptError] = {}
+    features = [*features, *declared]
+    for subject, restrictions in declared.items():
+        for feature in filter(restrictions.exclude, features):
+            pair = frozenset((subject.words, feature.words))
+            errors.setdefault(pair, restrictions.error(subject, feature))
+    for error in errors.values():
+        error.others = [*errors.values()][1:]
+        raise error
 
 
 class Advice(NamedTuple):

@@ -6,11 +6,15 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.equations.periodic import GHOSTS
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import words_of
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
 from karamelo_py.script.errors import Place, ScriptError
+
+NO_F_BAR = {"F-bar": "no anti_volumetric_locking: thin bodies do not lock"}
+THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 
 
 class Domain:

@@ -20,6 +20,7 @@ from karamelo_py.kernels.hooks import (
     vector_hook,
 )
 from karamelo_py.language.faults import as_script_error
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.units import NUMBER
 from karamelo_py.scene.group import ParticleGroup
@@ -112,6 +113,7 @@ class Fix(Publisher):
     by_sizes = False  # sizes of points follow from their volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
+    restrictions: Restrictions | None = None  # what it does not support
     reads_itself = False  # its formulas may contain its own values
     body: Any = None  # rigid solid that moves by the forces on it
     ignites = False

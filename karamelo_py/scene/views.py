@@ -428,14 +428,14 @@ class PointsView(View):
         """Set components of Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
-        flags = np.array([name in components for name in names])
-        values = np.stack(
-            [np.broadcast_to(components.get(name, 0.0), len(self.ids)) for name in names], axis=1
-        ).astype(s.nodes.sums.dtype)
+        columns = [components.get(name, 0.0) for name in names]
+        columns += [float(name in components) for name in names]
+        values = np.stack([np.broadcast_to(column, len(self.ids)) for column in columns], axis=1)
+        values = values.astype(s.nodes.sums.dtype)
         for block, rows, places in self._rows.parts:
             if len(rows) and can(elastic_law(block.laws), with_stress):
                 stress = np.ascontiguousarray(values[places])
-                impose_stress(arrays.matter_of(s.kin, block), np.asarray(rows), flags, stress)
+                impose_stress(arrays.matter_of(s.kin, block), np.asarray(rows), stress)
 
     def set_temperature(self, values: np.ndarray) -> None:
         self.impose(impose_temperature, values)

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.language.signature import In, NonNegative, Positive
 from karamelo_py.schemes.quasi_static import BEGIN, CLOSE, HOLD, Tolerance
-from karamelo_py.schemes.traits import SchemeTraits
+from karamelo_py.schemes.traits import IMPLICIT, SchemeTraits
 from karamelo_py.script.errors import ScriptError
 
 
@@ -58,7 +58,7 @@ class Newmark(NamedTuple):
     """
 
     limit = "error"
-    traits = SchemeTraits(implicit=True, damping=_damping)
+    traits = SchemeTraits(implicit=True, restrictions=IMPLICIT, damping=_damping)
     begin = BEGIN
     hold = HOLD
     close = CLOSE

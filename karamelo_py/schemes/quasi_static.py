@@ -5,7 +5,7 @@ from typing import Annotated, Literal, NamedTuple
 from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.equations.strain import StrainOfLoadStep
 from karamelo_py.language.signature import Constraint, NonNegative, Positive
-from karamelo_py.schemes.traits import SchemeTraits
+from karamelo_py.schemes.traits import IMPLICIT, SchemeTraits
 
 # stages: nodal loads from the present stress, constraints, motion of the points
 BEGIN = (
@@ -68,7 +68,7 @@ class QuasiStatic(NamedTuple):
     differently, or towards held nodes without points.
     """
 
-    traits = SchemeTraits(implicit=True, inertia=False)
+    traits = SchemeTraits(implicit=True, restrictions=IMPLICIT, inertia=False)
     begin = BEGIN
     hold = HOLD
     close = CLOSE

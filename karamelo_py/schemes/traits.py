@@ -3,7 +3,15 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from karamelo_py.language.rules import Restrictions
+
 DEFAULT_SHARE = 0.9  # fraction of the stable step
+
+IMPLICIT = Restrictions(
+    "implicit", "an explicit scheme, scheme(musl)",
+    only={"transfer": ("FLIP", "PIC")},  # points move by increments
+    without=("single", "ranks", "gpu"), but={"reflect": "fix velocity_nodes"},
+)  # fmt: skip
 
 
 class SchemeTraits(NamedTuple):
@@ -11,6 +19,7 @@ class SchemeTraits(NamedTuple):
 
     # Newton's method solves each step, with or without inertia.
     implicit: bool = False
+    restrictions: Restrictions | None = None  # what the scheme does not support
     inertia: bool = True
     # Stable step in h/c with two points per cell and direction, and with one.
     courant: tuple[float, float] = (1.0, 1.0)

@@ -20,6 +20,7 @@ class TransferTraits(NamedTuple):
     retains: bool = False  # points retain a fraction `alpha` of their velocity
     per_time: bool = False  # alpha refers to a stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
+    series: bool = False  # the new velocity is a series, summed in further visits of the points
 
 
 class Moment(Field):

@@ -55,7 +55,7 @@ class XPIC(NamedTuple):
 
     point_fields = (TermOfSeries, Reflected)
     node_fields = (Series,)
-    traits = TransferTraits()
+    traits = TransferTraits(series=True)
     in_lanes = True
 
 

@@ -11,7 +11,6 @@ from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.laws import initial_state
 from karamelo_py.points.laws.strengths.mu_i import yields_early_with_fbar
-from karamelo_py.points.transfers import Moment
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Place, ScriptError
 from karamelo_py.styles.methods.base import takes_average
@@ -26,26 +25,13 @@ _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
     update = hub.update
-    method, transfer = update.method, update.transfer
-    name = registry.name_of("transfer", type(transfer))
-    if Moment in declared([transfer], "point_fields") or name not in ("FLIP", "PIC"):
-        yield (
-            f"moves points by increments, which transfer {name} has no part in",
-            "FLIP instead, with an alpha of 1 after the basis",
-            method.place,
-        )
+    method = update.method
     if update.thermal and any(solid.rigid for solid in hub.solids.values()):
         yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
         yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.place
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
-    if update.boundary == "reflect":
-        yield "knows no walls that points bounce from", "fix velocity_nodes", None
-    if hub.settings.precision != "double":
-        yield "needs double precision", "no precision(single)", None
-    if hub.settings.comm.size > 1:
-        yield "runs in one process", "no --ranks; --threads divides the points", None
     kin = method.kinematics(hub)
     for solid in hub.solids.values():
         law = solid.material.law

@@ -133,30 +133,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     bodies = {fix.body for fix in moving}
     for touch in contacts_of(hub):
         _refuse_contact(hub, touch, bodies)
-    method, settings = hub.update.method, hub.settings
-    wrong = {
-        "takes explicit steps": hub.update.scheme.traits.implicit,
-        "runs in one process": settings.comm.size > 1,
-        "runs on processors": settings.engine == "gpu",
-        "needs double precision": settings.precision != "double",
-        "needs all its points": hub.update.boundary in ("delete", "reflect"),
-        "does not push pore water": any(
-            solid.material.fluid is not None for solid in hub.solids.values()
-        ),
-    }
-    cure = (
-        "scheme(musl), or a prescribed motion: fix velocity_particles",
-        "no --ranks; --threads divides the points",
-        "no --gpu",
-        "no precision(single)",
-        "boundary(error)",
-        "a dry material",
-    )
-    for fix in moving:
-        for (why, refused), hint in zip(wrong.items(), cure, strict=True):
-            if refused:
-                raise _error(fix, f"a rigid body that moves freely {why}", hint)
-    solids = hub.solids.values()
+    method, solids = hub.update.method, hub.solids.values()
     rigid = [solid for solid in solids if can(solid.material.law, constrained_velocity)]
     for fix in moving:
         body, apart = fix.body, method.own_grids or method.fields_per_solid

@@ -6,7 +6,7 @@ prints them) and, by their types, what is compiled.
 
 import copy
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,8 @@ from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
 from karamelo_py.kernels.table import Insulated
+from karamelo_py.language import registry
+from karamelo_py.language.rules import Feature, Restrictions, compare
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.point_table import owners_of_fields
 from karamelo_py.points import laws
@@ -41,11 +43,12 @@ from karamelo_py.run.step_size import Carried, set_up
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.domain import THIN
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import ScriptError, render_message
+from karamelo_py.script.errors import Place, ScriptError, render_message
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
@@ -90,13 +93,7 @@ def check_scene(hub: Hub) -> None:
         if error.place is None:
             error.place, error.command = method.place, "method"
         raise
-    if hub.domain.periodic:
-        boundary.check_periodic(hub)
-    if hub.update.boundary != "error":
-        boundary.check(hub)
-    for solid in hub.solids.values():
-        if solid.material.fluid is not None:
-            solid.material.fluid.check(hub)
+    _check_restrictions(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
     # Domains of rigid points would deform.
@@ -110,6 +107,70 @@ def check_scene(hub: Hub) -> None:
                 place=solid.place,
                 hint="a basis without domains that deform: linear, a spline, or ugimp",
             )
+
+
+def _features(hub: Hub) -> Iterator[Feature]:
+    """Yield the choices of a scene, and its options without restrictions."""
+    update, settings, method = hub.update, hub.settings, hub.update.method
+    kin = method.kinematics(hub)
+    place, name = method.place, registry.name_of("method", type(method))
+    transfer = registry.name_of("transfer", type(update.transfer))
+    scheme = registry.name_of("scheme", type(update.scheme))
+    yield Feature("method", name, f"method {name}", place=place)
+    yield Feature("basis", method.basis_name, f"the basis {method.basis_name}", place=place)
+    yield Feature("transfer", transfer, f"transfer {transfer}", place=place)
+    yield Feature("scheme", scheme, f"scheme {scheme}", place=update.scheme_place)
+    yield Feature("kinematics", kin.word, f"{kin.word} scenes")
+    if not method.frame.moves:
+        yield Feature("grids of solids", "", f"method {name}", "method(ulmpm, ...)", place)
+    if carried(method.basis, kin) > 0:
+        words = f"{type(method.basis).__name__} domains"
+        yield Feature("corners", "", words, "another basis", place)
+    if update.transfer.traits.series:
+        yield Feature("series", "", f"transfer {transfer}", "APIC or FLIP", place)
+    if update.thermal:
+        yield Feature("heat", "", "heat conduction", "a mechanical method", place)
+    if update.anti_locking:
+        yield Feature("F-bar", "", "anti_volumetric_locking", "anti_volumetric_locking(false)")
+    if settings.precision != "double":
+        yield Feature("single", "", f"precision({settings.precision})", "precision(double)")
+    if settings.comm.size > 1:
+        yield Feature("ranks", "", "--ranks", "--threads, which divides the points in one process")
+    if settings.engine == "gpu":
+        yield Feature("gpu", "", "--gpu", "processors, which run the same script: no --gpu")
+    for fix in hub.fixes.values():
+        if fix.solids or fix.follows_points:
+            yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.place)
+
+
+def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Place | None]]:
+    """Yield the restrictions of each capability in use, its words in messages and its line."""
+    update, box = hub.update, hub.domain
+    if box.periodic:
+        yield boundary.PERIODIC, "boundary(periodic)", None
+    if update.boundary != "error":
+        words = f"boundary({update.boundary})"
+        yield boundary.RESTRICTIONS[update.boundary], words, update.boundary_place
+    if box.thin:
+        yield THIN, "plane_stress" if box.dimension == 2 else "uniaxial_stress", None
+    for solid in hub.solids.values():
+        if solid.material.fluid is not None:
+            yield solid.material.fluid.restrictions, "pore_water", solid.place
+    for fix in hub.fixes.values():
+        yield fix.restrictions, f"fix {fix.style}", fix.place
+    name = registry.name_of("scheme", type(update.scheme))
+    yield update.scheme.traits.restrictions, f"scheme {name}", update.scheme_place
+
+
+def _check_restrictions(hub: Hub) -> None:
+    """Refuse combinations that a capability of the scene does not support."""
+    declared = {
+        Feature(restrictions.option, "", words, restrictions.instead, place): restrictions
+        for restrictions, words, place in _restricted(hub)
+        if restrictions is not None
+    }
+    if declared:
+        compare(declared, _features(hub))
 
 
 def thread_count(hub: Hub, points: int) -> int:

@@ -85,14 +85,6 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
     Without `setup`, checks that need arrays are skipped.
     """
     scheme = hub.update.scheme
-    if scheme.traits.implicit:
-        name = registry.name_of("scheme", type(scheme))
-        yield ScriptError(
-            f"a GPU takes no steps of scheme {name}, which solves equations",
-            place=hub.update.scheme_place,
-            hint=f"an explicit scheme (musl, usf, usl, usavg), or {WITHOUT}",
-        )
-        return
     from karamelo_py.run.gpu import Card  # registers its rows
 
     rows = scheme.rows if setup is None else table.plain(scheme.rows, setup)

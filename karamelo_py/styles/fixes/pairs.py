@@ -11,7 +11,7 @@ from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block, Matter
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.laws import elastic_law
-from karamelo_py.language.rules import gain
+from karamelo_py.language.rules import FLAT, Restrictions, gain
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.bodies import Hertz, MinimizePenetration
 from karamelo_py.points.laws import parameter
@@ -262,13 +262,11 @@ class ContactHertz(PairContact):
     contact/minimize_penetration, method tlmpm
     """
 
+    # Points around an axis or centre are rings, not balls.
+    restrictions = Restrictions("hertz", "minimize_penetration", only={"kinematics": FLAT})
+
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, solid1, solid2)
-        if hub.domain.kin.hoops:
-            raise ScriptError(
-                "the force of Hertz is one of balls, and points around an axis or centre are rings",
-                expected="fix contact/minimize_penetration, or a scene in 3D",
-            )
         self.law()  # refuses materials without moduli
 
     def law(self) -> Hertz:

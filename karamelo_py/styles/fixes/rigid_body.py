@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.kernels import free_bodies as kernel
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.language.arguments import NULL
-from karamelo_py.language.rules import known_failure
+from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.language.signature import Argument, NonNegative, Positive
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
@@ -108,6 +108,11 @@ class RigidBody(Fix):
         "[, torque=t][, motion=(ux, uy, uz)][, turning=w][, fixed=(x, rz)][, pivot=(x, y, z)]"
         "[, mass=m][, inertia=I]"
     )
+    restrictions = Restrictions(
+        "rigid_body", "a prescribed motion: fix velocity_particles",
+        without=("delete", "reflect", "single", "pore_water", "ranks", "gpu"),
+        but={"implicit": "scheme(musl), or a prescribed motion: fix velocity_particles"},
+    )  # fmt: skip
     published = (
         "x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz",
         "fx", "fy", "fz", "tx", "ty", "tz",

@@ -123,11 +123,6 @@ class Method:
         """Tag of averaging: `FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
-        if hub.domain.thin:
-            raise ScriptError(
-                "anti_volumetric_locking averages volumes, which thin bodies do not conserve",
-                expected="no anti_volumetric_locking: thin bodies do not lock",
-            )
         laws = [solid.material.law for solid in hub.solids.values()]
         steps = not hub.update.scheme.traits.implicit
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
