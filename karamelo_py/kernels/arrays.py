@@ -25,8 +25,6 @@ Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
-    """Fields of all nodes, by node number: ``nodes.sums[n, of_force(kin) + k]``."""
-
     sums: np.ndarray  # mass, momentum, force, scattered by the points
     update: np.ndarray  # v* after the momentum update, v* - v
     velocity: np.ndarray  # the velocity whose gradient deforms the points
@@ -50,7 +48,6 @@ def of_change(kin):
 
 
 def vector_at(kin, records, i, first, like):
-    """Load a vector from record `i`, starting at component `first`."""
     return vector(kin, row(records, i, first, (*like,)))
 
 
@@ -75,7 +72,7 @@ class Points(NamedTuple):
 
 
 def known_to_laws(points):
-    """The points without optional fields, so that kernels of laws serve all methods."""
+    """Omit optional fields, so that kernels of laws serve all methods."""
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
         points.id, (),
@@ -92,15 +89,12 @@ def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
-    """Rebuild `points` from `arrays` in the order of `arrays_of`."""
     remaining = iter(arrays)
     items: list[Any] = [None if array is None else next(remaining) for array in points[:-1]]
     return Points(*items, tuple(type(one)(next(remaining)) for one in points.fields))
 
 
 class Tiling(NamedTuple):
-    """The points of a block by tile."""
-
     count: np.ndarray  # (3,) int64: occupied tiles, parts of the points, parts that other
     #                    processes wait for
     share: np.ndarray  # (S + 1,) int64: tiles of part k are order[share[k]:share[k + 1]]
@@ -123,7 +117,7 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """Sums of the tiles of points: dense boxes of nodes, one after another.
+    """Sums of the tiles of points in dense boxes of nodes, one after another.
 
     A tile of nodes sums the boxes that reach it in a fixed order and zeros them. Its parts are
     ranges of nodes that overlap a box, after one that clears what the first box does not cover.
@@ -148,8 +142,6 @@ class Places(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Points of one law, the law's parameters per material, and the tiles."""
-
     points: Points
     laws: NamedTuple  # parameters, an array (m,) over materials each
     tiling: Tiling
@@ -174,7 +166,7 @@ def matter_of(kin: Tag, block: Block) -> Matter:
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """The block with the points `rows` in this order, not yet sorted."""
+    """Return the block with the points `rows` in this order, not yet sorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
@@ -370,7 +362,7 @@ class Control(NamedTuple):
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """A control with a zero clock; `firsts` are ids of the first points of solids."""
+    """Make a control with a zero clock; `firsts` are ids of the first points of solids."""
     clock: Any = np.zeros(1, CLOCK).view(np.recarray)
     parts = clock.step, clock.motion, clock.energy, clock.heat
     clock.motion.weight = clock.motion.stride = 1.0
@@ -410,7 +402,7 @@ def with_items(of, /, **items):
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """First index whose number is not below `x`; NumPy's search takes 0.4 s to compile."""
+    """Return the first index with at least `x`; NumPy's search takes 0.4 s to compile."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

@@ -17,8 +17,6 @@ _call = caller_of(CALL)
 
 
 class CalledHooks(NamedTuple):
-    """Compiled hooks, and a Python function called at the start of each step."""
-
     compiled: NamedTuple
     address: int  # of ``(stage) -> 1``, or 0 if it failed
 

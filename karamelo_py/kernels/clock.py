@@ -14,19 +14,19 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """dt, the time that points move, in the precision of the run."""
+    """Return dt, the time that points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """dt of the previous step; tiny, not 0, if there is none, because laws divide by it."""
+    """Return dt of the previous step; tiny, not 0, if there is none, because laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
-    """Time for which forces act, from the middle of the last step to the middle of this one.
+    """Return the time that forces act, between the middles of the last and this step.
 
     In the first step it is the whole step, as if initial velocities were half a step old, or half.
     """
@@ -34,7 +34,7 @@ def kick(s: Setup) -> Number:
 
 
 def common_velocity(kin: Tag, motion: Any, like: Number) -> tuple:
-    """Reference velocity (d,) for speeds, in the type of `like`."""
+    """Return the reference velocity (d,) for speeds, in the type of `like`."""
     return vector(kin, [real(motion.common[0, k], like) for k in range(kin.dimension)])
 
 
@@ -55,7 +55,7 @@ def choose_dt(control: Control) -> None:
 
     The last two steps are shortened equally: prescribed or mapped velocities give impulses that do
     not vanish with dt, so a very short step would have huge forces. Contact with a stiffness of
-    m/dt^2 uses a whole step: suddenly stiffer springs would throw bodies back.
+    m/dt^2 takes dt of a whole step, because suddenly stiffer springs would throw bodies back.
     """
     step, motion, heat = control.step[0], control.motion[0], control.heat[0]
     if motion.weight > 1:
@@ -124,7 +124,6 @@ def _read_reports(tiling, control):
 
 
 def read_reports(s: Setup) -> None:
-    """Put the largest rate and move of all tiles, and any failure, in the clock."""
     motion = s.control.motion[0]
     motion.new_rate = 0.0
     motion.new_move = 0.0
@@ -162,7 +161,7 @@ def move_check(s: Setup) -> MoveCheck:
 
 
 def checked_move(check, points, p):
-    """Move of point `p` in cells, and whether it is allowed."""
+    """Return the move of point `p` in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)
@@ -187,7 +186,6 @@ def _check_points(check, points, tiling, k):
 
 
 def check_moves(s: Setup, mode: Tag) -> bool:
-    """Check new positions again after hooks on them."""
     motion = s.control.motion[0]
     for block in s.blocks:
         _check_points(mode, block.tiling.count[1], move_check(s), block.points, block.tiling)

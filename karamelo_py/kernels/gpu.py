@@ -104,7 +104,7 @@ def _report(fate, number, moved, rate, stride):
 
 
 def is_last(s):
-    """True in the last step, which sums nothing for a next one."""
+    """Return True in the last step, which sums nothing for a next one."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.step[0].end_time
 
@@ -191,7 +191,6 @@ class Stage:
         self.gather, self.count = gather_point, count_point
 
     def scatter(self, part: int) -> Callable:
-        """Return the function that sums a cell's points at a part of its nodes."""
         point, place, quantities = self._point, self._place, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
         count, (begin, end) = self.support, self.nodes_of(part)
@@ -336,7 +335,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Find a chunk's prefix sum; `above` is the level above, or -1."""
+    """Sum what precedes an item of a level; `above` is the level above, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -370,8 +369,6 @@ def _point_and_corner(corners, count, listed):
 
 
 def sort_cell(corners: int) -> Callable:
-    """Return the function that sorts a cell's points by id and corner."""
-
     def key(ids, listed):
         p, corner = _point_and_corner(corners, ids.size, listed)
         return ids[p] * corners + corner
@@ -393,8 +390,10 @@ def sort_cell(corners: int) -> Callable:
     return sort_cell
 
 
-# --- order in memory: the threads of a warp take adjacent cells, so the first points of these cells
-# should be adjacent in memory, then their second points.
+# --- order in memory --------------------------------------------------------------------------
+#
+# The threads of a warp take adjacent cells: the first points of these cells should be adjacent in
+# memory, then their second points.
 
 
 def order_cell(i, fate, cells, come_from):

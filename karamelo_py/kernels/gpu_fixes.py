@@ -203,7 +203,6 @@ def clear_rows(i, fate, sums, first):
 
 
 def collect_total(i, fate, copies, sums, first):
-    """Sum a number of the totals over the copies, and clear those."""
     row, limb = first + i // copies.shape[2], i % copies.shape[2]
     total = sums[row, limb]
     for k in range(copies.shape[0]):
@@ -213,7 +212,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks; `which` is their range, and whether not only at the end of a run."""
+    """Publish totals of hooks; `which` is a range, and whether before the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):
@@ -221,7 +220,6 @@ def publish(i, fate, s, hooks, which):
 
 
 def add_energies(i, fate, s, block, copies):
-    """Sum energies of every `CHUNK`-th point, and mass and momentum of the solids."""
     points, laws, kin = known_to_laws(block.points), block.laws, s.kin
     threads = -(-points.mass.size // CHUNK)
     copy = copies[index(i % len(copies))]
@@ -268,7 +266,7 @@ def look_before(i, fate, s):
 
 
 def look_behind(i, fate, s):
-    """Check the energy; spurious gain ends the run."""
+    """Check the energy, and end the run on spurious gain."""
     energy = s.control.energy[0]
     if energy.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return

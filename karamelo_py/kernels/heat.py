@@ -53,7 +53,7 @@ def heat_of(points):
 
 @point_function(otherwise=True)
 def at_heated_points(hooks, s):
-    """Apply fixes that supply heat to points or set their temperature."""
+    pass
 
 
 @at_heated_points.on(arrays.Hooks)
@@ -71,7 +71,6 @@ def _of_heat(s):
 
 
 def at_its_nodes(s):
-    """The setup with the one-component nodes of heat."""
     return _of_heat(s)._replace(kin=Line())
 
 

@@ -55,8 +55,6 @@ class Call(NamedTuple):
 
 
 class HookedNodes(NamedTuple):
-    """Nodes (also of heat) for node functions."""
-
     target: int  # `arrays.ON_SUMS`, `ON_UPDATE`, `ON_VELOCITY`, `LOADS`, `LOADS_AGAIN`
     kin: NamedTuple
     grids: np.ndarray
@@ -108,7 +106,7 @@ class HeatedPoints(NamedTuple):
 
 
 def _turns(members, k, parts):
-    """Begin, end and stride of the chunks of thread `k` of `parts`."""
+    """Return begin, end and stride of the chunks of thread `k` of `parts`."""
     if isinstance(members, HookedNodes):
         shares = members.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
@@ -195,7 +193,7 @@ def _act_on_all(members, task, call):
 
 
 def directions(hooks):
-    """The dimension at run time, so that loops are not unrolled."""
+    """Return the dimension at run time, so that loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -257,7 +255,7 @@ def publish_total(hooks, h, control):
 
 
 def _choose_nodes(members, call, row, end, member):
-    """Choose up to a block of members with mass, in use; return number, where to continue."""
+    """Choose up to a block of used members with mass; return their number, and the next member."""
     hooks, h, ranges, sums = call.hooks, call.h, members.ranges, members.nodes.sums
     of_all = members.target >= LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -348,7 +346,7 @@ def _take_over(call, n, c, force):
 
 @noinline
 def _is_of_rigid(hooks, n):
-    """True for a node of a rigid solid, on which no work is done."""
+    """Return True for a node of a rigid solid, on which no work is done."""
     rigid = hooks.rigid_fields
     return rigid.size > 0 and rigid[n // (hooks.loads.shape[0] // rigid.size)]
 
@@ -432,7 +430,6 @@ def _change_update(members, call, c, q):
 
 @noinline
 def _change_velocity(members, call, c, q):
-    """Change a node's deforming velocity; return the total."""
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
     # Strain before the forces belongs to the last step and its holding hooks.
@@ -521,12 +518,12 @@ def without_whole(hooks):
 
 
 def known_to_hooks(nodes):
-    """Fields that the loop uses; others would have it compiled again."""
+    """Return the fields that the loop uses; others would have it compiled again."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
 def hooked_nodes(s, target, kept):
-    """Nodes for node functions; `kept` is the FLIP coefficient."""
+    """Return nodes for node functions; `kept` is the FLIP coefficient."""
     nodes = s.nodes
     trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
     return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept)
@@ -596,7 +593,7 @@ def _at_nodes_hooks(hooks, stage, target, s):
 
 @point_function(otherwise=True)
 def add_work(hooks, s, again):
-    """Sum the work of loads on nodes."""
+    pass
 
 
 @add_work.on(arrays.Hooks)
@@ -605,7 +602,7 @@ def _add_work_hooks(hooks, s, again):
 
 
 def choose_points(members, call, p, end):
-    """Choose up to a block of members, with positions; return number, where to continue."""
+    """Choose up to a block of members; return their number, and the next point."""
     hooks, h = call.hooks, call.h
     begin, ids, where = hooks.table[h].begin, members.ids, hooks.scratch
     count = 0
@@ -690,7 +687,7 @@ def _act_on_warmth(members, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Formulas of time now and at the end of the step (else 0), and contact times."""
+    """Return formulas of time now and at the end of the step (else 0), and contact times."""
     values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):

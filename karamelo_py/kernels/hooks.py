@@ -1,16 +1,15 @@
 """Compiled hooks of fixes: functions of one component at a node or point, or of whole points.
 
 A fix is a formula acting on a group, with a tiny function. The loops choose members, evaluate the
-formula block by block and call the function by address: a new list of fixes compiles only new
-functions.
+formula block by block and call the function by address, so only new functions are compiled.
 
 Node function ``(mass, v, v_star, force, value, before, kick, share) -> (v, v_star, force, total)``:
 `value` and `before` are the formula at the step's time and one step earlier; `share` is 1 / number
 of members with mass; `kick` is the time forces act, half of the last step plus half of this one.
-Totals are summed and published, plus the momentum that a change of v before the update adds to
-points, over kick. Of several hooks holding a node, the last to set v_star to its value decides, and
-gets the others' totals there. Of the deforming velocity, if mapped separately from v_star, v is
-set; before the forces (usf, usavg) by the hooks of the update, where those that hold set it to
+Totals are summed and published, plus the momentum over kick that a change of v before the update
+adds to points. Of several hooks that hold a node, the last to set v_star to its value decides, and
+gets the others' totals there. Hooks set v of the deforming velocity if it is mapped separately from
+v_star; before the forces (usf, usavg) the hooks of the update do, and those that hold set it to
 their v_star.
 
 Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``: `dt` is the time
@@ -19,8 +18,8 @@ of the move, `kick` the time forces act.
 Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``, of points
 where heat flows: `value` and `other` are the first and second formula, `face` the point's area,
 `supply` its heat per time, `share` the fraction of the nodal temperature change it takes. The total
-is the heat supplied. If a hook holds, `other` is the target temperature. Node functions of heat see
-capacity, temperature before and after the step, and heat flow.
+is the heat supplied; for a hook that holds, `other` is the target temperature. Node functions of
+heat see capacity, temperature before and after the step, and heat flow.
 
 Functions of whole points (:func:`vector_hook`) see vectors, fields and the law's state, and are
 compiled into the loop.
@@ -73,8 +72,8 @@ class CompiledHook(NamedTuple):
 
     function: Callable
     where: str  # "nodes" (also of heat), "points", "heated points", `WHOLE_POINTS`, `WHOLE_NODES`
-    publishes: bool  # its totals become ID_x, ID_y, ID_z
-    uses_before: bool  # also needs the formulas one step earlier
+    publishes: bool  # totals become ID_x, ID_y, ID_z
+    uses_before: bool  # needs the formulas one step earlier
     uses_share: bool  # needs 1 / number of members with mass
     holds: bool  # sets or bounds v_star; prescribes a temperature
     tag: Callable | None = None  # makes the tag of a function of whole points
@@ -92,7 +91,7 @@ class CompiledHook(NamedTuple):
 
 
 WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
-# What hooks act on at each stage; hooks on whole points wherever points are.
+# Hooks on whole points may act wherever points are.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(POINT_STAGES, "points"),
@@ -108,25 +107,23 @@ def node_hook(
     shares: bool = False,
     holds: bool = False,
 ) -> CompiledHook:
-    """Make a compiled hook on nodes, of a node function (see the module)."""
+    """Make a compiled hook on nodes from a node function (see the module)."""
     return CompiledHook(function, "nodes", publishes, uses_before, shares, holds)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = True, uses_before: bool = False
 ) -> CompiledHook:
-    """Make a compiled hook on points, of a point function (see the module)."""
+    """Make a compiled hook on points from a point function (see the module)."""
     return CompiledHook(function, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
-    """Make a compiled hook for ``supply_heat``, of a heat function (see the module)."""
+    """Make a compiled hook for ``supply_heat`` from a heat function (see the module)."""
     return CompiledHook(function, "heated points", publishes, False, False, holds)
 
 
 class Member(NamedTuple):
-    """A point or node for a function of whole members."""
-
     p: Index
     law: Tag
     state: tuple
@@ -136,7 +133,7 @@ class Member(NamedTuple):
 
 @point_function()
 def results(tag, members, one):
-    """Return the results of a function of whole members for a `Member`, a tuple."""
+    """Return the results of a function of whole members, a tuple."""
 
 
 @point_function()
@@ -174,7 +171,7 @@ NODE_WORDS = {
         members, members.nodes.sums, n, arrays.of_force(members.kin)
     ),
 }
-# Stages of hooks on whole nodes, and what they can change besides fields.
+# stages of hooks on whole nodes, and what they can change besides fields
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
@@ -229,9 +226,9 @@ def _writer(item: Any) -> Callable:
 def vector_hook(
     function: Callable, *, reads: tuple, writes: tuple, publishes: bool = False, nodes: bool = False
 ) -> CompiledHook:
-    """Make a compiled hook on points that sees vectors, declared fields, and the state of the law.
+    """Make a compiled hook that sees vectors, declared fields and the law's state of points.
 
-    With `nodes` one on nodes, which sees vectors and declared fields of nodes, `NODE_WORDS`.
+    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes.
 
     Parameters
     ----------
@@ -248,10 +245,10 @@ def vector_hook(
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
         return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
-    # In the function's module: importable, so kernels are cached.
+    # In the function's module, so that cached kernels can import it.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
-    while hasattr(module, name):  # it serves another hook, too
+    while hasattr(module, name):  # the function serves another hook too
         name += "_"
     made = namedtuple(name, ("row", "values"), module=function.__module__)
     setattr(module, name, made)

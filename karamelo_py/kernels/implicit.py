@@ -1,9 +1,9 @@
 """Implicit steps: nodal forces after trial displacements, and their derivatives.
 
-Weights and gradients at the beginning of the step stay fixed in Newton's iterations (as in
-Charlton, Coombs & Augarde 2017). With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H)
-(I + H)^-T gives the forces V0 P grad N. Its derivatives dP/dH (:mod:`karamelo_py.compiler.slopes`)
-give the whole stiffness V0 grad N dP/dH grad N: geometry, and all that a law does while it yields.
+Weights and gradients stay those before the step in Newton's iterations (as in Charlton, Coombs &
+Augarde 2017). With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H) (I + H)^-T gives
+the forces V0 P grad N, and dP/dH (:mod:`karamelo_py.compiler.slopes`) the stiffness V0 grad N dP/dH
+grad N, with geometry and yielding.
 """
 
 from typing import NamedTuple
@@ -42,10 +42,10 @@ GROUP = 8
 class Seen(NamedTuple):
     """Nodes that a block's points see, with nonzero weight or gradient."""
 
-    count: np.ndarray  # (n,) int32: number of nodes
-    nodes: np.ndarray  # (n, s) int32: indices among unknown nodes (int64: in the grid)
+    count: np.ndarray  # (n,) int32
+    nodes: np.ndarray  # (n, s) int32 index among unknown nodes (int64: in the grid)
     weights: np.ndarray  # (n, s)
-    gradients: np.ndarray  # (n, s, c) at positions before the step
+    gradients: np.ndarray  # (n, s, c) before the step
     starts: np.ndarray  # (m + 1,) int64: begin of each node in `entries`
     entries: np.ndarray  # int32 or int64: p s + k of the points that see a node, in order
 
@@ -53,15 +53,13 @@ class Seen(NamedTuple):
 class Pairs(NamedTuple):
     """Pairs of nodes seen by one point: the blocks of K, row by row."""
 
-    codes: np.ndarray  # (m,) int64: positions of the nodes in the grid; differences identify pairs
+    codes: np.ndarray  # (m,) int64 grid positions of the nodes; differences identify pairs
     middle: int  # column of the difference 0 in `rank`
     rank: np.ndarray  # (m, r) int32: index of the other node in a node's row; -1: no pair
-    first: np.ndarray  # (m + 1,) int64: begin of the pairs of a node
+    first: np.ndarray  # (m + 1,) int64: begin of a node's pairs
 
 
 class Blocks(NamedTuple):
-    """Pairs of nodes, and the numbers of each."""
-
     pairs: Pairs
     values: np.ndarray
 
@@ -72,7 +70,7 @@ class Tangent(NamedTuple):
     first: int
     end: int
     values: np.ndarray  # (t t, c) V0 dP/dH, a row of P after another
-    done: np.ndarray  # (m,) int64: entries of each node so far, see `add_stiffness`
+    done: np.ndarray  # (m,) int64 entries of each node so far (`add_stiffness`)
 
 
 class Response(NamedTuple):
@@ -80,11 +78,10 @@ class Response(NamedTuple):
 
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P
-    furthest: np.ndarray  # (PARTS,) the largest component of a displacement in each part
+    furthest: np.ndarray  # (PARTS,) largest component of a displacement in each part
 
 
 def row_of(pairs: Pairs, a: int, b: int) -> int:
-    """Return the number of the pair of nodes `a` and `b`."""
     return pairs.first[a] + pairs.rank[a, pairs.middle + pairs.codes[b] - pairs.codes[a]]
 
 
@@ -167,7 +164,6 @@ def strain(kin, seen, u, response, part):
 
 
 def strained_point(matter, response, p):
-    """Load law and state before the step, H, and reference volume of a point."""
     kin, points, laws = matter
     law, state = state_at(kin, points, laws, p)
     mass = points.mass[p]
@@ -232,7 +228,6 @@ def keep_stress(matter, stress):
 
 @kernel
 def list_points(seen):
-    """Fill `Seen.starts` and `Seen.entries`."""
     starts, entries = seen.starts, seen.entries
     m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
     for p in range(count):
@@ -266,7 +261,6 @@ def spread(seen, places):
 
 @by_threads
 def mark_pairs(seen, pairs, part):
-    """Set `Pairs.rank` to 0 for existing pairs."""
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -278,7 +272,7 @@ def mark_pairs(seen, pairs, part):
 
 @by_threads
 def add_forces(kin, seen, stress, f, part):
-    """Add the forces of stresses (t, n) to nodes (m, d): V0 P grad N."""
+    """Add the nodal forces V0 P grad N of stresses (t, n) to nodes (m, d)."""
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -291,7 +285,7 @@ def add_forces(kin, seen, stress, f, part):
 
 
 def along(kin, row):
-    """Return the direction a tensor row acts along: the radius for the hoop row."""
+    """Return the direction in which a tensor row acts, radial for the hoop row."""
     return row if row < kin.dimension else 0
 
 
@@ -325,7 +319,7 @@ def by_displacement(kin, D, g):
 
 @by_threads
 def add_stiffness(kin, seen, tangent, blocks, part):
-    """Add derivatives of the forces of points to blocks K (b, d d)."""
+    """Add derivatives of the points' forces to blocks K (b, d d)."""
     seen, (pairs, K) = at_hand(seen), at_hand(blocks)
     first, end, values, done = tangent
     t = kin.tensor_size

@@ -1,18 +1,17 @@
 """F-bar in implicit steps, and its derivatives, which couple more nodes.
 
-With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k directions, of which r is
+With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k directions, where
 
     r_p = sum_i N_ip R_i,    R_i = sum_q N_iq V_q J_q / sum_q N_iq V_q.
 
 The energy e(A, r) of a point has P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
-mean p of the stresses tau along these directions. Nodal forces are the derivatives by
+mean p of the stresses tau along these directions. Nodal forces are its derivatives by
 displacements: P grad N, and V J A^-T grad N times the average of q. With S = dR/du, their
 derivatives
 
     K + X^T S + S^T Y + S^T Z S
 
-are sums over points, and products of matrices of their nodes: X of dP/dr, Y of dq/dA and Z of
-dq/dr.
+are sums over points, and products of matrices of their nodes: X of dP/dr, Y of dq/dA, Z of dq/dr.
 """
 
 from typing import Any, NamedTuple
@@ -41,7 +40,7 @@ class Averages(NamedTuple):
     cofactors: np.ndarray  # (t, n) V J A^-T
     ratio: np.ndarray  # (1, n) r
     pressure: np.ndarray  # (1, n) q
-    mean: np.ndarray  # (1, n) the average of q
+    mean: np.ndarray  # (1, n) average of q
     tangent: np.ndarray  # (t t, n) dP/dA, a row of P after another
     by_ratio: np.ndarray  # (t, n) dP/dr
     of_pressure: np.ndarray  # (t, n) dq/dA
@@ -143,7 +142,6 @@ def bring_mean(kin, response, averages, part):
 
 @by_threads
 def sum_at_nodes(seen, values, sums, part):
-    """Add values (1, n) of points to nodes (m,), by weights."""
     seen = at_hand(seen)
     m, width = sums.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):
@@ -166,7 +164,7 @@ def average(seen, nodes, values, part):
 
 @by_threads
 def add_slopes(kin, seen, tensors, blocks, part):
-    """Add N_a T grad N_b of tensors T (t, n) of points to pairs of nodes, d numbers each."""
+    """Add N_a T grad N_b of point tensors T (t, n) to pairs of nodes, d numbers each."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     d = kin.dimension
     m, width = pairs.codes.size, seen.nodes.shape[1]
@@ -184,7 +182,7 @@ def add_slopes(kin, seen, tensors, blocks, part):
 
 @by_threads
 def add_products(seen, values, blocks, part):
-    """Add N_a N_b times values (1, n) of points to pairs of nodes."""
+    """Add N_a N_b times point values (1, n) to pairs of nodes."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * part // PARTS, m * (part + 1) // PARTS):

@@ -11,13 +11,11 @@ from karamelo_py.kernels.equations.strain import Strain
 
 
 class OneByOne(NamedTuple):
-    """Points one by one."""
-
     width = 1
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose lanes for a loop over points; none if interpreted, or if a part has none."""
+    """Choose lanes for a loop over points: none if interpreted, or if a part has none."""
     return OneByOne()
 
 
@@ -37,20 +35,20 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 
 
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
-    """Choose three loops over a stretch of points (gather, update, scatter) instead of one.
+    """Return True if three loops over a stretch (gather, update, scatter) replace one.
 
-    For visits in lanes that only strain: a law alone may fill the instruction cache. Where points
-    move, there is little to update, and finding stencils twice costs more.
+    They pay for visits in lanes that only strain: a law alone may fill the instruction cache. Where
+    points move, there is little to update, and finding stencils twice costs more.
     """
     strains = [isinstance(task, Strain) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Choose the update's lanes: twice as many in stretches, as dependent operations wait."""
+    """Double the lanes of an update in stretches, whose dependent operations wait."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 
 def zero_of(lanes: Tag, like: Number) -> Number:
-    """Return 0 in the number type of a visit: `like`, or lanes of it."""
+    """Return 0 in the type of `like`, or in lanes of it."""
     return like - like if isinstance(lanes, OneByOne) else spread(lanes, like - like)

@@ -1,7 +1,4 @@
-"""Laws in the precision of a run, and in tables.
-
-A law is a NamedTuple of numbers, number rows, or such NamedTuples (:mod:`karamelo_py.points.laws`).
-"""
+"""Laws in the precision of a run, and in tables."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -22,7 +19,7 @@ def _in(value: Any, real: type) -> Any:
 
 
 def law_table(laws: Sequence[Any], real: type) -> Any:
-    """Gather `laws` of one kind in a NamedTuple of arrays (m,); rows of numbers (m, longest)."""
+    """Gather `laws` of one kind in a NamedTuple of arrays (m,), or (m, longest) for rows."""
     return type(laws[0])(*(_table(column, real) for column in zip(*laws, strict=True)))
 
 

@@ -1,7 +1,7 @@
 """Pairs of touching points of two bodies, found with linked cells, and their forces.
 
-In double precision, on one thread: sums are in the order of the ids, whatever the number of threads
-and the order in memory.
+Sums are in double precision, on one thread and in the order of the ids, so they do not depend on
+threads or the order in memory.
 """
 
 from math import inf, sqrt
@@ -33,7 +33,7 @@ class TwoBodies(NamedTuple):
     mass: np.ndarray  # (n,)
     radius: np.ndarray  # (n,)
     force: np.ndarray  # (n, d)
-    grip: np.ndarray  # (n, d + 2) of the first body: see `points.bodies.rub`; (n, 0) without
+    grip: np.ndarray  # (n, d + 2) of the first body (`points.bodies.rub`); (n, 0) without
     #                   friction
     first2: int
 
@@ -46,12 +46,10 @@ class OneOfTwo(NamedTuple):
 
 
 class Push(NamedTuple):
-    """Settings of the forces between two bodies."""
-
     law: Tag  # of `points.bodies`
     kin: Tag
-    reach: float  # points touch if they are closer than this in every direction
-    step: float  # time that points have moved for
+    reach: float  # largest distance of touching points, in each direction
+    step: float  # time that points have moved
     dt: float  # sets the stiffness, with `kick`
     kick: float
 
@@ -59,13 +57,13 @@ class Push(NamedTuple):
 class Cells(NamedTuple):
     """Scratch of the search."""
 
-    start: np.ndarray  # (c + 1,) int64: room for c cells
-    cell: np.ndarray  # (n,) int64: the cell of each point; -1: nothing can touch it
+    start: np.ndarray  # (c + 1,) int64, room for c cells
+    cell: np.ndarray  # (n,) int64; -1: nothing can touch it
     order: np.ndarray  # (n,) int64: points of the second body by cell
-    corner: np.ndarray  # (3,) float64: lower corner of the cells
-    length: np.ndarray  # (3,) float64: lengths of their region
+    corner: np.ndarray  # (3,) lower corner of the cells
+    length: np.ndarray  # (3,) lengths of their region
     count: np.ndarray  # (3,) int64: cells along each direction
-    contact: np.ndarray  # (7,) of a point, see `_touch`
+    contact: np.ndarray  # (7,) of a point (`_touch`)
     total: np.ndarray  # (3,) force on the first body
 
 
@@ -94,7 +92,7 @@ def _radius(matter, x, p):
 def extend(matter, x, ids, extents):
     """Extend the extents of two bodies by a block's points at `x` (w, n).
 
-    `extents` (2, 7): per body the largest -x, -y, -z, x, y, z and radius.
+    `extents` (2, 7) holds the largest -x, -y, -z, x, y, z and radius of each body.
     """
     matter = at_hand(matter)
     points = matter.points
@@ -155,7 +153,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover by cells where the bodies may touch; return the width of a cell, 0 if nowhere."""
+    """Cover by cells where the bodies may touch; return a cell's width, 0 if nowhere."""
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -164,7 +162,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # In this form, NaN counts as none.
+        # this form excludes NaN
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -202,7 +200,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[number + 1] += 1
     for c in range(used):
         cells.start[c + 1] += cells.start[c]
-    # start[c] moves to the end of cell c, where cell c + 1 begins.
+    # start[c] moves to the end of cell c, where cell c + 1 begins
     for j in range(n, m):
         c = cells.cell[j]
         if c >= 0:
@@ -212,7 +210,6 @@ def _find_cells(d, bodies, cells, width):
 
 @noinline
 def _push_between(push, bodies, i, j):
-    """Return the normal force on point `i` from point `j`; 0 if they do not touch."""
     law, kin = push.law, push.kin
     x, none = bodies.x, zero_vector(kin, 0.0)
     dx = vector_at(kin, x, j, 0, none) - vector_at(kin, x, i, 0, none)
@@ -240,7 +237,7 @@ def _add(bodies, i, j, force, total):
 def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points; return 1 if they touch, else 0.
 
-    `cells.contact` sums for the friction on `i`: load, normal force, and each partner's stiffness
+    For the friction on `i`, `cells.contact` sums load, normal force, and each partner's stiffness
     times tangential velocity.
     """
     kin, contact = push.kin, cells.contact
@@ -249,7 +246,7 @@ def _touch(push, bodies, cells, i, j):
     if not square > 0:
         return 0
     _add(bodies, i, j, force, cells.total)
-    if bodies.grip.shape[1] == 0:  # no friction
+    if bodies.grip.shape[1] == 0:
         return 1
     none, mass = zero_vector(kin, 0.0), bodies.mass
     dv = vector_at(kin, bodies.v, j, 0, none) - vector_at(kin, bodies.v, i, 0, none)
@@ -315,7 +312,7 @@ def push_apart(push, bodies, cells):
                 _rub(push, bodies, i, contact)
             for a in range(max(cx - 1, 0), min(cx + 2, nx)):
                 for b in range(max(cy - 1, 0), min(cy + 2, ny)):
-                    # Cells along the last direction are adjacent in `order`.
+                    # cells along the last direction are adjacent in `order`
                     first = (a * ny + b) * nz + max(cz - 1, 0)
                     last = (a * ny + b) * nz + min(cz + 1, nz - 1)
                     begin = cells.start[first - 1] if first > 0 else 0

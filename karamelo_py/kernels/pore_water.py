@@ -1,4 +1,4 @@
-"""Rows of water in the pores, and what else a scene with it needs of kernels."""
+"""Rows of pore water, and how its quantities join those of the soil."""
 
 from typing import NamedTuple
 
@@ -19,12 +19,12 @@ from karamelo_py.points.laws.pore_water import with_pore_pressure
 
 
 class AtWater(NamedTuple):
-    """Fixes that accelerate nodes act on the water."""
+    pass
 
 
 @point_function(otherwise=True)
 def at_water(hooks, s):
-    """Apply fixes to the water of the nodes."""
+    pass
 
 
 @at_water.on(arrays.Hooks)
@@ -42,7 +42,8 @@ def _at_water(row, s, step):
 
 
 def _rim(s):
-    # Hats: every node. Splines: inside, B is what the places of points leave of 0.
+    # With hats every node is at the rim. Splines: inside, B is what the positions of points leave
+    # of 0.
     return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
 
 

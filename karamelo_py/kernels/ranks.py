@@ -1,7 +1,4 @@
-"""A scene on several processes: where kernels of one call the others.
-
-They call a Python function by address, which puts what it receives in the kernels' arrays.
-"""
+"""Scenes on several processes, whose kernels call Python by address to exchange arrays."""
 
 from typing import NamedTuple
 
@@ -20,8 +17,6 @@ _call = caller_of(CALL)
 
 
 class Linked(NamedTuple):
-    """This process has some of the tiles."""
-
     address: int  # of ``(request, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 if another process counts the terms of a node
 

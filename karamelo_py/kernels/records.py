@@ -11,11 +11,10 @@ from karamelo_py.compiler.lanes import REGISTER_BYTES, Beside, ask, at_lane, lan
 from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.points.basis.weighted import Weighted
 
-AHEAD = 16  # nodes whose records are prefetched ahead
+AHEAD = 16  # prefetch distance in nodes
 
 
 def put_at(array, i, first, values):
-    """array[i, first + k] = values[k]."""
     for k, value in enumerate(values):
         array[i, first + k] = value
 
@@ -27,7 +26,7 @@ def clear_first(array, i):
 
 @shared
 def row(array, i, first, like):
-    """(array[i, first], ..., array[i, first + len(like) - 1])."""
+    """Return (array[i, first], ..., array[i, first + len(like) - 1])."""
     if isinstance(i, Weighted):
         total = [a - a for a in like]
         for one, weight in zip(i.rows, i.weights, strict=True):
@@ -39,7 +38,7 @@ def row(array, i, first, like):
 
 @shared
 def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None:
-    """array[i, first + k] += values[k], lane after lane."""
+    """Add values[k] to array[i, first + k], lane after lane."""
     if isinstance(i, Weighted):
         for one, weight in zip(i.rows, i.weights, strict=True):
             accumulate(array, one, first, tuple([weight * value for value in values]))
@@ -49,11 +48,10 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
 
 
 def accumulate_affine(array, nodes, first, weights, field):
-    """Add an affine field times the weights to nodes: components from `first` on.
+    """Add an affine field times the weights to nodes, from component `first`.
 
-    `field`: the value at the first node, and slopes: the value grows by ``slopes[d]`` to the next
-    node in direction `d` (nodes form a square or cube, last direction fastest); without slopes it
-    is constant.
+    `field` is the value at the first node, and slopes: the value grows by ``slopes[d]`` to the next
+    node in direction `d` (nodes form a square or cube, last direction fastest), or is constant.
     """
     value, slopes = field
     width = _width(nodes, slopes)
@@ -90,7 +88,7 @@ _fma = llvm.of_library("llvm.fma")  # a b + c, rounded once
 
 
 def _transposed(builder: ir.IRBuilder, rows: list) -> list:
-    """Transpose four vectors of four or two numbers: lanes from records."""
+    """Transpose four vectors of four or two numbers, from records to lanes."""
     if rows[0].type.count == 2:
         ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
         cd = shuffle(builder, rows[2], rows[3], [0, 2, 1, 3])
@@ -129,7 +127,7 @@ def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> 
 
 
 def _gathered(builder: ir.IRBuilder, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
-    """``read(lane, column, count)`` loads components of one point."""
+    """Gather by ``read(lane, column, count)``, which loads components of one point."""
     components: list = []
     for begin, count in _chunks(len(like)):
         column = builder.add(first, I64(begin))
@@ -155,7 +153,7 @@ def _gather_row(array, nodes, first, like):
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, like):
-    """Weighted sums are made before records become lanes."""
+    """Sum by weight before records become lanes."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(like))
 
@@ -202,7 +200,7 @@ def _row(array, i, first, like):
 
 @intrinsic
 def _scatter(array, nodes, first, values):
-    """Add to node records lane by lane; summed first if all go to one node."""
+    """Add to node records lane by lane; sum first if all go to one node."""
     lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
@@ -280,7 +278,7 @@ def _accumulate_affine(array, nodes, first, weights, field):
 
 @intrinsic
 def _scatter_affine(*kinds):
-    """Scatter with records made once per point, not per node; weights from memory."""
+    """Scatter with records made once per point, not per node, and weights from memory."""
     array, nodes, _, weights, value, slopes = kinds
     lanes, width = weights[0], _width(nodes, slopes)
 
@@ -297,7 +295,7 @@ def _scatter_affine(*kinds):
             count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
-            # By the node's position in the first directions.
+            # by the node's position in the first directions
             at = {(): _records_of(builder, components[some], lanes, count)}
             grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 

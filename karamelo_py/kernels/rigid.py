@@ -1,7 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
-Rigid points scatter to separate sums (`RigidSums`): the nodal sums belong to other solids, whatever
-a rigid body's density. The force for its velocity acts on these.
+Rigid points scatter to separate sums (`RigidSums`), so nodal sums belong to other solids whatever a
+rigid body's density. The force for its velocity acts on these.
 """
 
 from typing import NamedTuple
@@ -23,12 +23,10 @@ from karamelo_py.points.laws.rigid import Rigid
 
 
 class RigidBodies(NamedTuple):
-    """Rigid solids among others on one grid."""
-
     node_fields = (RigidSums,)
 
-    force: np.ndarray  # (n,) slot of the force on the solid of each point, by id, or -1
-    torque: np.ndarray  # (n,) the same for the torque
+    force: np.ndarray  # (n,) slot of the force on each point's solid, by id, or -1
+    torque: np.ndarray  # (n,) slot of the torque
     slots: np.ndarray  # (r,) slots of forces and torques
 
 
@@ -38,10 +36,10 @@ def _at_nodes(s):
 
 @noinline
 def _impose(at, dt, control, n):
-    """Set the velocity of a node with rigid points; store the force for that in `rigid`.
+    """Set the velocity of a node with rigid points, and store the force for that in `rigid`.
 
-    Work as for a prescribed velocity. The change v* - v includes that force: else FLIP points never
-    acquire the body's velocity.
+    Work is as for a prescribed velocity. The change v* - v includes that force, or FLIP points
+    would never acquire the body's velocity.
     """
     kin, nodes, rigid = at
     d = kin.dimension
@@ -55,7 +53,7 @@ def _impose(at, dt, control, n):
         impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
-            # From the points' momentum: a fix may have held the node, leaving no change.
+            # From the points' momentum, because a fix may have held the node, leaving no change.
             change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity

@@ -11,16 +11,14 @@ from karamelo_py.points.kinematics import zero_vector
 
 
 class Rubbing(NamedTuple):
-    """Contact of n points with a tool."""
-
-    normal: np.ndarray  # (n, d) unit vectors
-    load: np.ndarray  # (n,) normal forces
+    normal: np.ndarray  # (n, d) unit
+    load: np.ndarray  # (n,)
     pull: np.ndarray  # (n, d) forces by which the step stretches the springs
     stop: np.ndarray  # (n, d) forces that stop the slip
 
 
 def rubbed(mu, load, hold, stop, at):
-    """Return the friction (d,) on a point; update its row `i` of the memory: ``at`` (grip, i)."""
+    """Return the friction (d,) on a point; ``at`` is its memory, (grip, row), which is updated."""
     (grip, i), d = at, len(hold)
     memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
     force, (hold, mean, unused) = rub(mu, load, memory, stop)

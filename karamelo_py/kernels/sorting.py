@@ -15,20 +15,18 @@ from karamelo_py.points.grid import Grid, cells_along, in_cells
 
 
 class TileGrid(NamedTuple):
-    size: np.ndarray  # (d,) cells of a tile
-    count: np.ndarray  # (g, d) number of tiles
-    first: np.ndarray  # (g + 1,) number of the first
+    size: np.ndarray  # (d,) cells
+    count: np.ndarray  # (g, d) tiles
+    first: np.ndarray  # (g + 1,) number of the first tile
 
 
 class Neighbourhood(NamedTuple):
-    """Nodes that a point may see before moving `reach` cells."""
-
-    top: np.ndarray  # (g, d) the last node of each grid
+    top: np.ndarray  # (g, d) last node of each grid
     per_cell: int
     beyond: int  # nodes seen beyond the cell
     least: int  # points at a wall see all nodes up to this one
     reach: float
-    offset: float  # of the first node seen, see points.basis.first_node
+    offset: float  # of the first node seen (`points.basis.first_node`)
 
 
 class SortKeys(NamedTuple):
@@ -46,7 +44,7 @@ class SortedOrder(NamedTuple):
     boxes: np.ndarray  # (2, T, d) first and last nodes that a tile's points may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
     order: np.ndarray  # (n,) previous numbers of points
-    tile: np.ndarray  # (n,) tiles
+    tile: np.ndarray  # (n,)
     room: np.ndarray  # (2, n) scratch
 
 
@@ -115,7 +113,7 @@ def _order_parts(sorting, k):
 
 @shared_out
 def _order_in_all_tiles(at, by, sorting, k):
-    """Sort a tile's points by first node, then id: cells filling groups of `width` first."""
+    """Sort a tile's points by first node, then id; cells filling groups of `width` come first."""
     (_, kin, grids, of, x), sorting = at_hand(at), at_hand(sorting)
     tiles, around, ids = at_hand(by)
     boxes, bins, cell, order = sorting.boxes, sorting.bins, sorting.room, sorting.order
@@ -142,7 +140,7 @@ def _order_in_all_tiles(at, by, sorting, k):
             cell[0, q] = number
             cell[1, q] = p
             bins[k, 0, number] += 1
-        # Cells of whole groups, then the rest; bins become begin and end.
+        # cells of whole groups, then the rest; bins become begin and end
         position = begin
         for rest in (False, True):
             for c in range(cells):
@@ -154,7 +152,7 @@ def _order_in_all_tiles(at, by, sorting, k):
             c, p = cell[0, q], cell[1, q]
             last = bins[k, 1, c]
             bins[k, 1, c] += 1
-            # Insertion sort: nearly all are in order.
+            # insertion sort, because nearly all are in order
             while last > bins[k, 0, c] and ids[order[last - 1]] > ids[p]:
                 order[last] = order[last - 1]
                 last -= 1
@@ -163,7 +161,6 @@ def _order_in_all_tiles(at, by, sorting, k):
 
 @by_threads
 def find_rows(at, around, tiling, parts, k):
-    """Fill `Tiling.rows` for a part of the tiles (3D)."""
     (_, _, grids, _, x), around, tiling = at_hand(at), at_hand(around), at_hand(tiling)
     rows, box = tiling.rows, tiling.box
     count = tiling.count[0]
@@ -206,7 +203,7 @@ def _put_all_rows(rows, room, parts, k):
 
 @noinline
 def _permute(mode, rows, order, room, parts):
-    """Permute rows by `order`, a few at a time: no copy of a whole field."""
+    """Permute rows by `order`, a few at a time to avoid copying a whole field."""
     first = 0
     while first < rows.shape[0]:
         last = min(first + room.shape[0], rows.shape[0])

@@ -1,6 +1,6 @@
-"""Gather from the nodes of a stencil and scatter to them: node by node, or all at once.
+"""Gather from the nodes of a stencil and scatter to them, node by node or all at once.
 
-At once: moments along the arms of a stencil, affine sums, corners of domains.
+Moments along the arms of a stencil, affine sums and corners of domains are done at once.
 """
 
 from karamelo_py.compiler import all_lanes, point_function, real
@@ -52,7 +52,7 @@ def give_affine(lanes, w, stencil, parts):
 
 
 def gathered_by_arms(w):
-    """(a,) if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls, else ()."""
+    """Return (a,) if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls, else ()."""
     return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
 
 
@@ -68,8 +68,8 @@ def _gathered_at_once_move(task, w, stencil, total):
     if not len(factor):
         return ()
     velocities = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
-    # sum N v (X - x)^T from sum N v and sum N v k, X being k nodes from the first: by rows, then
-    # planes, as weights are products.
+    # sum N v (X - x)^T follows from sum N v and sum N v k, X being k nodes from the first: by rows,
+    # then planes, as weights are products.
     sums = tuple([(v,) for v, _ in velocities])
     changes = tuple([dv for _, dv in velocities])
     for line in reversed(stencil.lines):
@@ -96,7 +96,7 @@ def _tails(weights, vectors):
 def _with_moment(weights, row):
     """Return sum_k w_k v_k and sum_k k w_k v_k of a row (Horner: the sum of suffix sums).
 
-    `row` (nodes, vectors): the moment is of the first vectors only.
+    `row` is (nodes, vectors); the moment is of the first vectors only.
     """
     first, *others = zip(*row[: len(weights)], strict=True)
     *tails, total = _tails(weights, first)
@@ -165,7 +165,6 @@ def _even(w, stencil, asked):
 
 @point_function(otherwise=True)
 def gather_nodes(stencil: tuple, lanes: Tag, tasks: tuple, w: Work, totals: tuple) -> tuple:
-    """Add the contributions of all stencil nodes to the tasks' totals."""
     return _gather(tasks, w, stencil, totals)
 
 
@@ -175,7 +174,7 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
         return _gather(tasks, w, stencil, totals)
     if isinstance(lanes, OneByOne):
         return _gather_parts(tasks, w, stencil, totals)
-    # Sorted points mostly see the same nodes: one load for all lanes.
+    # Sorted points mostly see the same nodes, with one load for all lanes.
     if product.sees_same_nodes(stencil):
         return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)
@@ -218,7 +217,6 @@ def _gather_parts(tasks, w, stencil, totals):
 
 @point_function(otherwise=True)
 def scatter_nodes(stencil: tuple, lanes: Tag, quantities: tuple, w: Work, loads: tuple) -> None:
-    """Scatter the loads to all stencil nodes."""
     _scatter(quantities, w, stencil, loads)
 
 

@@ -1,7 +1,6 @@
 """The rows of a step, compiled or interpreted, and the loop over steps.
 
-Many steps run in one compiled call. With hooks written in Python, the same source runs interpreted
-and calls them between rows.
+Many steps run in one compiled call. With hooks written in Python the same source runs interpreted.
 """
 
 import functools
@@ -44,14 +43,14 @@ def first_rows(scheme: Any, visits: Any) -> list[Any]:
 
 
 def untaken(rows: Iterable[Any], backend: type) -> list[str]:
-    # Rows become others before they are taken.
+    # rows become others before they are taken
     combined = table.Gather, table.Scatter, table.SceneTask, table.Repeated
     kinds = dict.fromkeys(type(row) for row in rows if not isinstance(row, combined))
     return [kind.__name__ for kind in kinds if not take.defined(kind, backend)]
 
 
 class InStep(NamedTuple):
-    mode: Tag  # one thread, or several
+    mode: Tag  # one thread or several
     hooks: Tag  # of the fixes
     more: bool  # another step follows: leave its sums on the nodes (fused)
 
@@ -59,7 +58,7 @@ class InStep(NamedTuple):
 class StepKind(NamedTuple):
     scheme: Tag
     visits: Tag  # `Fused` or `Staged`
-    mode: Tag  # one thread, or several
+    mode: Tag  # one thread or several
 
 
 @take.on(table.AtPoints, Processor)
@@ -146,7 +145,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# A step: if `more`, a fused one leaves the next sums; and the rows before the first.
+# a step (with `more`, a fused one leaves the next sums), and the rows before the first
 step, begin = _taking(rows_of), _taking(first_rows)
 
 
@@ -158,7 +157,7 @@ _alone: Any = functools.cache(table.one_by_one)
 
 
 DONE, STOPPED, ABOVE_LIMIT, SORT, SHRUNK, GAINED, HEATED = range(7)
-MOST_ABOVE_LIMIT = 50  # steps above the stable limit that stop a run
+MOST_ABOVE_LIMIT = 50  # consecutive steps above the stable limit that stop a run
 SMALLEST = 1e-6  # fraction of the first stable step below which a run stops
 
 
@@ -199,7 +198,7 @@ _by_team = by_team(lambda mode, kind, s, hooks, count: run_steps(kind, s, hooks,
 
 @kernel
 def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
-    """Call `run_steps`, with a team of threads if there is one."""
+    """Run `run_steps`, with a team of threads if there is one."""
     return _by_team(kind.mode, kind, s, hooks, count)
 
 

@@ -16,7 +16,7 @@ def adds(quantity: NamedTuple) -> bool:
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List column ranges of the quantities, adjacent ones joined."""
+    """List column ranges of the quantities, with adjacent ones joined."""
     ends: dict[tuple[Any, int], int] = {}  # first column of each array that ends there
     for one in [one for quantity in quantities for one in type(quantity).gives]:
         array, first = one.into.array, one.into.first(kin)
@@ -25,7 +25,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
-    """List the columns of the quantities in arrays that are present; adding ones last."""
+    """List the quantities' columns in arrays that are present, adding ones last."""
     turns = sorted(quantities, key=adds)
     sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
     return [

@@ -1,10 +1,10 @@
 """Faces in trees of boxes: distance to the nearest, and whether they enclose a position.
 
-Faces are simplices (points in 1D, segments in 2D, triangles in 3D), leaves of a binary tree of
-boxes. Node k has the children 2k and 2k + 1: a walk needs no stack. A position is enclosed if the
-faces wind around it: each face crossed by a ray along the last axis counts 1 or -1, by its side.
-Faces find the crossings of a common edge bit for bit: no position is counted twice or omitted.
-(Winding number: Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
+Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes. Node k
+has the children 2k and 2k + 1, so a walk needs no stack. A position is enclosed if the faces wind
+around it: each face crossed by a ray along the last axis counts 1 or -1, by its side. Faces find
+the crossings of a common edge bit for bit, so none is counted twice or omitted. (Winding number:
+Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ TINY = float(np.finfo(float).tiny)
 class Surface(NamedTuple):
     """Faces in a tree of boxes, nodes numbered from 1."""
 
-    low: np.ndarray  # (2 l, d) corners of the boxes; the last l nodes are leaves
+    low: np.ndarray  # (2 l, d) corners of boxes; the last l nodes are leaves
     high: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, direction
     odd: bool  # enclosed by an odd number of crossings: faces have no sides
@@ -34,7 +34,7 @@ class Surface(NamedTuple):
 class Convex(NamedTuple):
     """The region below planes and in a ball or (infinite) cylinder."""
 
-    planes: np.ndarray  # (k, d + 1): inward normals, and their products with a place
+    planes: np.ndarray  # (k, d + 1): inward normals, and their products with a point
     across: np.ndarray  # (d,) 1 along axes across which it is round, else 0
     centre: np.ndarray  # (d,)
     radius: float
@@ -142,11 +142,11 @@ def _nearer(kin, surface, k, x, best):
 
 @noinline
 def distance(surface, kin, x, reach):
-    """Return the distance to the nearest face, `reach` at most."""
+    """Return the distance to the nearest face, at most `reach`."""
     leaves = surface.low.shape[0] // 2
     best = reach * reach
     k = 1
-    while k < leaves:  # descend to a near face first: the walk then enters few boxes
+    while k < leaves:  # descend to a near face first, so that the walk enters few boxes
         left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
         if min(left, right) >= best:
             break
@@ -201,7 +201,7 @@ def _place_on_triangle(kin, surface, i, x):
 
 @noinline
 def nearest(kin, surface, x, reach):
-    """Return the place on the nearest face, which must be nearer than `reach`."""
+    """Return the closest point on the nearest face, which must be nearer than `reach`."""
     leaves = surface.low.shape[0] // 2
     best, face = reach * reach, 0
     k = 1
@@ -258,7 +258,7 @@ def _crossing_triangle(kin, surface, i, x):
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # Edge-on, any height between its ends: the position is next to it.
+    # edge-on: any height between its ends will do
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
@@ -289,24 +289,18 @@ def encloses(kin, surface, x):
 
 class HalfSpace(NamedTuple):
     normal: np.ndarray  # (d,) inward
-    offset: float  # its product with a place on the plane
+    offset: float  # its product with a point on the plane
 
 
 class Joined(NamedTuple):
-    """Union of shapes."""
-
     parts: tuple
 
 
 class Common(NamedTuple):
-    """Intersection of shapes."""
-
     parts: tuple
 
 
 class Outside(NamedTuple):
-    """Complement of a shape."""
-
     part: NamedTuple
 
 
@@ -405,6 +399,5 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Of a surface, positions (n, d) and a reach: depths (n,), < 0 outside, and distances from the
-# nearest face, both at most the reach.
+# Positions (n, d) and a reach give depths (n,), < 0 outside, and distances, both at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)

@@ -1,8 +1,8 @@
 """Sweeps over the points, tile by tile, and over the nodes in use.
 
-The points of a tile scatter to a separate buffer: a dense box of the nodes they may reach. Then
-each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics; sums have
-one order, whatever the number of threads.
+The points of a tile scatter to a separate buffer, a dense box of the nodes they may reach. Then
+each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics, so the order
+of sums does not depend on their number.
 """
 
 from math import inf
@@ -42,7 +42,7 @@ from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
-ROUNDING = 1e-3  # rounding of distances, in cells
+ROUNDING = 1e-3  # of distances, in cells
 STRETCH = 64  # points whose totals and arrays fit in the nearest cache
 
 
@@ -84,11 +84,11 @@ class Context(NamedTuple):
 
 
 class OldWeights(NamedTuple):
-    """Weights at the place before the move, as in the gather."""
+    pass
 
 
 class PresentWeights(NamedTuple):
-    """Weights after the move."""
+    pass
 
 
 def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
@@ -110,7 +110,6 @@ def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
 
 
 def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
-    """`now` and `then` are indices of `Points.x`."""
     weighed: Any = points.x[now] if frame.moves else points.home
     return Places(weighed, points.x[now], points.x[then])
 
@@ -129,8 +128,6 @@ def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
 
 
 class TileVisit(NamedTuple):
-    """A visit of a tile's points, `begin` to before `end`."""
-
     visit: Visit
     s: Context
     lanes: Tag
@@ -142,7 +139,7 @@ class TileVisit(NamedTuple):
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of the t-th tile of a block; after a failed point, nothing is scattered."""
+    """Visit the points of the t-th tile of a block; after a failed point, scatter nothing."""
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
@@ -172,12 +169,11 @@ def _without_gather(tile, p, moved):
 
 
 def is_good(stride, moved, rate):
-    """Return False if a point failed; NaN counts as failed."""
+    """Return False if a point failed, also for NaN."""
     return (moved <= stride) & (rate < 1e300)
 
 
 def _visit_at_once(tile):
-    """Gather, update and scatter points one by one, or a few in lanes."""
     visit, s, lanes, w, out, begin, end = tile
     dt = s.dt
     furthest = fastest = zero_of(lanes, dt)
@@ -261,7 +257,7 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
 
 def context_of(s: Setup, extent: Extent) -> Context:
     step, motion, (dt, gathers, scatters, moves) = s.control.step[0], s.control.motion[0], extent
-    # A little more: points are sorted whenever one did not fit (see run.tiles).
+    # A little more, because points are sorted whenever one did not fit (run.tiles).
     room = motion.drift_limit - motion.drift - motion.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, step.kept), s.averaging, s.grids, s.nodes,
@@ -297,7 +293,7 @@ def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context
 
 def sweep(s: Setup, mode: Tag, visit: Visit, extent: Extent) -> None:
     """Visit all points and sum at the nodes; tiles have the reports (`clock.read_reports`)."""
-    # Without buffers, nodes start from zero.
+    # without buffers, nodes start from zero
     direct, scatters = s.buffers.count[1], extent.scatters
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_given(mode, anew, s, scatters & (direct == 1))

@@ -1,9 +1,9 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
-A scheme's class attribute ``rows`` lists its stages once. From it follow the staged step, in which
-fixes act on points between stages; the fused step with the fewest visits of the points, whose first
-scatter joins the last visit of the previous step; the words of `karamelo-py check`; and the memory
-traffic of `karamelo-py bench`. F-bar, XPIC, heat and contact are rows that a scene adds (`plain`).
+A scheme's class attribute ``rows`` lists its stages once. Derived from it are the staged step, in
+which fixes act on points between stages; the fused step with the fewest visits of the points, whose
+first scatter joins the last visit of the previous step; the words of `karamelo-py check`; and the
+memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -26,7 +26,7 @@ from karamelo_py.points.transfers import stores_moment
 
 
 class Processor(NamedTuple):
-    """Back end: loops on the threads of a processor."""
+    pass
 
 
 @point_function(tags=2)
@@ -46,7 +46,7 @@ class AtPoints(NamedTuple):
 
 
 class AtNodes(NamedTuple):
-    """Fixes act on nodes; `target`: `arrays.ON_SUMS`, `ON_UPDATE` or `ON_VELOCITY`."""
+    """Fixes act on nodes; `target` is `arrays.ON_SUMS`, `ON_UPDATE` or `ON_VELOCITY`."""
 
     stage: int
     target: int
@@ -61,14 +61,12 @@ class Gather(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """Points to grid, with weights before or after the move."""
-
     quantities: tuple
     weights: NamedTuple = PresentWeights()
 
 
 class NodeTask(NamedTuple):
-    """A task at every node in use: a tag, or a function of the setup returning one."""
+    """A task at every node in use: a tag, or a function of the setup that returns one."""
 
     task: Any
     at: Any = None  # function of the setup: one with other nodes
@@ -110,8 +108,6 @@ class Repeated(NamedTuple):
 
 
 class SceneTask(NamedTuple):
-    """Rows of some scenes: ``rows(s)``."""
-
     rows: Any
     says: str | None = None
 
@@ -121,8 +117,6 @@ class Check(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """A compiled visit of the points."""
-
     visit: Visit
     share: float = 1.0
     of_last_step: bool = False
@@ -131,7 +125,7 @@ class Sweep(NamedTuple):
     moves: bool = True  # new positions go to the other array
     only_if_more: bool = False  # the scatter belongs to the next step
     at: Any = None  # function of the setup: one with other nodes
-    reported: Any = take_reports  # accepts the points' reports; None: nothing does
+    reported: Any = take_reports  # accepts the points' reports, unless None
 
 
 def each_node(function: Any) -> EachNode:
@@ -164,13 +158,11 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: Any) -> Any:
-    """Return the classes of tags: tags without numbers are all equal tuples."""
+    """Return the classes of tags, because tags without numbers are all equal tuples."""
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
 class _FusedStep:
-    """The rows of a step with the fewest visits of the points."""
-
     def __init__(self, rows: Iterable[Any]):
         self.rows: list[Any] = []
         self.visits: list[Visit] = []
@@ -267,16 +259,16 @@ def says(row: Any, setup: Any) -> str | None:
 
 
 class NoCompany(NamedTuple):
-    """Company of a task or quantity: none."""
+    """No company of a task or quantity."""
 
     before = ()  # rows before it
-    first = ()  # tasks or quantities in the same visit, before it
+    first = ()  # tasks or quantities before it in the same visit
     then = ()  # and after it
 
 
 @point_function(otherwise=True)
 def company_of(tag: Any, s: Setup) -> Any:
-    """Return what accompanies a task or quantity in this scene: a tag like `NoCompany`."""
+    """Return what accompanies a task or quantity in this scene, a tag like `NoCompany`."""
     return NoCompany()
 
 
@@ -319,14 +311,11 @@ def _in_company(row, s):
 
 
 def plain(rows: Iterable[Any], s: Setup) -> Iterator[Any]:
-    """Yield a scene's rows with those it adds."""
     for row in rows:
         yield from in_scene.find((type(row),))(row, s)
 
 
 class Insulated(NamedTuple):
-    """No heat flow."""
-
     rows = ()
 
 
@@ -365,7 +354,7 @@ def _hold_node(s, n):
 
 def hold_axis(s: Setup) -> tuple:
     """Hold the nodes on an axis of symmetry: v_r = 0, where N / r is unbounded."""
-    # Contact normals there are along the axis.
+    # contact normals there are along the axis
     return (EachNode(_hold_node, _hold_axis),) if s.kin.hoops else ()
 
 
@@ -373,7 +362,7 @@ def sum_series(s: Setup) -> tuple:
     """Replace the velocity change by XPIC's new velocity."""
     if not s.transfer.traits.series:
         return ()
-    # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, the sum from 0 to m - 1
+    # (I - (I - S S+)^m) v_p = S sum_k (I - S+ S)^k S+ v, k from 0 to m - 1
     terms = Repeated(lambda s: s.transfer.order - 1, _next_term)
     return NodeTask(xpic.StartSeries()), terms, *hold_axis(s)
 
@@ -407,8 +396,8 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
 def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
-    At most 1: below m / m_p, the node's strain would run ahead of its stress. No limit in the total
-    frame with moments, which return all of the node's velocity: any limit makes it grow.
+    It is at most 1: below m / m_p, the node's strain would run ahead of its stress. Moments in the
+    total frame return all of the node's velocity, which any limit would make grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
@@ -422,7 +411,7 @@ light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[at
 
 
 def seams(task: type) -> Any:
-    """Rows that join the images of nodes in periodic directions."""
+    """Return rows that join the images of nodes in periodic directions."""
 
     def rows(s):
         ranks = s.control.ranks
@@ -450,7 +439,7 @@ CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
 )
 WORK_OF_LOADS = WorkOfLoads()
-# The deforming velocity must satisfy contact too, unless it is v*.
+# the deforming velocity must satisfy contact too, unless it is v*
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
@@ -460,7 +449,7 @@ BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
 MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
-# Schemes that strain first: nodal velocity before the forces act.
+# schemes that strain first: nodal velocity before the forces act
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
     AXIS,
@@ -469,7 +458,7 @@ VELOCITY_BEFORE = (
     CONTACT_BEFORE,
 )
 FORCE = Scatter((InternalForce(),), OldWeights())
-# v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow.
+# v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow
 UPDATE = (
     SceneTask(sort_in_time),
     SEAM,
@@ -490,7 +479,7 @@ MOVE = (
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
-# The moved points' velocity, mapped to the nodes again.
+# the moved points' velocity, mapped to the nodes again
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
     SEAM_AGAIN,

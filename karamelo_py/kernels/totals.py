@@ -19,16 +19,16 @@ LOST = LIMBS - 1  # counts terms that are NaN or infinite
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
 MANY = 1 << 10  # terms whose integers can be summed without overflow
-COARSE, FINE = 1e-200, 1e200  # range of the largest term where terms are summed as integers
+COARSE, FINE = 1e-200, 1e200  # range of the largest term for which terms are summed as integers
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign, ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of the totals, in slots of published values (time, timestep, dt) that are not sums.
+# rows of the totals, in slots of published values (time, timestep, dt) that are not sums
 KINETIC, STORED, WORK = 0, 1, 2
 
 
 class Alone(NamedTuple):
-    """One process has all of the scene."""
+    pass
 
 
 def _grow(totals, row, limb, number):
@@ -65,8 +65,8 @@ def add_to(totals, row, x):
 def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
-    As integers of two sizes, except terms 2^30 times smaller than the largest. A number added to
-    1.5 2^52 has its integer part in its last bits: a loop that sums bits vectorises.
+    They are summed as integers of two sizes, except terms 2^30 times smaller than the largest. A
+    number plus 1.5 2^52 has its integer part in its last bits, so the loop vectorises.
     """
     if many_threads():  # a term or two each
         for q in range(count):
@@ -107,7 +107,6 @@ def add_many(totals, row, terms, count):
 
 @noinline
 def hand_over(private, totals, row):
-    """Move a row of a thread's totals to the common totals."""
     for k in range(LIMBS):
         if private[row, k] != 0:
             add_among(totals, row, k, private[row, k])
@@ -131,7 +130,7 @@ def rounded(total):
     carry(total)
     sign = 1.0
     if total[LOST - 1] < 0:
-        # Digits of one sign sum without cancellation.
+        # digits of one sign sum without cancellation
         sign = -1.0
         for k in range(LOST):
             total[k] = -total[k]
@@ -182,12 +181,12 @@ def number_of_all(ranks, control, number):
 
 @point_function(otherwise=True)
 def agree_on_reports(ranks, control):
-    """Agree on the largest move and rate, and any failed point."""
+    pass
 
 
 @point_function(otherwise=True)
 def agree_on_heat(ranks, control):
-    """Agree on the extreme temperatures."""
+    pass
 
 
 @point_function(otherwise=True)

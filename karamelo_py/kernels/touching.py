@@ -19,8 +19,8 @@ from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
 SOFT = 0.1  # fraction of the penetration removed in a step
-ASIDE = 0.05  # of the reach: step of depth differences
-LEVEL = 1e-3  # of that: below this change of depth, no direction
+ASIDE = 0.05  # step of depth differences, over the reach
+LEVEL = 1e-3  # change of depth over that step, below which there is no direction
 CALL = types.int64(types.int64)
 
 _call = caller_of(CALL)
@@ -48,7 +48,7 @@ def direction_of(falls, step):
 
 @point_function()
 def grip_of(tag, members):
-    """Return the array of friction memory, or None."""
+    pass
 
 
 @grip_of.on(Touch)
@@ -66,7 +66,7 @@ def force_of(tag, members, volume, one):
     ball = radius(kin, float(volume), position)
     x = position - way
     grip = grip_of(tag, members)
-    # Most points are far: a short reach is cheap.
+    # most points are far, and a short reach is cheap
     within = depth(tag.shape, kin, x, 1.001 * ball)
     if within <= -ball:
         if grip is not None and grip[d, p] != 0:
@@ -84,7 +84,7 @@ def force_of(tag, members, volume, one):
     slip = velocity - none._make([float(v) for v in load_vector(kin, members.points.v, p)])
     contact_dt, contact_kick, kick = values[2 * d :]
     stiffness = float(members.points.mass[p]) / (contact_dt * contact_kick)
-    # Removing all penetration within a step would throw bodies back.
+    # removing all penetration within a step would throw bodies back
     push = SOFT * (within + ball) + contact_dt * dot(slip, normal)
     load = stiffness * max(push, 0.0)
     if grip is None:
@@ -92,7 +92,7 @@ def force_of(tag, members, volume, one):
     hold = none._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = none
-    if mean > 0:  # from positions: velocities are noisy
+    if mean > 0:  # from positions, because velocities are noisy
         slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + SOFT * stiffness * slid, normal)

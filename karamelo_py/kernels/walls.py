@@ -1,6 +1,6 @@
 """Coulomb friction at walls: nodes that a fix holds across a wall rub along it.
 
-The normal force is that for the prescribed velocity; the tangential force is at most mu times as
+The normal force is the one for the prescribed velocity; the tangential force is at most mu times as
 large, and at most what stops the motion. The wall does not move along itself.
 """
 
@@ -55,7 +55,7 @@ def rub(members, call, n, mu):
             hooks.loads[n, c] -= mass * taken / dt
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
-    # A wall takes no heat.
+    # a wall takes no heat
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 

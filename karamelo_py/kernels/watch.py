@@ -2,9 +2,9 @@
 
 Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
 the middles of steps, stresses to their ends: two consecutive steps give energies at one time, to
-second order. Growth is relative to the energy without drift (of the centres of mass), which cannot
+second order. Growth is relative to the energy without drift (of the centres of mass), which could
 hide vibrations. The same looks measure how many cells stressed material moves through
-(`note_crossing`): a linear basis in the updated frame loses stress by that.
+(`note_crossing`), by which a linear basis in the updated frame loses stress.
 """
 
 from math import exp, inf, sqrt
@@ -40,7 +40,7 @@ BOUND = 10.0  # times initial energy and work of loads: more stops the run
 ROUND_OFF = 1e-14  # of m c^2: energies below are noise
 COARSE = 1000.0  # round-off errors: a strain of this size is noise
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
-HEAT_NOISE = 1e-4  # of a temperature: tolerated if all are equal
+HEAT_NOISE = 1e-4  # of a temperature, tolerated if all are equal
 OVERSHOOT = 0.1  # of the range of temperatures from the sources: more stops the run
 # Tolerated multiple of the stable step of conduction: point temperatures in the null space decay
 # (measured with 2 points per cell: 4 and 5.8 with and without convection).
@@ -102,7 +102,7 @@ def _take_work(work, control):
 
 
 def sum_energies(s, mode):
-    """Sum kinetic, stored plus dissipated energy, and work, in the clock; not of rigid bodies."""
+    """Sum kinetic, stored plus dissipated energy, and work in the clock, without rigid bodies."""
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
@@ -199,7 +199,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((energy.kinetic - energy.of_drift) / now, 0.0), 1.0) * lasting / energy.to_and_fro
     )
-    # The loss by a linear basis does not count as leaving.
+    # the loss by a linear basis does not count as leaving
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -222,12 +222,12 @@ def growth(first, later, unit):
 
 
 def keeps(first, later, unit, within=WITHIN):
-    """Return True if growth is within a fraction of the unit; False for NaN."""
+    """Return True if growth is within a fraction of the unit, False for NaN."""
     return later - first <= within * unit
 
 
 def unit_of(energy):
-    """Return the unit of energy growth: the largest energy, with a limited part of drift."""
+    """Return the largest energy, with a limited part of drift."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 
@@ -255,7 +255,7 @@ def judge(control):
         energy.supplied,
         energy.of_bodies,
     )
-    # Rigid bodies exchange energy with what they touch: a small part of theirs may be all of its.
+    # Rigid bodies exchange energy with what they touch, to which a small part of theirs may be all.
     vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
@@ -267,15 +267,15 @@ def judge(control):
         if loss > energy.lost:
             energy.lost = loss
             energy.crossed = way
-    # Means: a single look also shows the shortest waves.
+    # means, because a single look also shows the shortest waves
     unit = unit_of(energy)
     if energy.looks == FEW:
         energy.first_few = energy.first_mean = energy.largest_mean = (
             balance + energy.last_balance + energy.last_but_one
         ) / FEW
     if energy.looks >= 2 * FEW:
-        # The minimum of a few: a look or two may be wrong in collisions. Stored: the result does
-        # not depend on the last look.
+        # Minimum of a few, because a look or two may be wrong in collisions; stored, so that the
+        # result does not depend on the last look.
         least = min(balance, energy.last_balance, energy.last_but_one)
         energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
     energy.sum_of_balance += balance
@@ -289,7 +289,7 @@ def judge(control):
         energy.grown = max(energy.grown, growth(energy.first_mean, mean, unit))
         energy.largest_mean = max(energy.largest_mean, mean)
     reference = abs(energy.first_balance) + energy.supplied
-    # In this form, NaN is noticed.
+    # this form notices NaN
     return balance - energy.first_balance <= max(BOUND * reference, energy.energy_floor)
 
 
@@ -301,7 +301,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # In this form, NaN is noticed.
+            # this form notices NaN
             heat.T_low = T if not heat.T_low <= T else heat.T_low
             heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)
@@ -329,7 +329,9 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store energies if a look is due; `level`: fraction of the later stored energy in balances."""
+    """Store energies if a look is due; `level` is the fraction of the later stored energy in
+    balances.
+    """
     energy = s.control.energy[0]
     energy.level = level
     if anew:
@@ -359,7 +361,7 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Check the energy after an implicit step: velocities and stresses are of one time."""
+    """Check the energy after an implicit step, with velocities and stresses of one time."""
     if s.control.energy[0].watch_energy == 0:
         return True
     _sum_before(s, mode, int(s.control.values[TIMESTEP]))

@@ -48,7 +48,7 @@ class Sum(NamedTuple):
 
 
 def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
-    """Columns of a field, or its first `count(kin)`."""
+    """Return the columns of a field, or of its first `count(kin)`."""
     count = count or kind.shape
     return NodeColumns(kind, _zero, count, count)
 
@@ -69,7 +69,6 @@ VELOCITY = NodeColumns("velocity", _zero, vector, lambda kin: arrays.VELOCITY_WI
 
 
 def of_point(**functions: Callable) -> MappingProxyType:
-    """The functions of a point in `NodalQuantity.takes`, by name."""
     return MappingProxyType(functions)
 
 
@@ -112,12 +111,12 @@ class Report(NamedTuple):
 
 @point_function()
 def empty(task: Tag, w: Work, x: tuple) -> tuple:
-    """Totals at the start of a gather: zeros."""
+    """Return the totals at the start of a gather."""
 
 
 @point_function()
 def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
-    """`total` plus a node's contribution."""
+    """Return `total` plus a node's contribution."""
 
 
 @point_function()
@@ -132,12 +131,12 @@ def load_of(quantity: Tag, pt: PointView) -> tuple:
 
 @point_function()
 def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
-    """Add a load's contribution to a node."""
+    pass
 
 
 @point_function()
 def affine_part(quantity, w, stencil, load):
-    """(array, first component, value at the first node, increments per node), or ()."""
+    """Return (array, first component, value at the first node, increments per node), or ()."""
 
 
 def _register(kind: Any) -> None:
@@ -174,12 +173,12 @@ def _register(kind: Any) -> None:
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:
-    """An array of nodes by name or field class, or None."""
+    """Return an array of nodes by name or field class, or None."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
 
 def _at_first(w, stencil, value, slopes):
-    """Value at the first node, and increments per node, of an affine field at a point."""
+    """Return an affine field's value at the first node, and its increments per node."""
     value = value if isinstance(value, tuple) else (value,)
     if not len(slopes):
         return value, ()
@@ -211,13 +210,13 @@ def reads(*names: str) -> Callable:
 
 
 def is_apart(w):
-    """True for rigid points with separate sums."""
+    """Return True for rigid points with separate sums."""
     return laws.is_rigid(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @reads("mass")
 def mass(pt):
-    """Mass given to the common sums: 0 for rigid points with separate sums."""
+    """Return the mass given to the common sums: 0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 
@@ -229,7 +228,7 @@ def v(pt):
 
 @reads("moment")
 def moment(pt):
-    """Tensor stored with the velocity, or ()."""
+    """Return the tensor stored with the velocity, or ()."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
 
 
@@ -243,7 +242,6 @@ def gathered_all(tasks, w, stencil, k, totals):
 
 
 def updated_all(tasks, pt, totals, fastest):
-    """Update by all tasks in order; return the sum of moves, and the rate."""
     moved = real(0, fastest)
     for task, total in zip(tasks, totals, strict=True):
         further, fastest = updated(task, pt, total, totals, fastest)

@@ -70,7 +70,7 @@ class FBarOfSoil(FBar):
 
 @eq.reads("mass", "state", "material", "volume ratio")
 def volumes(pt):
-    """Volume after and before the trial increment."""
+    """Return the volume after and before the trial increment."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     return volume * pt.of(VolumeRatio)[0, pt.p], volume
@@ -83,7 +83,7 @@ class Volumes(eq.NodalQuantity):
 
 
 def mean_stress(pt):
-    """Volume times mean Kirchhoff stress, and present volume."""
+    """Return volume times mean Kirchhoff stress, and present volume."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
@@ -92,7 +92,7 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
-    """-V (averaged - the point's mean stress), a tensor."""
+    """Return -V (averaged - the point's mean stress), a tensor."""
     _, _, f = pt.law_state_F
     V_tau, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - V_tau
@@ -100,8 +100,6 @@ def minus_V_stress_beside(pt):
 
 
 class AveragedForce(eq.NodalQuantity):
-    """Adds the force of averaged minus the point's mean stress."""
-
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     adds = True
@@ -131,7 +129,6 @@ class SetMeanStress(eq.Task):
 
 
 def no_ratio(w, like):
-    """Initial total of the averaged volume ratio; () without averaging."""
     return (real(0, like),) if isinstance(w.averaging, FBar) else ()
 
 
@@ -153,8 +150,6 @@ def averaged(pt, dl, ratio):
 
 @node_task
 class TakeMean(NamedTuple):
-    """Divides a weighted sum by its weights."""
-
     goes_through = ("nodal mean", "nodal mean")
 
     def at_node(task, kin, nodes, n, dt):

@@ -56,13 +56,13 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as in `Heate
 
 
 def at_least_round_off(weight):
-    """`weight`, but not 0: nodes with only a gradient need a temperature."""
+    """Return `weight`, but not 0: nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 
 @eq.reads("mass", "state", "material")
 def content(pt):
-    """Heat capacity, conductivity times volume, and temperature, which are stored too."""
+    """Return and store heat capacity, conductivity times volume, and temperature."""
     (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
@@ -84,7 +84,6 @@ def heat_gradient(pt):
 
 
 def temperature_at(pt, node):
-    """Temperature of a point, extrapolated to a node."""
     _, _, T = pt.content
     for axis in range(len(pt.gradient)):
         T = fma(pt.gradient[axis], node.arm[axis], T)
@@ -113,7 +112,7 @@ class HeatContent(eq.NodalQuantity):
 
 @eq.reads("state", "material", "deformation gradient", "heat gradient", "conductance")
 def flow(pt):
-    """Heat flow times volume, (d,)."""
+    """Return heat flow times volume, (d,)."""
     _, _, f = pt.law_state_F
     against = pulled_back(pt.w.frame, pt.kin, heat_gradient(pt), f)
     return -of_present(pt.p, pt.of(Conductance)[0, pt.p]) * against
@@ -157,8 +156,6 @@ class TemperatureGradient(eq.Task):
 
 
 class Warming(eq.Task):
-    """Gathers the change of nodal temperature, and updates the point's."""
-
     not_at_corners = ("anything",)
     says = "temperature"
     reads = (

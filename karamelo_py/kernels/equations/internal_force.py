@@ -26,7 +26,7 @@ class WorkOfForces(Field):
 
 @eq.reads("mass", "state", "material", "deformation gradient")
 def minus_V_stress(pt):
-    """-V times the stress conjugate to the frame's gradients, a tensor."""
+    """Return -V times the stress conjugate to the frame's gradients, a tensor."""
     law, state, f = pt.law_state_F
     volume = eq.mass(pt) * laws.specific_volume(law)
     return -volume * force_stress(pt.w.frame, pt.kin, laws.kirchhoff_stress(law, pt.kin, state), f)
@@ -34,7 +34,7 @@ def minus_V_stress(pt):
 
 @eq.reads("force")
 def force_of_fixes(pt):
-    """Force (d,) of fixes, or ()."""
+    """Return the force (d,) of fixes, or ()."""
     force = pt.load(Force, pt.v)
     if not len(force):
         return ()
@@ -44,7 +44,7 @@ def force_of_fixes(pt):
 
 @eq.reads()
 def V_mean_stress(pt):
-    """V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
+    """Return V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
     return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
 
 
@@ -54,7 +54,7 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Force at the point and its slope, where gradients are moments of weights (MLS)."""
+    """Return the force at the point and its slope, where gradients are moments of weights (MLS)."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

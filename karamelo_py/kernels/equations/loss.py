@@ -50,8 +50,6 @@ class FrictionalHeat(StepField):
 
 @node_task
 class KeepLoss(NamedTuple):
-    """Energy loss of a node: kinetic energy brought minus nodal kinetic energy."""
-
     goes_through = ("sums", "energy loss", "energy loss")
 
     def at_node(task, kin, nodes, n, dt):
@@ -83,7 +81,6 @@ def warm_node(rubbed, n, heat):
 
 
 def warm_by_friction(pt):
-    """Give a point the frictional heat of its nodes, by weight."""
     rubbed = field(pt.w.nodes.fields, FrictionalHeat)
     if rubbed is not None:
         (law, state), like = pt.law_and_state, pt.v[0]
@@ -98,7 +95,6 @@ def warm_by_friction(pt):
 
 
 def energy_of(mass, momentum):
-    """|momentum|^2 / (2 mass), or 0 without mass."""
     least = real(1e-36, mass)
     return where(mass > least, 0.5 * momentum.squared() / max(mass, least), mass - mass)
 
@@ -119,7 +115,7 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Part of `moment` that a point of a gas retains: none if it is alone.
+    """Return the part of `moment` that a point of a gas retains: none if it is alone.
 
     Nodes seen by no other point return its moment: driven by its pressure, its volume would grow
     without bound. The energy of the rest heats it.
@@ -175,7 +171,7 @@ def _before(node, like):
 
 
 def _gone(pt, v, moment):
-    """Kinetic energy per mass that a point lost to the nodes and back."""
+    """Return the kinetic energy per mass that a point lost to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

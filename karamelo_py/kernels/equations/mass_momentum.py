@@ -24,23 +24,21 @@ class Centre(SummedField):
 
 @eq.reads()
 def rigid_mass(pt):
-    """Mass of a rigid point with separate sums, or ()."""
     return (of_present(pt.p, pt.w.points.mass[pt.p]),) if eq.is_apart(pt.w) else ()
 
 
 @eq.reads()
 def place(pt):
-    """Position (d,) after the move if centres are needed, else ()."""
+    """Return the position (d,) after the move if centres are needed, else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
 
 def momentum(pt, node):
-    """Momentum given to a node; APIC and its kin vary it around the point."""
     return nodal_momentum(node.transfer, pt, node)
 
 
 def affine_momentum(pt, w):
-    """Momentum at the point, and its gradient, if affine, else ()."""
+    """Return the momentum at the point and its gradient if affine, else ()."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
@@ -70,7 +68,6 @@ class MassMomentum(eq.NodalQuantity):
 
 @eq.reads("moment")
 def moment_again(pt):
-    """Moment mapped again after the move."""
     moment = eq.moment(pt)
     return (
         mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment

@@ -82,7 +82,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """The place `new` with moved corners, by gathered velocities if known."""
+    """Return the place `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

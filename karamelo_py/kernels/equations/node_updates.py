@@ -14,19 +14,19 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
 
 
 def node_task(tag: type) -> type:
-    """Class decorator: register the function ``at_node`` of a task."""
+    """Register the function ``at_node`` of a task."""
     at_node.on(tag)(vars(tag)["at_node"])
     return tag
 
 
 def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
-    """1 / mass of a node, or 0 without mass."""
+    """Return 1 / mass of a node, or 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, like) / mass if mass > 0 else real(0, like)
 
 
 def unlimited(seen, n, mass, light):
-    """Fraction of its velocity change that a node shows; < 1 if it is light."""
+    """Return the fraction of its velocity change that a node shows; < 1 if it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -44,7 +44,7 @@ class SquaredMass(SummedField):
 
 @node_task
 class NodalUpdate(NamedTuple):
-    """v* = v + dt f / m."""
+    """Sets v* = v + dt f / m."""
 
     says = "update v*"
     goes_through = ("sums", "update")
@@ -59,7 +59,7 @@ class NodalUpdate(NamedTuple):
 
 @node_task
 class MomentumToVelocity(NamedTuple):
-    """MUSL's re-mapped velocity from momentum in the velocity array."""
+    """Divides the re-mapped momentum by the mass (MUSL)."""
 
     says = "re-mapped velocity"
     goes_through = ("sums", "velocity", "velocity")
@@ -72,8 +72,6 @@ class MomentumToVelocity(NamedTuple):
 
 @node_task
 class SumsToVelocity(NamedTuple):
-    """Velocity from momentum before the update (USF)."""
-
     says = "nodal velocity"
     goes_through = ("sums", "velocity")
 
@@ -85,7 +83,7 @@ class SumsToVelocity(NamedTuple):
 
 @node_task
 class UpdateToVelocity(NamedTuple):
-    """The deforming velocity is v*, limited at light nodes (USL).
+    """Limits the deforming velocity v* at light nodes (USL).
 
     A point of mass m that gives a node the fraction N gets back the strain of f dt / (N m): an
     oscillation that grows if (c dt / h)^2 > N, in d directions at once. The limit acts below

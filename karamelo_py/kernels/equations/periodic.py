@@ -30,14 +30,12 @@ class Axis(NamedTuple):
 
 
 class Seam(NamedTuple):
-    """The periodic directions of a run, in `Control.ranks` instead of processes."""
-
     axes: tuple  # of `Axis`
 
 
 @counts.on(Seam)
 def _counts_seam(ranks, n):
-    """True for one of the images of a node."""
+    """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
         place = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
@@ -75,7 +73,7 @@ class JoinVelocity(NamedTuple):
 
 
 def _is_lowest(axis, nodes, n):
-    """True for the first node in use among its images."""
+    """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
     place = (int(n) - axis.first) // axis.stride % axis.count
@@ -105,6 +103,5 @@ def _join(axis, nodes, array, n):
 
 
 def ask_to_sort(s):
-    """Have the points sorted every `EVERY` steps, when those outside return."""
     if (int(s.control.values[TIMESTEP]) + 1) % EVERY == 0:
         s.control.motion[0].drift = inf

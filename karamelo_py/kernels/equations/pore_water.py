@@ -85,8 +85,6 @@ class PoreForce(SummedField):
 
 
 class PoreArea(SummedField):
-    """Outward area of the saturated soil at a node."""
-
     shape = vector
 
 
@@ -136,14 +134,14 @@ def _is_wet(pt):
 
 
 def pore_N(node):
-    """Weight for volumes of water, at the cell centre with a linear basis."""
+    """Return the weight for volumes of water, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.N
     return real(0.5**node.kin.dimension, node.N)
 
 
 def pore_grad(node):
-    """Gradient for pressure and flux, at the cell centre with a linear basis."""
+    """Return the gradient for pressure and flux, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.grad_N
     d = node.kin.dimension
@@ -154,7 +152,7 @@ def pore_grad(node):
 
 @eq.reads("mass", "state", "material")
 def water(pt):
-    """Mass of a point's water, (m,); () if it is dry."""
+    """Return the mass of a point's water, (m,); () if it is dry."""
     if not _is_wet(pt):
         return ()
     law, state = pt.law_and_state
@@ -164,13 +162,12 @@ def water(pt):
 
 @eq.reads("v", "relative velocity")
 def water_v(pt):
-    """Velocity of a point's water (d,); () if it is dry."""
     return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
 
 
 @eq.reads("mass", "state", "material", "deformation gradient", "unseen pressure")
 def pores(pt):
-    """Volume, pores, volume times pressure, drag, pressure, and volume as a stress; or ()."""
+    """Return volume, pores, volume times pressure, drag, pressure, volume as a stress; or ()."""
     if not _is_wet(pt):
         return ()
     law, state, f = pt.law_state_F
@@ -224,8 +221,6 @@ class WaterMomentum(eq.NodalQuantity):
 
 
 class WaterForce(eq.NodalQuantity):
-    """Scatters volumes, drag, and the force of the pressure."""
-
     says = "pore pressure to grid"
     takes = eq.of_point(pores=pores)
     gives = (
@@ -245,7 +240,7 @@ class WaterMomentumAgain(eq.NodalQuantity):
 
 
 def _taken_up(b):
-    """exp(-b), and (1 - exp(-b)) / b."""
+    """Return exp(-b), and (1 - exp(-b)) / b."""
     e = exp(-b)
     return e, (1 - e) / b if b > SMALL else 1 - 0.5 * b * (1 - b / 3)
 
@@ -346,8 +341,6 @@ class DragWater(NamedTuple):
 
 @node_task
 class MakeFlux(NamedTuple):
-    """Mass flux from the velocities mapped again."""
-
     rim: float
 
     says = "flux of the water"

@@ -12,8 +12,6 @@ from karamelo_py.points.kinematics import I, det, large, outer, zero
 
 
 class Strain(Task):
-    """Gathers the velocity gradient, and updates the law's state."""
-
     not_at_corners = ("moments",)
     records = "velocity"
     says = "stress"
@@ -61,8 +59,6 @@ class StrainOfLastStep(Strain):
 
 
 class SecondStrain(Strain):
-    """`Strain` for the second of two increments of a step."""
-
     records = ""
     says = "second half of the stress"
 
@@ -115,7 +111,7 @@ def add_gradient(node, grad_v):
 
 
 def increment(dt, grad_v):
-    """dl = dt grad v, rounded as numbers: F + dl sums two of them."""
+    """Return dl = dt grad v, rounded first: F + dl sums two numbers."""
     return grad_v._make(dt * grad_v)
 
 
@@ -129,13 +125,13 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Cells by which a point's domain reaches further."""
+    """Return the cells by which a point's domain reaches further."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 def _fastest_wave(pt, material, fastest):
-    """max(fastest, c + max |v_i - common_i|); finds c only if its bound is larger."""
+    """Return max(fastest, c + max |v_i - common_i|); find c only if its bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter

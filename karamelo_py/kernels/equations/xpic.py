@@ -13,8 +13,6 @@ from karamelo_py.points.transfers.xpic import Series, TermOfSeries
 
 
 class SeriesTerm(namedtuple("SeriesTerm", "k"), eq.Task):
-    """Gathers term `k` of the series, from 0."""
-
     says = "term of the series to the points"
     reads = ("x",)
     writes = ("term of series",)
@@ -37,8 +35,6 @@ def term(pt):
 
 
 class SeriesBack(eq.NodalQuantity):
-    """Scatters mass times the term to the second vector of `Series`."""
-
     says = "term of the series to the grid"
     takes = eq.of_point(mass=eq.mass, term=term)
     gives = (
@@ -51,8 +47,6 @@ class SeriesBack(eq.NodalQuantity):
 
 @node_task
 class StartSeries(NamedTuple):
-    """First term of the series, v; also the new velocity so far."""
-
     goes_through = ("sums", "series", "update", "update")
 
     def at_node(task, kin, nodes, n, dt):
@@ -65,8 +59,6 @@ class StartSeries(NamedTuple):
 
 @node_task
 class ExtendSeries(NamedTuple):
-    """Next term, added to the new velocity."""
-
     goes_through = ("sums", "series", "series", "update", "update")
 
     def at_node(task, kin, nodes, n, dt):
