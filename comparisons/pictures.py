@@ -62,7 +62,7 @@ def finish(axes: Any, about: str) -> None:
     named = {line: str(line.get_label()).partition(",")[0] for line in axes.get_lines()}
     known = {line: word for line, word in named.items() if look.known(word)}
     for line, method in known.items() if len({*known.values()}) == len(known) else ():
-        line.set_color(look.PALETTE[look.place(method) or -1])  # black is what is exact
+        line.set_color(look.PALETTE[look.number(method) or -1])  # black is what is exact
     for axis, ends in ((axes.xaxis, axes.dataLim.intervalx), (axes.yaxis, axes.dataLim.intervaly)):
         if axis.get_scale() == "log":
             drawn = [a for line in axes.get_lines() for a in line.get_data()[axis is axes.yaxis]]

@@ -39,7 +39,7 @@ def panel(axes, lines: dict[str, tuple[list[float], list[float]]]) -> None:
     look.log_axis(axes.yaxis, min(errors), max(errors))
     ends = []
     for name, (x, y) in lines.items():
-        marker = look.place(name.partition(",")[0], METHODS)
+        marker = look.number(name.partition(",")[0], METHODS)
         colour = look.PALETTE[marker]
         axes.plot(x, y, color=colour, marker=look.MARKERS[marker], lw=1.5, ms=5)
         ends.append((x[-1], y[-1], name, colour))

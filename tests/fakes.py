@@ -106,7 +106,7 @@ class FakeHub:
         self.values = FakeValues(Ek=1.0, Ek_s=1.0, Es_s=0.0)
         self.interpreter = SimpleNamespace(files=[], variables={"E": 1000.0, "name": "text"})
         self.rehearsing = self.checking = False
-        self.place = None
+        self.mark = None
         self.console = Console(io.StringIO(), io.StringIO())
         self.fields = FakeFields(self, count)
         self.dumps = {}

@@ -38,9 +38,9 @@ class SmallHub(Hub):
             lines += [f"dimension({dimension}{f', {lo!r}, {hi!r}' * dimension}, {h!r})"]
         lines += [f"material(steel, linear, {DENSITY}, 1e9, 0.3)"]
         self.interpreter.run_text("\n".join(lines))
-        self.place = None
+        self.mark = None
 
-    def warn(self, message, place=None, hint=None, expected=None):
+    def warn(self, message, mark=None, hint=None, expected=None):
         self.warnings.append(message)
 
     def use(self, method, basis):

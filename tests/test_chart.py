@@ -268,7 +268,7 @@ def test_a_method_has_its_colour_in_every_chart():
     (alone,) = look.styles([{"basis": "cubic-spline"}])
     among = look.styles([{"basis": basis, "N": N} for basis in ORDERS for N in "34"])
     assert among[-1][:2] == among[-2][:2] == alone[:2] and among[-1] != among[-2]
-    methods = {name: look.place(name) for name in look.FAMILIES[0]}
+    methods = {name: look.number(name) for name in look.FAMILIES[0]}
     assert len(set(methods.values())) == len(methods)
 
 
@@ -283,7 +283,7 @@ def test_curves_have_the_colours_of_their_methods_and_names_where_they_leave_the
     axes = drawn[0].axes[0]
     curves = [line for line in axes.lines if len(line.get_xdata()) == 101]
     assert [line.get_color() for line in curves] == [
-        look.PALETTE[look.place(name)] for name in ("FLIP", "PIC")
+        look.PALETTE[look.number(name)] for name in ("FLIP", "PIC")
     ]
     lead = next(line for line in axes.lines if line.get_color() == curves[1].get_color()
                 and len(line.get_xdata()) == 3)  # fmt: skip
@@ -302,7 +302,7 @@ def test_no_two_lines_look_alike():
     ]
     assert len(set(look.styles(cantilevers))) == 3
     everything = [{"basis": b, "transfer": t} for b in look.FAMILIES[0] for t in look.FAMILIES[1]]
-    few = [choice for choice in everything if look.place(choice["transfer"]) < len(look.DASHES)]
+    few = [choice for choice in everything if look.number(choice["transfer"]) < len(look.DASHES)]
     assert len(set(look.styles(few))) == len(few)
 
 

@@ -116,7 +116,7 @@ def test_mistakes(run, lines, mark, says):
         run(PLANE + lines)
     text = caught.value.render()
     assert says in text
-    place = caught.value.place
+    place = caught.value.mark
     assert place.line == (PLANE + lines).count("\n") + 1
     if mark:
         assert place.text[place.column - 1 : place.column - 1 + place.length] == mark

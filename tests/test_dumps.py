@@ -18,7 +18,7 @@ from karamelo_py.output import files, snapshots, text
 from karamelo_py.output.rhythm import ByTime, is_due, next_step
 from karamelo_py.output.units import Units
 from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.styles.dumps import lammps
 from karamelo_py.styles.dumps.lammps import GridDump, GridGz, Particle, ParticleGz
 from karamelo_py.styles.dumps.pyplot import Movie, PyPlot
@@ -275,7 +275,7 @@ def test_a_folder_that_went_away_is_a_script_error(plane):
 
 def test_an_error_of_a_dump_in_a_run_is_its_own(plane):
     plane.dumps["d"] = Particle(plane, 2, "gone/p.*.dump")
-    plane.dumps["d"].place = Place("in.test", 7, 1, 4, "dump(...)")
+    plane.dumps["d"].mark = Mark("in.test", 7, 1, 4, "dump(...)")
     with pytest.raises(ScriptError) as caught:
         plane.run(4)
     assert caught.value.render().startswith("in.test:7:1: error: cannot write ")

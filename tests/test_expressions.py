@@ -17,7 +17,7 @@ class Hub(scene.Hub):
         super().__init__(Console(quiet=True))
         self.warnings = []
 
-    def warn(self, message, place=None, hint=None):
+    def warn(self, message, mark=None, hint=None):
         self.warnings.append(message)
 
 
@@ -121,7 +121,7 @@ def test_formulas_cannot_grow_without_end(hub, monkeypatch):
     monkeypatch.setattr("karamelo_py.script.terms._MAX_SIZE", 100)
     with pytest.raises(ScriptError, match="too long") as caught:
         run(hub, "f = time\n" + "f = f + x\n" * 60)
-    assert caught.value.place.column == 5
+    assert caught.value.mark.column == 5
 
 
 def test_presets_win_over_the_script(hub):

@@ -175,7 +175,7 @@ def test_groups_by_name():
     assert caught.value.hint == "all, or group(p_nodes, nodes, region, ...)"
     with pytest.raises(ScriptError) as caught:
         AnyGroup.from_script(hub, arguments("q")[0])
-    assert caught.value.place.column == 3
+    assert caught.value.mark.column == 3
 
 
 def test_empty_groups_are_warned_about():

@@ -257,7 +257,7 @@ def test_initial_velocities_of_points_are_told():
     control = SimpleNamespace(firsts=np.array([0, 2]), values=np.zeros(50))
     setup = SimpleNamespace(blocks=[SimpleNamespace(points=points, laws=())], control=control)
     steps = LoadSteps.__new__(LoadSteps)
-    hub = SimpleNamespace(solids={"a": None, "b": None}, place=None)
+    hub = SimpleNamespace(solids={"a": None, "b": None}, mark=None)
     steps.simulation = SimpleNamespace(setup=setup, hub=hub)
     with pytest.raises(ScriptError, match="solid 'b' has initial velocities"):
         steps._check_at_rest()

@@ -74,7 +74,7 @@ def test_what_cannot_be_meant(typed, column, part):
     with pytest.raises(ScriptError) as caught:
         update(f"method({typed})")
     assert part in caught.value.render()
-    assert caught.value.place.column == column + (7 if column > 1 else 0)
+    assert caught.value.mark.column == column + (7 if column > 1 else 0)
 
 
 def test_the_same_word_twice():

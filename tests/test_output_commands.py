@@ -30,7 +30,7 @@ def refused(hub, text):
         say(hub, text)
     rendered = caught.value.render()
     assert rendered.startswith("in.test:1:")
-    return rendered, caught.value.place.text[caught.value.place.column - 1 :]
+    return rendered, caught.value.mark.text[caught.value.mark.column - 1 :]
 
 
 def test_dumps_are_made_as_said(hub):

@@ -46,7 +46,7 @@ class Hub:
 
     def __init__(self):
         self.values = Values()
-        self.place = None
+        self.mark = None
 
 
 def number(text):
@@ -65,7 +65,7 @@ def arguments(text):
 def test_the_paper_script_is_understood():
     statements = parse(PAPER, "in.paper")
     assert len(statements) == len(PAPER.splitlines())
-    assert [s.place.line for s in statements] == list(range(1, len(statements) + 1))
+    assert [s.mark.line for s in statements] == list(range(1, len(statements) + 1))
     dump = statements[13]
     assert dump.name == "dump"
     assert [raw.code.strip() for raw in dump.arguments][3:6] == ["N_log", "dump_p.*.LAMMPS", "x"]
@@ -97,8 +97,8 @@ def test_line_ends_tabs_and_a_missing_last_one_mean_nothing(end):
     a, f = parse(text)
     assert isinstance(a, Assignment)
     assert isinstance(f, CommandCall)
-    assert (a.place.line, a.place.column) == (1, 2)
-    assert f.place.line == 4
+    assert (a.mark.line, a.mark.column) == (1, 2)
+    assert f.mark.line == 4
 
 
 def test_a_byte_order_mark_and_blank_text_are_fine():
@@ -225,8 +225,8 @@ def test_garbage_raises_script_errors_with_a_place_and_nothing_else(text):
     try:
         statements = parse(text, "in.garbage")
     except ScriptError as error:
-        assert error.place is not None
-        assert error.place.line <= text.count("\n") + text.count("\r") + 1
+        assert error.mark is not None
+        assert error.mark.line <= text.count("\n") + text.count("\r") + 1
         assert "in.garbage:" in error.render()
         return
     for statement in statements:
@@ -235,7 +235,7 @@ def test_garbage_raises_script_errors_with_a_place_and_nothing_else(text):
                 try:
                     parse_text(raw.code)
                 except ScriptError as error:
-                    assert error.place is not None
+                    assert error.mark is not None
 
 
 def test_deep_nesting_is_an_error_not_a_crash():

@@ -375,11 +375,11 @@ def test_errors_carry_message_and_place(tmp_path, capsys):
     with pytest.raises(SimulationError) as caught:
         Simulation(path)
     assert str(caught.value) == said
-    assert (caught.value.place.line, caught.value.place.column) == (2, 13)
+    assert (caught.value.mark.line, caught.value.mark.column) == (2, 13)
     sim = Simulation("method(ulmpm, PIC, linear)\ndimension(2, 0, 1, 0, 1, 0.1)\n")
     with pytest.raises(SimulationError, match="unknown region 'box'") as caught:
         sim.solid("s", "region", "box", 2, "m", 0.1)
-    assert caught.value.place.text == "solid(s, region, box, 2, m, 0.1)"
+    assert caught.value.mark.text == "solid(s, region, box, 2, m, 0.1)"
     with pytest.raises(SimulationError, match="there is no solid to move"):
         sim.run(3)
     with pytest.raises(SimulationError, match="there is no rest of a script"):

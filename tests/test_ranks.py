@@ -378,7 +378,7 @@ def test_tiles_are_cut_by_work(monkeypatch, costs, tiles_of_first):
     method, blocks = hub.update.method, hub.simulation.setup.blocks
     two = SharedTiles(
         SimpleNamespace(rank=0, size=2), method.lattices(hub), method.basis, 128, False,
-        one_place=False,
+        one_space=False,
     )  # fmt: skip
     two.share_out(work_of(two.loads(blocks), np.array(costs)))
     assert np.count_nonzero(two.owner[:8] == 0) == tiles_of_first

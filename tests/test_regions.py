@@ -100,10 +100,10 @@ def test_wrong_dimensions(texts, says, form):
 def test_a_wrong_value_marks_its_argument():
     with pytest.raises(ScriptError) as caught:
         commands.dimension(empty_hub(), *arguments(2, 0, 1, 3, 2, 0.1))
-    assert caught.value.place.column == len("f(2, 0, 1, 3, ") + 1
+    assert caught.value.mark.column == len("f(2, 0, 1, 3, ") + 1
     with pytest.raises(ScriptError) as caught:
         commands.dimension(empty_hub(), *arguments(1, 0, 1, -1))
-    assert caught.value.place.column == len("f(1, 0, 1, ") + 1
+    assert caught.value.mark.column == len("f(1, 0, 1, ") + 1
 
 
 def test_the_form_of_another_dimension_is_recognised():

@@ -30,8 +30,8 @@ def message(text):
     with pytest.raises(ScriptError) as caught:
         run(text)
     error = caught.value
-    assert error.place is not None
-    assert error.place.line == text.rstrip().count("\n") + 1
+    assert error.mark is not None
+    assert error.mark.line == text.rstrip().count("\n") + 1
     return error.render()
 
 
@@ -39,7 +39,7 @@ def marked(text):
     """The word that is marked."""
     with pytest.raises(ScriptError) as caught:
         run(text)
-    place = caught.value.place
+    place = caught.value.mark
     return place.text[place.column - 1 : place.column - 1 + place.length]
 
 

@@ -9,7 +9,7 @@ from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script import errors
-from karamelo_py.script.errors import Place, ScriptError, nearest, render_message
+from karamelo_py.script.errors import Mark, ScriptError, nearest, render_message
 
 SCENE = """\
 method(ulmpm, FLIP, linear, 1)
@@ -278,13 +278,11 @@ def check(script, lines_before, column, part, tmp_path):
     error = caught.value
     message = error.render()
     assert part in message
-    assert message.startswith(f"in.wrong:{error.place.line}:{error.place.column}: error: ")
-    assert error.place.line > lines_before
-    assert error.place.column == column
+    assert message.startswith(f"in.wrong:{error.mark.line}:{error.mark.column}: error: ")
+    assert error.mark.line > lines_before
+    assert error.mark.column == column
     lines = message.splitlines()
-    assert lines[1].endswith(
-        script.splitlines()[error.place.line - 1].rstrip().replace("\x01", "�")
-    )
+    assert lines[1].endswith(script.splitlines()[error.mark.line - 1].rstrip().replace("\x01", "�"))
     assert lines[2].strip().startswith("|")
     assert set(lines[2].replace("|", "").strip()) == {"^"}
     # No word of the machinery.
@@ -377,7 +375,7 @@ def test_mistakes_after_a_run_are_found_before_its_first_step(tmp_path):
     script = SCENE + "run(3)\na = 1\nfix(f, body_force, nowhere, 0, 0)\n"
     with pytest.raises(ScriptError, match="unknown group 'nowhere'") as caught:
         Interpreter(hub).run_text(script)
-    assert caught.value.place.line == 10
+    assert caught.value.mark.line == 10
     assert hub.update.step == 0
 
 
@@ -397,19 +395,19 @@ def test_results_that_a_rehearsal_does_not_have_raise_nothing(tmp_path):
 def test_multi_line_text_marks_the_line_of_the_word(tmp_path):
     with pytest.raises(ScriptError) as caught:
         run(SCENE + "fix(v, velocity_nodes,\n    nowhere, # where\n    0, 0)", tmp_path)
-    place = caught.value.place
+    place = caught.value.mark
     assert (place.line, place.column, place.length) == (9, 5, 7)
     assert place.text == "    nowhere, # where"
 
 
 def test_tabs_keep_the_marks_in_line():
-    text = render_message("error", "m", Place("f", 1, 3, 1, "a\tb"))
+    text = render_message("error", "m", Mark("f", 1, 3, 1, "a\tb"))
     assert text.splitlines()[2].endswith("|  \t^")
 
 
 def test_long_lines_are_cut_around_the_mark():
     line = "a = " + "1 + " * 200 + "b"
-    text = render_message("error", "m", Place("f", 1, len(line), 1, line)).splitlines()
+    text = render_message("error", "m", Mark("f", 1, len(line), 1, line)).splitlines()
     assert len(text[1]) < 200
     assert text[1].index("b") == text[2].index("^")
 
@@ -453,8 +451,8 @@ def test_mistakes_in_an_included_script_are_marked_there(tmp_path):
     (tmp_path / "one.in").write_text("\na = nothing\n")
     with pytest.raises(ScriptError) as caught:
         run_file(tmp_path / "in.main")
-    assert caught.value.place.file.endswith("one.in")
-    assert caught.value.place.line == 2
+    assert caught.value.mark.file.endswith("one.in")
+    assert caught.value.mark.line == 2
 
 
 def test_include_of_itself_is_refused(tmp_path):
@@ -491,7 +489,7 @@ def test_other_encodings_are_read(tmp_path):
 
 def test_print_shows_values(tmp_path, capsys):
     hub = run('a = 2\nf = a*time\nw = "linear"\nprint(a, f, w, "done")\nprint(x0)', tmp_path)
-    assert hub.place.line == 5
+    assert hub.mark.line == 5
     out = capsys.readouterr().out
     assert 'a = 2, f = 2*time = 0, w = "linear", done' in out
     assert "x0 = x0" in out

@@ -140,8 +140,8 @@ def test_misfits_mark_the_argument(hub, annotation, text, message):
     error = caught.value
     assert message in error.message
     assert error.command == "style"
-    assert error.place.line == 1
-    assert 3 <= error.place.column < 3 + len(text)
+    assert error.mark.line == 1
+    assert 3 <= error.mark.column < 3 + len(text)
     assert "style: " in error.render()
 
 
@@ -227,7 +227,7 @@ def test_counts_and_blame(hub, text, message, column):
         call(hub, Style, text)
     assert message in caught.value.message
     if column is not None:
-        assert caught.value.place.column == column
+        assert caught.value.mark.column == column
 
 
 def test_raw_arguments_pass_names_on_to_the_style(hub):
@@ -279,7 +279,7 @@ def test_records_need_no_hub(hub):
     assert first.description == "Young's modulus."
     with pytest.raises(ScriptError, match="too stiff") as caught:
         call(hub, Moduli, "1e9, 0")
-    assert caught.value.place.column == 3
+    assert caught.value.mark.column == 3
 
 
 def test_a_signature_that_cannot_be_understood_is_no_crash(hub):

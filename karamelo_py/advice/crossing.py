@@ -140,7 +140,7 @@ def words_at_end(facts: BasicFacts) -> dict[str, str]:
     if hub.update.first_time(CROSSING):
         hub.warn(
             f"{CROSSING}: {path}, {loss} ({when(facts.simulation)})",
-            place=hub.update.method.place,
+            mark=hub.update.method.mark,
             hint=CURE,
             code=code_of(CROSSING),
             cause="points crossing cells: the gradient of a linear basis is discontinuous",

@@ -42,13 +42,13 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
     else:
         result = _wrong_point(hub, simulation, smaller)
         seen = f" after a spurious energy gain ({when(simulation, 1)})"
-        if result.place is None and simulation.energy_watch.has_grown():
+        if result.mark is None and simulation.energy_watch.has_grown():
             cause, fix = energy.cause_of_gain(hub, simulation)
             fix = smaller if too_large else fix
             result = result._replace(message=result.message + seen, fix=fix, cause=cause)
         else:
             result = result._replace(message=f"{result.message} ({when(simulation, 1)})")
-    if result.place is None and not result.cause and (too_large or simulation.steps.above_limit()):
+    if result.mark is None and not result.cause and (too_large or simulation.steps.above_limit()):
         return result._replace(cause=_above_limit_as_cause(hub, simulation))
     return result
 
@@ -69,8 +69,8 @@ def _above_limit(hub: Hub, simulation: Simulation) -> Trouble:
         f"{simulation.steps.limit:.4g}: {named(hub, fastest)} moves at {speed:.4g} "
         f"({when(simulation)})"
     )
-    fix, place = own_step_instead(simulation), hub.update.dt_place
-    return Trouble(message, fix, "step-above-limit", place=place)
+    fix, mark = own_step_instead(simulation), hub.update.dt_mark
+    return Trouble(message, fix, "step-above-limit", mark=mark)
 
 
 def _speeds(points: PointTable) -> np.ndarray:

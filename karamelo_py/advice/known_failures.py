@@ -26,7 +26,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 PEEK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8
@@ -103,7 +103,7 @@ class Step(NamedTuple):
     """
 
     run: int
-    place: Place | None
+    mark: Mark | None
     fixed_dt: float | None
     dt_factor: float | None
     halves: bool
@@ -120,7 +120,7 @@ def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> S
         *(hub.domain.h, method, update.thermal),
         *(type(scheme), scheme, type(transfer), transfer),
     )
-    return Step(hub.begun, update.dt_place, update.fixed_dt, update.dt_factor, halves, scene, span)
+    return Step(hub.begun, update.dt_mark, update.fixed_dt, update.dt_factor, halves, scene, span)
 
 
 def later_steps(hub: Hub) -> list[Step]:
@@ -146,7 +146,7 @@ def warn_about_steps(
             words += f"{asked / of_heat:.3g} x the stability limit of conduction: "
             words += "temperatures would oscillate"
             if step is present:
-                raise ScriptError(words, place=step.place, hint=hint, code="step-above-limit")
+                raise ScriptError(words, mark=step.mark, hint=hint, code="step-above-limit")
         elif limit == of_heat:
             words += f"above the stability limit {limit:.4g} of conduction; "
             words += f"temperatures oscillate above {BORNE:g} x this limit"
@@ -157,7 +157,7 @@ def warn_about_steps(
                 words += f"; {mixed_units(hub, simulation)}"
                 hint = f"{UNITS}. If they are as they should be, {hint}"
         if hub.update.first_time(name) or (again and step is present):
-            hub.warn(words, place=step.place, hint=hint, code="step-above-limit")
+            hub.warn(words, mark=step.mark, hint=hint, code="step-above-limit")
     hub.later.clear()
 
 
@@ -195,7 +195,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
                 "has such values",
                 f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
                 f"1 GPa is {1e9 / units.si(STRESS):.3g} {units.name(STRESS)}",
-                place=solid.material.place,
+                mark=solid.material.mark,
             )
 
 
@@ -225,7 +225,7 @@ def warn_about_factor(hub: Hub) -> None:
     if idle and update.first_time("dt_factor"):
         hub.warn(
             "dt_factor has no effect: load steps are set by set_dt, or 1",
-            place=update.dt_place,
+            mark=update.dt_mark,
             hint="set_dt(...) instead",
             code="dt-factor-ignored",
         )
@@ -251,7 +251,7 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
         hub.warn(
             f"fix {loads[0].style} '{loads[0].id}' does not depend on time: all of its load acts "
             "in the first load step, and nothing changes it in the others",
-            place=loads[0].place,
+            mark=loads[0].mark,
             hint="a formula of time, which each load step adds set_dt or 1 to: times time/40 in "
             "run(40); or run(1)",
             code="loads-at-once",
@@ -265,8 +265,8 @@ def warn_about_laws(hub: Hub, simulation: Simulation, duration: float) -> None:
 def _tell(hub: Hub, advice: Iterable[Advice]) -> None:
     for each in advice:
         if hub.update.first_time(each.name):
-            place = each.place or hub.update.method.place
-            hub.warn(f"{each.name}: {each.reason}", place=place, hint=each.cure, code=each.code)
+            mark = each.mark or hub.update.method.mark
+            hub.warn(f"{each.name}: {each.reason}", mark=mark, hint=each.cure, code=each.code)
 
 
 def _duration_of_later(hub: Hub, simulation: Simulation) -> float:
@@ -341,7 +341,7 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
         if unreached and hub.update.first_time(f"out of reach {fix.id}"):
             hub.warn(
                 f"fix {fix.style} '{fix.id}' acts on nodes that no point reaches: {NOTHING_THERE}",
-                place=fix.place,
+                mark=fix.mark,
                 hint="a region that reaches into the body",
                 code="out-of-reach",
             )
@@ -350,4 +350,4 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
             group.awaits_solids = False
             hint = "nodes belong to the solids here: fix contact/surface makes walls next to them"
             message = f"group '{group.id}' holds no nodes; {NOTHING_THERE}"
-            hub.warn(message, group.place, hint, code="no-nodes")
+            hub.warn(message, group.mark, hint, code="no-nodes")

@@ -130,7 +130,7 @@ class Narrator(Listener):
             hub.warn(
                 f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at "
                 "the edge of the domain; more are only counted",
-                place=update.boundary_place,
+                mark=update.boundary_mark,
             )
 
     def _tell_of_limit(self, simulation: Simulation) -> None:

@@ -29,7 +29,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
         if solid not in facts.elastic or not slender or not _one_row(solid, axis):
             continue
         if any(g[axis] != 0 for g in facts.weights) and fixed_directions(facts, body).any():
-            return {"solid": solid.id, "cells": sides[axis] / solid.h, "place": solid.place}
+            return {"solid": solid.id, "cells": sides[axis] / solid.h, "mark": solid.mark}
     return None
 
 

@@ -462,7 +462,7 @@ def _tell_of_no_run(hub: Hub, script: str) -> None:
     elif hub.solids and not hub.answered:
         raise ScriptError(message, hint=f"{RUN_COMMANDS}, or quit where it may end")
     elif hub.domain is not None or not hub.interpreter.variables:
-        hub.place = None
+        hub.mark = None
         hub.warn(message, hint=RUN_COMMANDS)
 
 

@@ -45,8 +45,8 @@ class SimulationError(ScriptError):
 
     Attributes
     ----------
-    message, place, expected, hint
-        Parts of the message; `place` has file, line, column and the text of the line.
+    message, mark, expected, hint
+        Parts of the message; `mark` has file, line, column and the text of the line.
     """
 
     def __str__(self) -> str:

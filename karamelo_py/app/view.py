@@ -193,7 +193,7 @@ def _tools(scene: Hub) -> list[Any]:
             raise ScriptError(
                 f"the position of fix '{fix.id}' depends on results of the run, which are not in "
                 "its script",
-                place=fix.place,
+                mark=fix.mark,
                 expected="walls and tools that move by formulas of time",
                 hint="a log with them in the folder of the dumps, or dump pyplot during the run",
             )

@@ -60,7 +60,7 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     if count not in DIMENSION.names:
         message = f"the number of dimensions must be 1, 2 or 3, not {count:g}"
         expected = " or ".join(DIMENSION.line(d) for d in DIMENSION.names)
-        raise ScriptError(message, place=dimensions.place, expected=expected)
+        raise ScriptError(message, mark=dimensions.mark, expected=expected)
     if bounds:
         hub.domain = _domain(hub, DIMENSION, bounds, int(count))
     else:
@@ -155,7 +155,7 @@ def boundary(
         message = f"boundary({style}) is for all directions"
         raise ScriptError(message, argument="directions", expected=f"boundary({style})")
     hub.update.boundary = style
-    hub.update.boundary_place = hub.place
+    hub.update.boundary_mark = hub.mark
 
 
 def set_periodic(hub: Hub, directions: list[int]) -> None:
@@ -228,30 +228,30 @@ def _refuse_second(hub: Hub) -> None:
 
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
     values = forms.read(hub, bounds, count)
-    places = {name: argument.place for name, argument in zip(values, bounds, strict=True)}
+    places = {name: argument.mark for name, argument in zip(values, bounds, strict=True)}
     lo = [values[name] for name in _BOUNDS[0 : 2 * count : 2]]
     hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
     for low, high in zip(_BOUNDS[::2], _BOUNDS[1 : 2 * count : 2], strict=False):
         if values[high] <= values[low]:
             message = f"{high} = {values[high]:g} must be above {low} = {values[low]:g}"
-            raise ScriptError(message, place=places[high], expected=forms.line(count))
+            raise ScriptError(message, mark=places[high], expected=forms.line(count))
     h = values.get("h")
     if h is not None and h <= 0:
         message = f"the cell size h = {h:g} must be above 0"
-        raise ScriptError(message, place=places["h"], expected=forms.line(count))
+        raise ScriptError(message, mark=places["h"], expected=forms.line(count))
     try:
         domain = Domain(count, lo, hi, h)
     except ScriptError as error:
-        error.argument, error.place = None, places.get("h")
+        error.argument, error.mark = None, places.get("h")
         raise
-    domain.place = hub.place
+    domain.mark = hub.mark
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
     # One cell along a side is a line or column; a domain of one cell is an element that deforms.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
             "grid is one cell, and its nodes at the upper ends lie outside",
-            place=places["h"],
+            mark=places["h"],
             hint="smaller cells, or the same unit of length for both",
         )
     return domain
@@ -316,7 +316,7 @@ def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
     if len(counts) == hub.domain.dimension > 1:
         raise ScriptError(
             f"{', '.join(counts)} points along the sides: points are counted in a cell here",
-            place=arguments[1].place,
+            mark=arguments[1].mark,
             expected=solid.syntax,
             hint=f"solid({ID}, region, {region}, 1, {material}, {h}), or more than 1 in each "
             "direction of a cell",

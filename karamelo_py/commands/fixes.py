@@ -96,7 +96,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     with signature.in_new_words(kind, ID, style, arguments):
         target = registry.called(kind, ID, style)
     if ID in others and set(others[ID].published) & set(target.published):
-        message = f"'{ID}' is a {others.kind} already (line {others[ID].place.line})"
+        message = f"'{ID}' is a {others.kind} already (line {others[ID].mark.line})"
         expected = f"another ID: {ID}_x and the like would mean two things"
         raise ScriptError(message, argument="ID", expected=expected)
     catalogue.refuse_unnameable(ID)
@@ -113,7 +113,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     replaces = catalogue is hub.fixes
     if replaces and ID in catalogue and new.body is None:
         hub.warn(
-            f"fix '{ID}' replaces the one of line {catalogue[ID].place.line}",
+            f"fix '{ID}' replaces the one of line {catalogue[ID].mark.line}",
             hint="fixes that act at the same time need different IDs",
         )
     catalogue.add(ID, new, replace=replaces)
@@ -132,7 +132,7 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
     if third and registry.knows(kind, third):
         message = f"'{third}' is a style, and the style comes before the group"
         expected = f"{kind}({ID}, {third}, {style}, ...)"
-        raise ScriptError(message, place=arguments[0].place, expected=expected)
+        raise ScriptError(message, mark=arguments[0].mark, expected=expected)
     if third and instead(kind, third):
         registry.find(kind, third)  # its error suggests the name
 

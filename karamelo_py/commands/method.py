@@ -67,19 +67,19 @@ def method(
     if hub.solids:
         message = "the method cannot change once there are solids"
         expected = "method(...) before the first solid"
-        hint = f"move it above line {next(iter(hub.solids.values())).place.line}"
+        hint = f"move it above line {next(iter(hub.solids.values())).mark.line}"
         raise ScriptError(message, expected=expected, hint=hint, code="too-late")
     before = hub.update.method
     if before is not None:
         hub.warn(
-            f"this method replaces the one in line {before.place.line}", hint="one line method(...)"
+            f"this method replaces the one in line {before.mark.line}", hint="one line method(...)"
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
     for family, part in parts.items():
         check_part(hub, f"{family} {call.names[family]}", part)
     chosen.basis_name = f"{basis} {call.variant}".strip()
-    chosen.place = hub.place
+    chosen.mark = hub.mark
     hub.update.thermal = chosen.thermal
 
 
@@ -134,13 +134,13 @@ def scheme(
         raise ScriptError(message, argument="start", expected="an explicit scheme, or no start")
     update, runs = hub.update, len(hub.runs)
     update.half_start = start == "half"
-    if update.scheme_place is not None and update.scheme_behind == runs:
+    if update.scheme_mark is not None and update.scheme_behind == runs:
         hub.warn(
-            f"this scheme replaces the one in line {update.scheme_place.line}, which no run "
+            f"this scheme replaces the one in line {update.scheme_mark.line}, which no run "
             "has used",
             hint="one line scheme(...) before a run",
         )
-    update.scheme, update.scheme_place, update.scheme_behind = chosen, hub.place, runs
+    update.scheme, update.scheme_mark, update.scheme_behind = chosen, hub.mark, runs
     for name in PUBLISHED:
         # Values of earlier steps do not apply to an explicit scheme.
         if name in hub.values or chosen.traits.implicit:
@@ -291,7 +291,7 @@ class _Call:
             raise ScriptError(
                 f"domains of the shape {shape} are for {self.shapes[shape].dimension} "
                 f"dimensions, and this scene has {self.dimension}",
-                place=shapes[shape].place,
+                mark=shapes[shape].mark,
                 expected="one of " + ", ".join(fit),
             )
         if not shapes:
@@ -357,7 +357,7 @@ class _Call:
             chosen = next((a.text for a in self.options if _word(a, self.variants["basis"])), None)
             return ScriptError(
                 f"{who} takes {takes}",
-                place=argument.place,
+                mark=argument.mark,
                 expected=self.instead(chosen),
                 hint=f"-var {word} mechanical takes it away" if word else None,
             )
@@ -367,13 +367,13 @@ class _Call:
                     if word in variants_of(registry.find(family, name)):
                         return ScriptError(
                             f"{word} goes with {name}, not with {self.names[family]}",
-                            place=argument.place,
+                            mark=argument.mark,
                             expected=f"karamelo-py help {family} {name} explains it",
                         )
         options = self._words("method", "transfer", "basis")
         return ScriptError(
             f"'{argument.text}' is not an option of method({', '.join(self.names.values())})",
-            place=argument.place,
+            mark=argument.mark,
             expected="nothing more, or one of " + ", ".join(options),
             hint=meant(word, options),
         )
@@ -387,5 +387,5 @@ def _word(argument: Argument, words: Container[str]) -> str | None:
 
 def _chosen_twice(first: Argument, second: Argument) -> ScriptError:
     return ScriptError(
-        f"'{first.text}' was chosen already", place=second.place, expected="one of them"
+        f"'{first.text}' was chosen already", mark=second.mark, expected="one of them"
     )

@@ -69,8 +69,8 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
             _check(hub, before, after, numbers)
             judge(hub, after)
     for after in changed.values():
-        place = hub.materials if isinstance(after, Material) else hub.parts[after.kind]
-        place[after.id] = after
+        catalogue = hub.materials if isinstance(after, Material) else hub.parts[after.kind]
+        catalogue[after.id] = after
     for solid in hub.solids.values():
         solid.material = changed.get(solid.material, solid.material)
 
@@ -109,7 +109,7 @@ def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> Mat
     if isinstance(after, Material) and isinstance(entry, Material):
         fit_to_domain(hub, after)
         after.fluid = entry.fluid
-    after.id, after.place = entry.id, entry.place
+    after.id, after.mark = entry.id, entry.mark
     return after
 
 
@@ -125,19 +125,19 @@ def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument,
         if specific_volume(after.law) != specific_volume(before.law):
             raise ScriptError(
                 f"the density of material '{after.id}' cannot change: its points have their masses",
-                place=numbers[0].place,
+                mark=numbers[0].mark,
                 expected="a density before the first solid of the material",
                 code="too-late",
             )
         kin = Space()
         if law_kind(after.law) != law_kind(before.law):
             message = f"{names} would give the points of material '{after.id}' another law"
-            raise ScriptError(message, place=numbers[0].place, expected="numbers of the same law")
+            raise ScriptError(message, mark=numbers[0].mark, expected="numbers of the same law")
         if initial_state(after.law, kin, 1.0) != initial_state(before.law, kin, 1.0):
             raise ScriptError(
                 f"the state of the points of material '{after.id}' began from {names}, which "
                 "cannot change any more",
-                place=numbers[0].place,
+                mark=numbers[0].mark,
                 expected="the number before the first solid of the material",
                 code="too-late",
             )

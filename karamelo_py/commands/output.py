@@ -53,7 +53,7 @@ def dump(
     try:
         hub.output.claim(new.file, f"dump '{ID}'")
     except ScriptError as error:
-        error.place = arguments[1].place
+        error.mark = arguments[1].mark
         raise
     hub.asked.update(new.columns)
     hub.dumps.add(ID, new)
@@ -69,7 +69,7 @@ def _check_order(hub: Hub, arguments: tuple[Argument, ...]) -> None:
         message = "argument 1 'every' must be a whole number; the file comes second"
         expected = "the steps between two snapshots, then the file"
         hint = f"{second.text}, {first.text}" if NUMBER.fullmatch(second.text) else None
-        raise ScriptError(message, place=first.place, expected=expected, hint=hint)
+        raise ScriptError(message, mark=first.mark, expected=expected, hint=hint)
 
 
 dump.syntax = "ID, all, style, every, file[, ...]"
@@ -228,7 +228,7 @@ def plot(
             kind="plot",
         )
     curve = PlottedCurve(every, x, y, axis, scale, label)
-    curve.place = hub.place
+    curve.mark = hub.mark
     plots.add(ID, curve)
 
 
@@ -255,7 +255,7 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
     plots = hub.output.plots
     hub.output.files.pop(plots.file, None)
     hub.output.claim(file, "save_plot")
-    plots.file, plots.place = file, hub.place
+    plots.file, plots.mark = file, hub.mark
     if not hub.rehearsing:
         plots.finish()
 

@@ -102,7 +102,7 @@ def _take_away(hub: Hub, ids: np.ndarray) -> None:
     if not len(ids):
         hub.warn("no point is chosen: nothing is deleted")
         return
-    mass, energy = take_away(hub, ids, hub.place)
+    mass, energy = take_away(hub, ids, hub.mark)
     words = (
         f"{len(ids)} points are deleted, with a mass of {mass:.6g} and an energy of {energy:.6g}"
     )
@@ -260,7 +260,7 @@ def populate_cylindrical_coordinates(
         raise ScriptError(message, argument="solid", expected=expected, code="too-late")
     refuse_chosen(hub, solid, "populate_cylindrical_coordinates")
     values = FORMS.read(hub, lattice, hub.require_domain().dimension)
-    placed = _polar(values, dict(zip(values, (a.place for a in lattice), strict=True)))
+    placed = _polar(values, dict(zip(values, (a.mark for a in lattice), strict=True)))
     if not region.unknown:
         placed = _kept(hub, region, placed)
     T0, solid.T0 = solid.T0, values["T0"]
@@ -279,7 +279,7 @@ populate_cylindrical_coordinates.syntax = (
 
 def _polar(values: dict, places: dict) -> Placement:
     """Slices outermost, then rings, then angles."""
-    check_radius(values["R"], place=places["R"])
+    check_radius(values["R"], mark=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1
         for name in ("Ndx", "Ndr", "Ndtheta")
@@ -307,7 +307,7 @@ def _polar(values: dict, places: dict) -> Placement:
         axis = "xyz".index(values["axis"])
         if values["hi"] <= values["lo"]:
             raise ScriptError(
-                f"hi = {values['hi']:g} must be above lo = {values['lo']:g}", place=places["hi"]
+                f"hi = {values['hi']:g} must be above lo = {values['lo']:g}", mark=places["hi"]
             )
         dx = (values["hi"] - values["lo"]) / counts[0]
         columns.insert(axis, values["lo"] + (slices + 0.5) * dx)
@@ -317,13 +317,11 @@ def _polar(values: dict, places: dict) -> Placement:
     return Placement(np.column_stack(columns), volume, np.column_stack(halves), lo, hi)
 
 
-def _count(value: float, name: str, place) -> int:
+def _count(value: float, name: str, mark) -> int:
     if math.isnan(value):
         return 1  # a result that a rehearsal does not have
     if value < 1 or value != math.floor(value):
-        raise ScriptError(
-            f"{name} must be a whole number of at least 1, not {value:g}", place=place
-        )
+        raise ScriptError(f"{name} must be a whole number of at least 1, not {value:g}", mark=mark)
     return int(value)
 
 

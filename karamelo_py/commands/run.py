@@ -80,7 +80,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     --------
     dt_factor
     """
-    hub.update.fixed_dt, hub.update.dt_place = dt, hub.place
+    hub.update.fixed_dt, hub.update.dt_mark = dt, hub.mark
     hub.values.set("dt", dt)
     if hub.update.dt_factor is not None:
         _warn_of_factor(hub)
@@ -107,7 +107,7 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     """
     hub.update.dt_factor = factor
     if hub.update.fixed_dt is None:
-        hub.update.dt_place = hub.place
+        hub.update.dt_mark = hub.mark
     else:
         _warn_of_factor(hub)
 
@@ -291,7 +291,7 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     if every == 0:
         return
     new = restart_file.Restarts(hub, every, Path(file))
-    new.place = hub.place
+    new.mark = hub.mark
     hub.output.check_file(new.file)
     hub.output.claim(new.file, RESTART)
     hub.output.last.append(new)

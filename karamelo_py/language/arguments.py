@@ -8,7 +8,7 @@ from copy import copy
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError, meant, one_of
+from karamelo_py.script.errors import Mark, ScriptError, meant, one_of
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.parser import NUMBER, parse_expression
 from karamelo_py.script.syntax import Raw
@@ -21,7 +21,7 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 class Argument:
-    """An unevaluated argument of a call: its `text` without surrounding blanks, and `place`."""
+    """An unevaluated argument of a call: its `text` without surrounding blanks, and `mark`."""
 
     def __init__(self, raw: Raw, interpreter: Any):
         code = raw.code
@@ -33,8 +33,8 @@ class Argument:
             self.text = re.sub(r"\s+", " ", self.text)
 
     @property
-    def place(self) -> Place:
-        return self._raw.place
+    def mark(self) -> Mark:
+        return self._raw.mark
 
     @property
     def statement(self) -> Any:
@@ -76,18 +76,18 @@ class Argument:
         if isinstance(value, str):
             return value
         if text:
-            raise ScriptError(f"{self.text} is not a text", place=self.place)
+            raise ScriptError(f"{self.text} is not a text", mark=self.mark)
         if re.search(r"\s", self.text):
             first, second = self.text.split()[:2]
             message = f"'{self.text}' is more than one word"
             hint = f'is a comma missing: "{first}, {second}"? A name with blanks needs quotes'
-            raise ScriptError(message, place=self.place, hint=hint)
+            raise ScriptError(message, mark=self.mark, hint=hint)
         return self.text
 
     def value(self, hub: Scene | None) -> Value:
         if self.is_null:
             raise ScriptError(
-                "NULL cannot be used here", place=self.place, expected="a number or a formula"
+                "NULL cannot be used here", mark=self.mark, expected="a number or a formula"
             )
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
@@ -155,7 +155,7 @@ class Named:
     """Base of parts of a scene that scripts name by an ID; also an annotation."""
 
     id: str = ""
-    place: Place | None = None
+    mark: Mark | None = None
     catalogue = ""
 
     @classmethod
@@ -168,10 +168,10 @@ def look_up(catalogue: Any, argument: Argument):
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"
         raise ScriptError(
-            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", place=argument.place
+            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", mark=argument.mark
         )
     try:
         return catalogue[word]
     except ScriptError as error:
-        error.place = error.place or argument.place
+        error.mark = error.mark or argument.mark
         raise

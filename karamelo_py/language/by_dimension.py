@@ -70,7 +70,7 @@ class Forms:
             hint = other if missing else f"{other}; here {hint}"
         raise ScriptError(
             message,
-            place=gap.place if gap else None if missing else arguments[len(names)].place,
+            mark=gap.mark if gap else None if missing else arguments[len(names)].mark,
             expected=self.line(dimension),
             hint=f"is a comma missing in '{gap.text}'?" if gap else hint,
             code="arguments",
@@ -99,7 +99,7 @@ class Forms:
             if text in ("+INF", "-INF"):
                 if (text == "-INF") == (end < 0):
                     return end
-                raise ScriptError(f"{name} cannot be {text}", place=argument.place, expected="INF")
+                raise ScriptError(f"{name} cannot be {text}", mark=argument.mark, expected="INF")
         value = number(hub, argument, name, expected=self.line(dimension))
         if end is not None and abs(value) >= _HUGE and (value < 0) == (end < 0):
             return end
@@ -111,7 +111,7 @@ class Forms:
             return word
         raise ScriptError(
             f"{name} must be one of {', '.join(choices)}",
-            place=argument.place,
+            mark=argument.mark,
             expected=self.line(dimension),
             hint=meant(word, choices) if word else None,
             code="argument",
@@ -127,8 +127,8 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
     if isinstance(value, Expression):
         wanted = "a constant number, not a formula"
         hint = f"value({argument.text}) is its present value"
-    message, place = f"{name} must be {wanted}", argument.place
-    raise ScriptError(message, place=place, expected=expected, hint=hint)
+    message, mark = f"{name} must be {wanted}", argument.mark
+    raise ScriptError(message, mark=mark, expected=expected, hint=hint)
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
@@ -136,5 +136,5 @@ def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> 
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     message = f"{name} must be a finite number, not {value}"
-    place = argument.place if argument is not None else None
-    raise ScriptError(message, place=place, argument=None if argument is not None else name)
+    mark = argument.mark if argument is not None else None
+    raise ScriptError(message, mark=mark, argument=None if argument is not None else name)

@@ -8,7 +8,7 @@ from karamelo_py.language.arguments import NUMBER, Argument, with_gap
 from karamelo_py.language.kinds import Parameter, Unfit
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import longer
-from karamelo_py.script.errors import Place, ScriptError, meant, nearest, table
+from karamelo_py.script.errors import Mark, ScriptError, meant, nearest, table
 
 
 def wrong_count(
@@ -21,9 +21,9 @@ def wrong_count(
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
-    place, hint, missing = None, None, [f"{word}=..." for word in keywords]
+    mark, hint, missing = None, None, [f"{word}=..." for word in keywords]
     if surplus:
-        place, hint = surplus[0].place, _of_surplus(surplus[0].text, expected, name)
+        mark, hint = surplus[0].mark, _of_surplus(surplus[0].text, expected, name)
     elif len(arguments) < len(needed):
         hint = longer(name, arguments) or table()["otherwise"].get(name)
         missing = _named(needed[len(arguments) :], slots)
@@ -31,12 +31,12 @@ def wrong_count(
         hint = None
     elif left_out := _left_out(needed, arguments) if len(arguments) < len(needed) else []:
         before, filled = _filled(needed, arguments, left_out)
-        place, missing = before.place, _named(left_out, slots)
+        mark, missing = before.mark, _named(left_out, slots)
         hint = hint or (f"{name}({filled})" if filled else None)
     message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
     if missing:
         message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-    return ScriptError(message, place=place, expected=form, hint=hint, code="arguments")
+    return ScriptError(message, mark=mark, expected=form, hint=hint, code="arguments")
 
 
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
@@ -83,9 +83,9 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
         hint = f"arguments are given by position: leave out '{word} ='"
     choices = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
     message = f"no argument is named '{word}'"
-    place = argument.place
+    mark = argument.mark
     code = "arguments"
-    return ScriptError(message, place=place, expected=choices, hint=hint, code=code, name=word)
+    return ScriptError(message, mark=mark, expected=choices, hint=hint, code=code, name=word)
 
 
 def swapped(
@@ -131,17 +131,17 @@ def misfit(
         text, hint = f"one of {', '.join(registry.names(family))}", None
     if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
         hint = "commas separate arguments: a million is 1e6 or 1000000"
-    message, place = f"{which} must be {text}, not {unfit.got}", unfit.place or argument.place
-    return ScriptError(message, place=place, expected=text, hint=hint, code="argument")
+    message, mark = f"{which} must be {text}, not {unfit.got}", unfit.mark or argument.mark
+    return ScriptError(message, mark=mark, expected=text, hint=hint, code="argument")
 
 
 def guilty(
     error: ScriptError, arguments: Sequence[Argument], bound: dict[str, list[Argument]]
-) -> Place | None:
+) -> Mark | None:
     if isinstance(error.argument, int) and error.argument < len(arguments):
         plain = [argument for argument in arguments if argument.keyword() is None]
-        return (arguments if error.argument >= 0 else plain)[error.argument].place
+        return (arguments if error.argument >= 0 else plain)[error.argument].mark
     if isinstance(error.argument, str) and bound.get(error.argument):
-        return bound[error.argument][0].place
+        return bound[error.argument][0].mark
     words = (error.name, f'"{error.name}"')
-    return next((a.place for a in arguments if a.text in words), None)
+    return next((a.mark for a in arguments if a.text in words), None)

@@ -11,7 +11,7 @@ from typing import Any
 
 from karamelo_py.compiler import CannotCompile, Undefined, places_of
 from karamelo_py.language import registry
-from karamelo_py.script.errors import FAILURES, Place, Quit, ScriptError
+from karamelo_py.script.errors import FAILURES, Mark, Quit, ScriptError
 
 TRACEBACK = "; --debug shows the traceback"
 
@@ -19,8 +19,8 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 
 @contextmanager
-def as_script_error(name: str, where: str, code: Any, place: Place | None) -> Iterator[None]:
-    """Convert an exception of a style (``fix drag``) to an error at `place`.
+def as_script_error(name: str, where: str, code: Any, mark: Mark | None) -> Iterator[None]:
+    """Convert an exception of a style (``fix drag``) to an error at `mark`.
 
     `where` is the active part, such as a hook; the last line in the file of `code` is named.
     """
@@ -29,17 +29,17 @@ def as_script_error(name: str, where: str, code: Any, place: Place | None) -> It
     except KNOWN:
         raise
     except FAILURES as error:
-        raise of_style(error, name, where, code, place) from error
+        raise of_style(error, name, where, code, mark) from error
 
 
 def of_style(
-    error: BaseException, name: str, where: str, code: Any, place: Place | None
+    error: BaseException, name: str, where: str, code: Any, mark: Mark | None
 ) -> ScriptError:
     message = f"{cause_of(error)}{place_in(code, error)}"
-    return fault(name, f"{where}: {message}", place, TRACEBACK)
+    return fault(name, f"{where}: {message}", mark, TRACEBACK)
 
 
-def fault(name: str, message: str, place: Place | None, more: str = "") -> ScriptError:
+def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptError:
     family, _, style = name.rpartition(" ")
     family = family or "command"
     origin = registry.origin(family, style) if registry.knows(family, style) else ""
@@ -47,7 +47,7 @@ def fault(name: str, message: str, place: Place | None, more: str = "") -> Scrip
     hint = f"tell the author of {style}{more}"
     if origin.startswith("the module "):
         hint = f"mend it in {origin.removeprefix('the ')}{more}"
-    error = ScriptError(f"{name}{package}: {message}", place=place, hint=hint, code="plug-in")
+    error = ScriptError(f"{name}{package}: {message}", mark=mark, hint=hint, code="plug-in")
     error.complete = True
     return error
 
@@ -58,8 +58,8 @@ def cause_of(error: BaseException) -> str:
         return str(error)
     if not isinstance(error, CannotCompile):
         return ": ".join(filter(None, (type(error).__name__, str(error))))
-    user_places = (place for place in places_of(error) if not place[0].startswith(_others()))
-    line = next(filter(None, (linecache.getline(*place).strip() for place in user_places)), None)
+    user_places = (mark for mark in places_of(error) if not mark[0].startswith(_others()))
+    line = next(filter(None, (linecache.getline(*mark).strip() for mark in user_places)), None)
     return f"it cannot be compiled: {error}" + (f", in '{line}'" if line else "")
 
 
@@ -90,7 +90,5 @@ def place_in(code: Any, error: BaseException) -> str:
     except TypeError:
         source = None
     places = [*places_of(error)]
-    same = [
-        place for place in places if source and Path(place[0]).resolve() == Path(source).resolve()
-    ]
+    same = [mark for mark in places if source and Path(mark[0]).resolve() == Path(source).resolve()]
     return next((f" ({Path(file).name}:{line})" for file, line in [*same, *places]), "")

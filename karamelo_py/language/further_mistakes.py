@@ -166,7 +166,7 @@ def misnamed(
         try:
             _look_up(interpreter, statement, variables, set(wanting))
         except ScriptError as error:
-            error.place = error.place or statement.place
+            error.mark = error.mark or statement.mark
             errors.append(error)
     return errors
 
@@ -176,7 +176,7 @@ def _look_up(
 ) -> None:
     name, arguments = statement.name, statement.arguments
     if name not in FUNCTIONS and not registry.knows("command", name):
-        raise unknown_call(interpreter, name, statement.place, statement=True)
+        raise unknown_call(interpreter, name, statement.mark, statement=True)
     where = _STYLED.get(name, len(arguments))
     if where >= len(arguments):
         return
@@ -195,7 +195,7 @@ def _look_up(
         try:
             registry.find(name, style)
         except ScriptError as error:
-            error.command, error.place = name, arguments[where].place
+            error.command, error.mark = name, arguments[where].mark
             ID, *words = words_of(statement)
             error.hint = renamed(name, style, ID, words[where:]) or error.hint
             raise
@@ -207,5 +207,5 @@ def _rest_of(interpreter: Any) -> list[Statement]:
 
 
 def _order(error: ScriptError) -> tuple:
-    place = error.place
-    return (error.included != [], place.file, place.line) if place else (True, "", 0)
+    mark = error.mark
+    return (error.included != [], mark.file, mark.line) if mark else (True, "", 0)

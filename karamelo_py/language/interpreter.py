@@ -12,7 +12,7 @@ from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.script import evaluation, syntax
-from karamelo_py.script.errors import Pause, Place, Quit, ScriptError
+from karamelo_py.script.errors import Mark, Pause, Quit, ScriptError
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression
@@ -30,16 +30,16 @@ def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
     code = "operand"
     if isinstance(statement, syntax.CommandCall):
         code = "not-possible"
-        lines = {argument.place[:2] for argument in statement.arguments}
-        place = error.place
-        inside = place and place[:2] in lines and place != statement.place
+        lines = {argument.mark[:2] for argument in statement.arguments}
+        mark = error.mark
+        inside = mark and mark[:2] in lines and mark != statement.mark
         if inside or error.argument is not None:
             code = "argument"
     return code
 
 
 class Interpreter:
-    """Executes a script on a hub; sets its ``interpreter`` and ``place``."""
+    """Executes a script on a hub; sets its ``interpreter`` and ``mark``."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
@@ -193,7 +193,7 @@ class Interpreter:
 
     def execute(self, statement: syntax.Statement) -> None:
         self.statement = statement
-        self.hub.place = statement.place
+        self.hub.mark = statement.mark
         depth = len(self.frames)
         done = len(self.record.statements)
         try:
@@ -204,7 +204,7 @@ class Interpreter:
             raise
         except ScriptError as error:
             self.record.forget_from(done)
-            error.place = error.place or (None if error.complete else statement.place)
+            error.mark = error.mark or (None if error.complete else statement.mark)
             self.presets.blame(statement, error)
             for wrong in (error, *error.others):
                 wrong.included = wrong.included or self._including(depth - 1)
@@ -213,7 +213,7 @@ class Interpreter:
             raise
         except RecursionError:
             message, hint = "this is nested too deeply", "use more names"
-            raise ScriptError(message, place=statement.place, hint=hint, code="syntax") from None
+            raise ScriptError(message, mark=statement.mark, hint=hint, code="syntax") from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
         name = statement.name if isinstance(statement, syntax.CommandCall) else ""
@@ -226,15 +226,15 @@ class Interpreter:
         self.record.statements.append(text)
         if replay is None:
             return self._execute(statement)
-        replay.next(text, statement.place)
+        replay.next(text, statement.mark)
         last = replay.at_end
         self._execute(statement)
         if last and self.replay is replay:
-            raise replay.other_script("there a run stood here", statement.place)
+            raise replay.other_script("there a run stood here", statement.mark)
 
-    def _including(self, depth: int) -> list[Place]:
+    def _including(self, depth: int) -> list[Mark]:
         frames = self.frames[:depth]
-        return [frame.statements[frame.next - 1].place for frame in reversed(frames)]
+        return [frame.statements[frame.next - 1].mark for frame in reversed(frames)]
 
     def _execute(self, statement: syntax.Statement) -> None:
         if isinstance(statement, syntax.Assignment):
@@ -252,7 +252,7 @@ class Interpreter:
             right = statement.raw.code[equal.right.start : equal.right.end]
             message = "this compares and does nothing with the result"
             hint = f"an assignment has one =: {left.name} = {right}"
-            raise ScriptError(message, place=statement.place, hint=hint)
+            raise ScriptError(message, mark=statement.mark, hint=hint)
         self.evaluate(node, statement.raw)
 
     def _assign(self, statement: syntax.Assignment) -> None:
@@ -286,7 +286,7 @@ class Interpreter:
     def _call(self, statement: syntax.CommandCall) -> None:
         name, raw = statement.name, statement.raw
         if self.hides(name) or not (name in FUNCTIONS or registry.knows("command", name)):
-            raise unknown.unknown_call(self, name, statement.place, statement=True)
+            raise unknown.unknown_call(self, name, statement.mark, statement=True)
         if registry.knows("command", name):
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
@@ -315,7 +315,7 @@ class Interpreter:
         if name in self.hub.values:
             self.hub.asked.add(name)
             return Expression.seed(name)
-        raise unknown.unknown_name(self, name, evaluation.mark(raw, node))
+        raise unknown.unknown_name(self, name, evaluation.mark_of(raw, node))
 
     def means_something(self, name: str) -> bool:
         """As a call or in later lines."""
@@ -329,13 +329,13 @@ class Interpreter:
     def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Value:
         name = node.name
         begin = raw.start + node.start
-        place = raw.source.place(begin, begin + len(name))
+        mark = raw.source.mark(begin, begin + len(name))
         if not registry.knows("command", name) or self.hides(name):
-            raise unknown.unknown_call(self, name, place, statement=False)
+            raise unknown.unknown_call(self, name, mark, statement=False)
         target = registry.find("command", name)
         # A command without a value must not run here, least of all a run.
         if inspect.get_annotations(target).get("return", "") in (None, "None"):
-            raise unknown.no_value(name, place)
+            raise unknown.no_value(name, mark)
         arguments = [
             signature.Argument(syntax.Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
             for o in node.operands
@@ -343,10 +343,10 @@ class Interpreter:
         try:
             value = signature.call(target, self.hub, arguments, name)
         except ScriptError as error:
-            error.place = error.place or place
+            error.mark = error.mark or mark
             raise
         if isinstance(value, (int, float)):
             return float(value)
         if not isinstance(value, (str, Expression)):
-            raise unknown.no_value(name, place)
+            raise unknown.no_value(name, mark)
         return value

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Place, ScriptError, meant
+from karamelo_py.script.errors import Mark, ScriptError, meant
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
@@ -80,8 +80,8 @@ class InputFile:
         expected = "a file in the current folder or the folder of the script"
         hint = meant(here.name, [p.name for p in files])
         message = f"the file {name} {problem}"
-        place, code = argument.place, "no-file"
-        raise ScriptError(message, place=place, expected=expected, hint=hint, code=code)
+        mark, code = argument.mark, "no-file"
+        raise ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
 
 
 class TableFile(InputFile):
@@ -103,7 +103,7 @@ class OutputFile:
         except UnicodeEncodeError:
             raise ScriptError(
                 f"{name} cannot be the name of a file here, where names of files are in {encoding}",
-                place=argument.place,
+                mark=argument.mark,
                 hint="the environment variable PYTHONUTF8=1, or another name",
             ) from None
         # A run makes the folder of -out; `check` may not find it.
@@ -111,10 +111,10 @@ class OutputFile:
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
             message, hint = f"the folder {folder} does not exist", f"mkdir {folder}"
-            raise ScriptError(message, place=argument.place, expected=expected, hint=hint)
+            raise ScriptError(message, mark=argument.mark, expected=expected, hint=hint)
         if path.is_dir() or name.endswith(("/", "\\")):
             message, expected = f"{name} is a folder", "the name of a file"
-            raise ScriptError(message, place=argument.place, expected=expected)
+            raise ScriptError(message, mark=argument.mark, expected=expected)
         return Path(name)
 
 
@@ -122,7 +122,7 @@ def _file_name(argument: Argument) -> str:
     name = argument.words()
     if not name.strip() or "\0" in name or name == NULL:
         raise ScriptError(
-            "a file name is missing", place=argument.place, expected="the name of a file"
+            "a file name is missing", mark=argument.mark, expected="the name of a file"
         )
     return os.path.expanduser(name)
 
@@ -130,10 +130,10 @@ def _file_name(argument: Argument) -> str:
 class Unfit(Exception):
     """An argument is of another kind, described by `got`."""
 
-    def __init__(self, got: str, place: Place | None = None, hint: str | None = None):
+    def __init__(self, got: str, mark: Mark | None = None, hint: str | None = None):
         super().__init__(got)
         self.got = got
-        self.place = place
+        self.mark = mark
         self.hint = hint
 
 

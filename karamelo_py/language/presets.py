@@ -79,9 +79,9 @@ class Presets(dict[str, str]):
         return {name: None for word in words for name in self._made_of.get(word, ())}
 
     def blame(self, statement: Statement, error: ScriptError) -> None:
-        place = error.place
-        if place not in (None, statement.place) and not error.hint:
-            marked = place.text[place.column - 1 : place.column - 1 + place.length]
+        mark = error.mark
+        if mark not in (None, statement.mark) and not error.hint:
+            marked = mark.text[mark.column - 1 : mark.column - 1 + mark.length]
             if options := ", ".join(f"-var {name} {self[name]}" for name in self._in(marked)):
                 error.hint = f"{marked} comes from {options}"
         for name, number in self._texts.items():

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, field
 from math import nan
 
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
@@ -44,7 +44,7 @@ class Replay:
     def at_end(self) -> bool:
         return self.number == len(self.record.statements) - 1
 
-    def next(self, text: str, place: Place | None) -> None:
+    def next(self, text: str, mark: Mark | None) -> None:
         """Take the next statement; refuse it if it differs from the record."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
@@ -52,16 +52,16 @@ class Replay:
         # An unfinished run may change its length.
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
-                raise self._was_over(before, place)
-            error = self.other_script(f"there this statement was {before}", place)
+                raise self._was_over(before, mark)
+            error = self.other_script(f"there this statement was {before}", mark)
             error.hint = self._longer_by(before, text) or error.hint
             raise error
 
-    def _was_over(self, run: str, place: Place | None) -> ScriptError:
+    def _was_over(self, run: str, mark: Mark | None) -> ScriptError:
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
             f"{self.file} was written when this run was over, by {run}",
-            place=place,
+            mark=mark,
             expected=f"{run} as it was{behind}",
             hint=self._state_alone(),
         )
@@ -81,10 +81,10 @@ class Replay:
     def value(self) -> float:
         return self._values.pop(0) if self._values else nan
 
-    def other_script(self, message: str, place: Place | None = None) -> ScriptError:
+    def other_script(self, message: str, mark: Mark | None = None) -> ScriptError:
         return ScriptError(
             f"{self.file} was written by another script: {message}",
-            place=place,
+            mark=mark,
             expected="the script that wrote it; what it says about steps and output, and how long "
             "the last run is, may change",
             hint=self._state_alone(),

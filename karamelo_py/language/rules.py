@@ -11,8 +11,8 @@ declared next to a basis, transfer, scheme, method, field, law or part of a law,
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
 returns whether the rule applies, or the numbers for its words by name, or a list of these, one per
 message. Braces in words take these numbers and attributes of ``part``, ``scene`` and ``owner`` (of
-a law or its parts, the material), such as ``{scene.turn:.2g}``. Two names are special: ``place``,
-the marked place in the script (default: of the fix, material or method), and ``share``, the size of
+a law or its parts, the material), such as ``{scene.turn:.2g}``. Two names are special: ``mark``,
+the location in the script (default: of the fix, material or method), and ``share``, the size of
 noise over the tolerable amount.
 """
 
@@ -21,7 +21,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from math import inf
 from typing import Any, NamedTuple
 
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 When = Callable[[Any, Any], Any]
 
@@ -38,7 +38,7 @@ class Feature(NamedTuple):
     name: str
     words: str  # in messages
     instead: str = ""  # what to use instead of the option
-    place: Place | None = None
+    mark: Mark | None = None
 
 
 class Restrictions(NamedTuple):
@@ -74,7 +74,7 @@ class Restrictions(NamedTuple):
         instead = ", ".join(known[:-1]) + " or " * (len(known) > 1) + "".join(known[-1:])
         return ScriptError(
             f"{subject.words} does not support {feature.words}",
-            place=feature.place or subject.place,
+            mark=feature.mark or subject.mark,
             expected=self.but.get(kind) or instead or feature.instead,
         )
 
@@ -97,7 +97,7 @@ class Advice(NamedTuple):
     reason: str
     cure: str
     share: float = inf
-    place: Any = None
+    mark: Any = None
 
     @property
     def code(self) -> str:
@@ -153,6 +153,6 @@ def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
                 share = numbers.get("share", inf)
                 if kind != "failure" or share > 1:
                     names = {"part": part, "owner": owner, "scene": scene, **numbers}
-                    place = numbers.get("place", getattr(owner or part, "place", None))
+                    mark = numbers.get("mark", getattr(owner or part, "mark", None))
                     name, reason, cure = (text.format(**names) for text in words)
-                    yield Advice(name, reason, cure, share, place)
+                    yield Advice(name, reason, cure, share, mark)

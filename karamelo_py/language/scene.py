@@ -10,7 +10,7 @@ class Scene(Protocol):
     console: Any
     settings: Any
     folder: Path
-    place: Any
+    mark: Any
     rehearsing: bool
     checking: bool
     interpreter: Any
@@ -45,7 +45,7 @@ class Scene(Protocol):
         """Let computes and fixes measure the present state."""
 
     def warn(
-        self, message: str, place: Any = None, hint: str | None = None, expected: str | None = None
+        self, message: str, mark: Any = None, hint: str | None = None, expected: str | None = None
     ) -> None:
         """Warn the user."""
 

@@ -92,7 +92,7 @@ def call(
 ) -> Any:
     """Call a command or make a style from script arguments; store their values in `converted`.
 
-    `name` is ``run``, or ``fix body_force``. ScriptError, with a place, for anything wrong in the
+    `name` is ``run``, or ``fix body_force``. ScriptError, with a mark, for anything wrong in the
     arguments or the target.
     """
     try:
@@ -133,8 +133,8 @@ def call(
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
-                wrong.place, wrong.hint = gap.place, f"is a comma missing in '{gap.text}'?"
-            wrong.place = wrong.place or explain.guilty(wrong, arguments, bound)
+                wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"
+            wrong.mark = wrong.mark or explain.guilty(wrong, arguments, bound)
             wrong.command = wrong.command or name
         raise
 
@@ -165,7 +165,7 @@ def remade(
             if word not in expected:
                 raise ScriptError(
                     f"{name} has no '{word}'" if word else f"'{argument.text}' has no name",
-                    place=argument.place,
+                    mark=argument.mark,
                     expected=", ".join(f"{n}=..." for n in expected),
                     hint=meant(word, expected),
                 )
@@ -179,7 +179,7 @@ def remade(
         last = {n: values[n] for n in names[names.index(several) + 1 :] if n in values}
         return make(target, hub, name, *first, *values.get(several, ()), **last), values
     except ScriptError as error:
-        error.place = error.place or explain.guilty(error, arguments, bound)
+        error.mark = error.mark or explain.guilty(error, arguments, bound)
         error.command = error.command or name
         raise
 
@@ -212,7 +212,7 @@ def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) ->
         if not is_class and not registry.is_foreign(target):
             raise  # a fault of the program
         where = "__init__" if is_class else "it"
-        raise faults.of_style(error, name, where, target, hub.place) from error
+        raise faults.of_style(error, name, where, target, hub.mark) from error
 
 
 def _bind(
@@ -235,7 +235,7 @@ def _bind(
         elif word not in by_name:
             raise explain.unknown_keyword(word, argument, expected)
         elif word in bound:
-            raise ScriptError(f"{word} is given twice", place=argument.place)
+            raise ScriptError(f"{word} is given twice", mark=argument.mark)
         else:
             bound[word] = [value]
     needed = sum(not (p.optional or p.variadic) for p in slots)
@@ -255,7 +255,7 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
     except Unfit as unfit:
         raise explain.misfit(parameter, argument, number, unfit) from None
     except ScriptError as error:
-        error.place = error.place or argument.place
+        error.mark = error.mark or argument.mark
         error.expected = error.expected or f"{parameter.name}: {parameter.kind.text}"
         raise
 

@@ -37,7 +37,7 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
     return ScriptError(message, expected=expected, hint=hint, code=code)
 
 
-def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptError:
+def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptError:
     commands = registry.names("command")
     kind = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) if statement else None
@@ -45,7 +45,7 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
         message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"
         hint, code = f"{name}*(...)", "unknown-command"
-        return ScriptError(message, place=place, expected=expected, hint=hint, code=code)
+        return ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
     shown = commands if statement else sorted(FUNCTIONS)
     callables = commands if statement else [*FUNCTIONS, *commands]
     return ScriptError(
@@ -53,33 +53,33 @@ def unknown_call(script: Any, name: str, place: Any, statement: bool) -> ScriptE
         code="unknown-command",
         name=name,
         kind=kind,
-        place=place,
+        mark=mark,
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
         hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, callables),
     )
 
 
-def no_value(name: str, place: Any) -> ScriptError:
+def no_value(name: str, mark: Any) -> ScriptError:
     message, hint = f"{name}(...) gives no value", f"{name}(...) goes on a separate line"
     expected = "a function, or a command that gives a value, such as value(...)"
-    return ScriptError(message, place=place, expected=expected, hint=hint)
+    return ScriptError(message, mark=mark, expected=expected, hint=hint)
 
 
-def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
+def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
     kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
         expected = "a number or formula; NULL, INF and EDGE are arguments by themselves"
-        return ScriptError(f"{name} is not a number", place=place, expected=expected)
+        return ScriptError(f"{name} is not a number", mark=mark, expected=expected)
     if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
         message = f"'{name}' is a {kind} and needs parentheses"
-        return ScriptError(message, place=place, expected=expected)
-    if other := _not_published(script, name, place) or defined_later(script, name, place):
+        return ScriptError(message, mark=mark, expected=expected)
+    if other := _not_published(script, name, mark) or defined_later(script, name, mark):
         return other
     if name == "i":
         return ScriptError(
             "'i' is the number of a point in Karamelo, which no formula knows here",
-            place=place,
+            mark=mark,
             expected="a formula of positions",
             hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
         )
@@ -87,7 +87,7 @@ def unknown_name(script: Any, name: str, place: Any) -> ScriptError:
     hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])
     return ScriptError(
         f"unknown name '{name}'",
-        place=place,
+        mark=mark,
         code="unknown-name",
         name=name,
         alike=alike,
@@ -134,13 +134,13 @@ def _publishing(script: Any) -> Iterator[tuple[str, str, Any]]:
             yield catalogue.kind, ID, item
 
 
-def _not_published(script: Any, name: str, place: Any) -> ScriptError | None:
+def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
     for kind, ID, item in _publishing(script):
         if name in (ID, f"{ID}_{name[-1]}"):
             names = [f"{ID}_{s}" if s else ID for s in item.published]
             return ScriptError(
                 f"{kind} {item.style} publishes {', '.join(names) or 'nothing'}, not {name}",
-                place=place,
+                mark=mark,
                 hint=meant(name, names) or (f"did you mean '{names[0]}'?" if names else None),
             )
     return None
@@ -153,7 +153,7 @@ def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, in
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
-            line = statement.place.line
+            line = statement.mark.line
             if isinstance(statement, Assignment):
                 yield statement, "", statement.name, line
             elif isinstance(statement, CommandCall) and statement.arguments:
@@ -176,7 +176,7 @@ def _needs(script: Any, name: str, other: str) -> bool:
     return other in reached
 
 
-def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
+def defined_later(script: Any, name: str, mark: Any) -> ScriptError | None:
     ID = re.sub(r"_[^_]+$", "", name)
     assigned = script.statement.name if isinstance(script.statement, Assignment) else ""
     for statement, kind, made, line in _ahead(script, back=1):
@@ -188,13 +188,13 @@ def defined_later(script: Any, name: str, place: Any) -> ScriptError | None:
         else:
             continue
         hint = f"move line {line} up"
-        if statement.place == script.hub.place:
+        if statement.mark == script.hub.mark:
             where, hint = f"it is set in this very line {line}", "give it a value first"
         elif assigned and _needs(script, name, assigned):
             hint = f"'{assigned}' and '{name}' need each other: set one of them without the other"
         expected = f"a name that is known here; {where}"
         code = "used-before-defined"
-        return ScriptError(message, place=place, expected=expected, hint=hint, code=code)
+        return ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
     return None
 
 
@@ -243,7 +243,7 @@ def in_own_words(script: Any, name: str) -> str | None:
     method = next((call for call in calls if call.name == "method"), None)
     asked = [c for c in (script.statement, *calls) if isinstance(c, CommandCall) and c.name == name]
     before, rest = words_of(method), words_of(asked[0] if asked else None)
-    where = f"instead of line {method.place.line}" if method else "before the first solid"
+    where = f"instead of line {method.mark.line}" if method else "before the first solid"
     if name == "method_modify" and rest:
         if registry.knows("method", rest[0]):
             before, rest = [rest[0], *before[1:]], rest[1:] or before[1:] or ["FLIP"]

@@ -304,7 +304,7 @@ class ColumnFormula:
         of_both = [name for name in sets if name in columns or argument.knows(name)]
         if clash := set(of_both).intersection(re.findall(r"[^\W\d]\w*", argument.text)):
             message = f"'{min(clash)}' is a group or solid, and a column or another value, too"
-            raise ScriptError(message, place=argument.place, hint="rename the group or solid")
+            raise ScriptError(message, mark=argument.mark, hint="rename the group or solid")
         names = [*columns, *(name for name in sets if name not in of_both)]
         self.hub, self.text = hub, argument.text
         self.formula = Expression(argument.value_with(names))
@@ -313,14 +313,14 @@ class ColumnFormula:
             if name in hub.interpreter.variables:
                 hub.warn(
                     f"'{name}' is the column here, not the variable of the script",
-                    place=argument.part(name).place,
+                    mark=argument.part(name).mark,
                     hint=f"another name for the variable, such as {name}_0, if it is meant",
                 )
         if not self.columns or len(self.columns) > self.MOST:
             many = "no column" if not self.columns else f"{len(self.columns)} columns"
             raise ScriptError(
                 f"'{argument.text}' has {many} of dump particle",
-                place=argument.place,
+                mark=argument.mark,
                 expected=f"1 to {self.MOST} of {', '.join(columns)}",
             )
 

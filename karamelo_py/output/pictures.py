@@ -96,7 +96,7 @@ class DrawnPoints(Artist):
         if many:  # rasterised in .pdf and .svg, too: viewers cannot show as many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
-            self.picture.place(self.rows[:, first : first + MARKS])
+            self.picture.draw(self.rows[:, first : first + MARKS])
             artist.draw(renderer)
         if many:
             renderer.stop_rasterizing()
@@ -138,7 +138,7 @@ class Picture:
     _prepare: Callable[[], Any]  # sets up the axes; returns the artist of the points
     # Visible rows of points x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
-    place: Callable[[np.ndarray], None]  # passes visible points to the artist
+    draw: Callable[[np.ndarray], None]  # passes visible points to the artist
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
@@ -416,7 +416,7 @@ class PlanePicture(Picture):
         lines = [line for tool in tools for line in tool.lines(*ends)]
         self.marks.lines.set_segments(lines + [line for x in bodies for line in outlines(x[:, :2])])
 
-    def place(self, rows: np.ndarray) -> None:
+    def draw(self, rows: np.ndarray) -> None:
         self.artist.set_offsets(rows[:2].T)
         self.artist.set_facecolors(self._colours_of(rows))
 
@@ -577,5 +577,5 @@ class LinePicture(Picture):
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
         return np.array([*x.T[:2], values])[:, np.argsort(ids)]
 
-    def place(self, rows: np.ndarray) -> None:
+    def draw(self, rows: np.ndarray) -> None:
         self.artist.set_data(rows[0], rows[2])

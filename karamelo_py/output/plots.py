@@ -11,7 +11,7 @@ from karamelo_py.output.files import savefig
 from karamelo_py.output.quantity import Quantity
 from karamelo_py.output.rhythm import ByTime, Rhythmic
 from karamelo_py.output.units import labelled
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Mark
 
 
 @dataclass(eq=False)
@@ -39,7 +39,7 @@ class Plots(dict[str, PlottedCurve]):
         self.hub = hub
         self.file: Path | None = None
         self.style = ""
-        self.place: Place | None = None
+        self.mark: Mark | None = None
 
     def add(self, ID: str, curve: PlottedCurve) -> None:
         curve.id = ID

@@ -48,8 +48,8 @@ class Quantity:
                 return cls(hub, text)
             return cls(hub, text, argument.value(hub))
         except ScriptError as error:
-            if error.place is None:
-                error.place = argument.place
+            if error.mark is None:
+                error.mark = argument.mark
             if error.code == "unknown-name" and error.name == text:
                 error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
                 if error.alike != "time":
@@ -116,7 +116,7 @@ class Caption:
             try:
                 self.quantities[piece] = Quantity.from_script(hub, argument)
             except ScriptError as error:
-                error.place, error.argument = None, "title"
+                error.mark, error.argument = None, "title"
                 error.message = f"{{{piece}}} in {option}: {error.message}"
                 ways = f"or mathematics in dollars ($v_{{max}}$), or {{{{{piece}}}}} for braces"
                 error.expected = f"{error.expected or 'a formula'}, {ways}"

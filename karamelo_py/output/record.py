@@ -18,7 +18,7 @@ from typing import Any
 
 import karamelo_py
 from karamelo_py.output.files import folder_of_discarded, write_whole
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 SCHEMA = 1
 NAME = "run.json"
@@ -82,26 +82,26 @@ class RunRecord:
         self._write()
 
     def warn(
-        self, text: str, hint: str | None, place: Place | None, code: str = "", cause: str = ""
+        self, text: str, hint: str | None, mark: Mark | None, code: str = "", cause: str = ""
     ) -> None:
-        self._note("warning", text, place, hint=hint, code=code, cause=cause)
+        self._note("warning", text, mark, hint=hint, code=code, cause=cause)
 
     def end(self, status: str, error: BaseException | None = None) -> None:
         self.content["status"] = status
         if isinstance(error, ScriptError):
             fields = {"code": error.code, "cause": error.cause, "resume": error.resume}
             fields["rendered"] = error.render()
-            self._note("error", error.sentence, error.place, hint=error.hint, **fields)
+            self._note("error", error.sentence, error.mark, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
         # In Python each command ends here; few change anything.
         if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
-    def _note(self, kind: str, text: str, place: Place | None, **optional: str | None) -> None:
+    def _note(self, kind: str, text: str, mark: Mark | None, **optional: str | None) -> None:
         note: Json = {"kind": kind, "text": text}
-        if place is not None:
-            note["place"] = {"file": place.file, "line": place.line, "column": place.column}
+        if mark is not None:
+            note["place"] = {"file": mark.file, "line": mark.line, "column": mark.column}
         self.messages.append(note | {name: of for name, of in optional.items() if of})
 
     def _write(self) -> None:

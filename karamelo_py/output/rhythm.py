@@ -7,7 +7,7 @@ from typing import Annotated
 from karamelo_py.language.kinds import Positive, Unfit, kind_of
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Mark
 
 _BY_TIME = re.compile(r"time\s*\((.*)\)")
 _STEPS = kind_of(Annotated[int, Positive])
@@ -31,7 +31,7 @@ class Rhythmic:
     every: int | ByTime
     last_step: int | None = None
     style = ""  # of a dump
-    place: Place | None = None
+    mark: Mark | None = None
 
     def write(self) -> None:
         raise NotImplementedError
@@ -67,7 +67,7 @@ class Every:
         try:
             return ByTime(_SPAN.convert(hub, span))
         except Unfit as unfit:
-            unfit.place = unfit.place or span.place
+            unfit.mark = unfit.mark or span.mark
             raise
 
 

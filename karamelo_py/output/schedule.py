@@ -12,7 +12,7 @@ from karamelo_py.output.log import Log
 from karamelo_py.output.plots import Plots
 from karamelo_py.output.rhythm import ByTime, Rhythmic, is_due, next_step
 from karamelo_py.output.units import Units
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 RESTART = "restart"
 
@@ -72,7 +72,7 @@ class Output:
         if self.plots.file is not None and not self.plots:
             self.hub.warn(
                 f"{self.plots.file} will not be drawn: there is nothing to plot",
-                place=self.plots.place,
+                mark=self.plots.mark,
                 hint="plot(ID, every, x, y) gives a curve",
             )
         self.log.begin()
@@ -150,20 +150,20 @@ class Output:
 
 @contextmanager
 def _reported(item: Rhythmic | Plots, hook: str) -> Iterator[None]:
-    naming = as_script_error(f"dump {item.style}", hook, type(item), item.place)
+    naming = as_script_error(f"dump {item.style}", hook, type(item), item.mark)
     try:
         with naming if item.style else nullcontext():
             yield
     except ScriptError as error:
-        raise _located(error, item.place) from error.__cause__
+        raise _located(error, item.mark) from error.__cause__
     except OSError as error:
         said = f"cannot write {error.filename or 'a file'}: {error.strerror or error}"
-        raise _located(ScriptError(said), item.place) from error
+        raise _located(ScriptError(said), item.mark) from error
 
 
-def _located(error: ScriptError, place: Place | None) -> ScriptError:
-    if error.place is None and place is not None:
-        error.place = place
+def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
+    if error.mark is None and mark is not None:
+        error.mark = mark
         error.complete = True
     return error
 

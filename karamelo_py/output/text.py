@@ -196,7 +196,7 @@ def _without_zeros(word):
 def _put_eight(text, at, word):
     def codegen(builder, array, at, number):
         data = llvm.ArrayParts(builder, text, array).data
-        place = builder.bitcast(builder.gep(data, [at]), ir.IntType(64).as_pointer())
-        builder.store(number, place, align=1)
+        pointer = builder.bitcast(builder.gep(data, [at]), ir.IntType(64).as_pointer())
+        builder.store(number, pointer, align=1)
 
     return types.void(text, types.int64, types.int64), codegen

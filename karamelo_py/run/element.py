@@ -287,7 +287,7 @@ class Point:
         return min(forms, key=stored)
 
     def _flat(self, gradient: np.ndarray) -> tuple:
-        return tensor(self.kin, [float(gradient[place]) for place in self.kin.Tensor.places])
+        return tensor(self.kin, [float(gradient[index]) for index in self.kin.Tensor.places])
 
     def _accept(self, state: tuple, increment: np.ndarray) -> None:
         weights = np.where(np.arange(6) < 3, 1, 2)

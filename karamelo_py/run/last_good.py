@@ -116,7 +116,7 @@ class LastGood(NamedTuple):
             yield
         except ScriptError as error:
             hub = self.hub
-            hub.warn(error.message, hint=error.hint, place=error.place)
+            hub.warn(error.message, hint=error.hint, mark=error.mark)
             if hub.settings.comm.size > 1:
                 hub.settings.comm.failed_within = True
                 raise OthersWait from None

@@ -126,7 +126,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
     d = kin.dimension
     coordinates = places[:, direction::d] if places.shape[1] > d else places[:, direction, None]
     _, first, back = np.unique(coordinates, axis=0, return_index=True, return_inverse=True)
-    lines = [along(basis, kin, grid, tuple(place), direction) for place in places[first]]
+    lines = [along(basis, kin, grid, tuple(mark), direction) for mark in places[first]]
     back = back.ravel()
     return _Line(
         np.array([int(one.first) for one in lines])[back],

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from karamelo_py.script.errors import Place
+from karamelo_py.script.errors import Mark
 
 
 class Trouble(NamedTuple):
@@ -13,7 +13,7 @@ class Trouble(NamedTuple):
     fix: str
     code: str
     cause: str = ""
-    place: Place | None = None
+    mark: Mark | None = None
 
 
 def when(simulation: Any, later: int = 0) -> str:

@@ -70,7 +70,7 @@ def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
         "a formula that is a number at all times and places of the run, such as by max(a, b) or "
         "if(condition, a, b)",
         "not-a-number",
-        place=fix.place,
+        mark=fix.mark,
     )
 
 
@@ -79,4 +79,4 @@ def endless_speed(simulation: SceneState) -> ScriptError:
     message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
     hint = "look for a formula that gives NaN or infinity, such as a division by zero"
     trouble = no_number(simulation, message, hint)
-    return ScriptError(trouble.message, place=trouble.place, hint=trouble.fix, code=trouble.code)
+    return ScriptError(trouble.message, mark=trouble.mark, hint=trouble.fix, code=trouble.code)

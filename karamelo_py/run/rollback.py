@@ -154,7 +154,7 @@ class RollBack:
             else:
                 resume = last.keep(status, trouble.code)
             kind = Stopped
-        error = kind(trouble.message, place=trouble.place, hint=trouble.fix)
+        error = kind(trouble.message, mark=trouble.mark, hint=trouble.fix)
         error.code, error.cause, error.resume = trouble.code, trouble.cause, resume
-        error.complete = trouble.place is not None
+        error.complete = trouble.mark is not None
         raise error

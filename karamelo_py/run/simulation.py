@@ -55,7 +55,7 @@ class Simulation(SceneArrays):
         for solid in hub.solids.values():
             if solid.initial and (previous is None or solid.first_id >= previous.count):
                 ids = np.arange(solid.first_id, solid.first_id + solid.count)
-                set_columns(self, solid.initial, ids, solid.place)
+                set_columns(self, solid.initial, ids, solid.mark)
 
     @cached_property
     def light_nodes(self) -> float:

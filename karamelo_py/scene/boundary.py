@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
 from karamelo_py.language.scene import Scene
 from karamelo_py.scene.solid import named
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 PERIODIC = Restrictions(
     "periodic", "no boundary(periodic)",
@@ -45,18 +45,18 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
         hub.warn(
             f"step {step + 1}, time {simulation.time:.6g}: {named(hub, gone[0])} "
             "leaves the domain and is deleted; more are only counted",
-            place=hub.update.boundary_place,
+            mark=hub.update.boundary_mark,
         )
     if not simulation.present.any():
         raise ScriptError(
             f"step {step + 1}, time {simulation.time:.6g}: all points have left the domain",
-            place=hub.update.boundary_place,
+            mark=hub.update.boundary_mark,
             hint="a shorter run, or a larger domain",
         )
     return True
 
 
-def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, float]:
+def take_away(hub: Scene, ids: np.ndarray, mark: Mark | None) -> tuple[float, float]:
     """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
     simulation = hub.simulation
     for fix in hub.fixes.values():
@@ -64,13 +64,13 @@ def take_away(hub: Scene, ids: np.ndarray, place: Place | None) -> tuple[float, 
         if body and ((ids >= body.first_id) & (ids < body.first_id + body.count)).any():
             raise ScriptError(
                 f"points of '{body.id}' cannot be deleted: fix '{fix.id}' moves it as a rigid body",
-                place=place,
+                mark=mark,
                 hint=f"a group without points of '{body.id}', or delete_fix({fix.id})",
             )
     if len(ids) == np.count_nonzero(simulation.present):
         raise ScriptError(
             f"step {simulation.step}, time {simulation.time:.6g}: no point would be left",
-            place=place,
+            mark=mark,
             hint="a condition that some points do not meet, or another group",
         )
     return simulation.remove(ids)

@@ -11,7 +11,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import words_of
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.lattice import RELATIVE_TOLERANCE, Lattice
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 NO_F_BAR = {"F-bar": "no anti_volumetric_locking: thin bodies do not lock"}
 THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
@@ -26,7 +26,7 @@ class Domain:
 
     thin = False
     thickness = 1.0  # in 2D; cross-section in 1D
-    place: Place | None = None
+    mark: Mark | None = None
     periodic: tuple[int, ...] = ()  # directions
     node_fields: tuple[type, ...] = ()
 

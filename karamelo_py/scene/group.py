@@ -62,7 +62,7 @@ class AnyGroup(Named):
         if not isinstance(group, cls):
             raise ScriptError(
                 f"group '{group.id}' is a group of {group.kind}",
-                place=argument.place,
+                mark=argument.mark,
                 expected=f"a group of {cls.kind}",
                 hint=f"all, or group({group.id}_{cls.kind}, {cls.kind}, region, ...)",
             )

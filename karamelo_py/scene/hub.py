@@ -20,12 +20,12 @@ from karamelo_py.scene.domain import Domain, no_domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.schemes.musl import MUSL
-from karamelo_py.script.errors import Place, ScriptError, meant, render_message
+from karamelo_py.script.errors import Mark, ScriptError, meant, render_message
 from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts in creation order, with ``id`` and ``place``."""
+    """Named parts in creation order, with ``id`` and ``mark``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -35,13 +35,13 @@ class Catalogue(dict):
     def add(self, ID: str, item: Any, *, replace: bool = False) -> Any:
         if not replace:
             self.refuse(ID)
-        item.id, item.place = ID, self.hub.place
+        item.id, item.mark = ID, self.hub.mark
         self[ID] = item
         return item
 
     def refuse(self, ID: str) -> None:
         if ID in self:
-            before = self[ID].place
+            before = self[ID].mark
             where = f" (line {before.line})" if before else ""
             raise ScriptError(
                 f"ID '{ID}' is already used{where}",
@@ -116,16 +116,16 @@ class Update:
         self.method: Any = None
         self.transfer: Any = None
         self.scheme: Any = MUSL()
-        self.scheme_place: Place | None = None
+        self.scheme_mark: Mark | None = None
         self.scheme_behind = 0  # runs before it was chosen
         self.thermal = False
         self.anti_locking = False  # F-bar
         self.half_start = False  # the first kick lasts half a step
         self.fixed_dt: float | None = None  # set_dt; None: adaptive
         self.dt_factor: float | None = None  # of the stable step; None: automatic
-        self.dt_place: Place | None = None
+        self.dt_mark: Mark | None = None
         self.boundary = "error"
-        self.boundary_place: Place | None = None
+        self.boundary_mark: Mark | None = None
         self.warned_of_bounces = False
         self.warned_of: list[str] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
@@ -180,7 +180,7 @@ class Hub:
         self.console = console or Console()
         self.settings = Settings()
         self.folder = Path.cwd()
-        self.place: Place | None = None
+        self.mark: Mark | None = None
         # Nothing runs and nothing is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
@@ -275,14 +275,14 @@ class Hub:
         for catalogue in (self.computes, self.fixes):
             for item in catalogue.values():
                 name = f"{catalogue.kind} {item.style}"
-                with as_script_error(name, "refresh", type(item), item.place):
+                with as_script_error(name, "refresh", type(item), item.mark):
                     item.refresh()
                 if catalogue is self.computes and item.published and not item.has_published:
                     item.has_published = True
                     self.warn(
                         f"{name} has measured and published nothing: "
                         f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
-                        item.place,
+                        item.mark,
                         hint="its author calls self.publish in refresh, or says published = ()",
                     )
         # A plug-in's compute may use random numbers.
@@ -291,7 +291,7 @@ class Hub:
     def warn(
         self,
         message: str,
-        place: Place | None = None,
+        mark: Mark | None = None,
         hint: str | None = None,
         expected: str | None = None,
         *,
@@ -300,9 +300,9 @@ class Hub:
     ) -> None:
         """Warn and record the warning, except in a rehearsal."""
         if not self.rehearsing:
-            self.record.warn(message, hint, place or self.place, code, cause)
+            self.record.warn(message, hint, mark or self.mark, code, cause)
             text = render_message(
-                "warning", message, place or self.place, expected, hint, code=code, cause=cause
+                "warning", message, mark or self.mark, expected, hint, code=code, cause=cause
             )
             self.warned.append((self.update.time, text))
             self.console.warn(text)
@@ -326,16 +326,16 @@ class Hub:
         if curve is not None and rehearsed.output.plots.file is None and not self.open_ended:
             self.warn(
                 f"plot '{curve.id}' is drawn nowhere: the script has no save_plot",
-                curve.place,
+                curve.mark,
                 hint="save_plot(curves.png)",
             )
         seen = {id(item) for item in rehearsed.in_runs}
         for item in () if self.open_ended else rehearsed.lasting():
-            if id(item) not in seen and item.place is not None:
+            if id(item) not in seen and item.mark is not None:
                 kind = next((c.kind for c in rehearsed.catalogues if item.id in c), "plot")
                 self.warn(
                     f"{kind} '{item.id}' comes after the last run, and does nothing",
-                    place=item.place,
+                    mark=item.mark,
                     hint="define it before the run that needs it",
                 )
 

@@ -25,7 +25,7 @@ from karamelo_py.language.scene import Scene
 from karamelo_py.output.units import NUMBER
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
-from karamelo_py.script.errors import Place, ScriptError, plural
+from karamelo_py.script.errors import Mark, ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import SUFFIXES
 
@@ -52,7 +52,7 @@ class Publisher:
     hub: Scene
     id: str = ""
     style: str = ""
-    place: Place | None = None
+    mark: Mark | None = None
     columns: Sequence[str] = ()  # dump columns that it reads
     # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
@@ -181,7 +181,7 @@ class Fix(Publisher):
     def _attributed(self, name: str, hook: Callable) -> Callable:
         @wraps(hook)
         def call(view: Any) -> None:
-            with as_script_error(f"fix {self.style}", name, type(self), self.place):
+            with as_script_error(f"fix {self.style}", name, type(self), self.mark):
                 hook(view)
                 view.write_back()
 

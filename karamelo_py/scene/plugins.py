@@ -37,7 +37,7 @@ from karamelo_py.points.laws import LawTraits, law_traits
 from karamelo_py.points.transfers import TransferTraits, updated_velocity
 from karamelo_py.scene.modify import Fix
 from karamelo_py.schemes.traits import SchemeTraits
-from karamelo_py.script.errors import FAILURES, Place
+from karamelo_py.script.errors import FAILURES, Mark
 from karamelo_py.script.values import in_a_row
 
 SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
@@ -50,8 +50,8 @@ ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelli
 def check_fix(hub: Scene, fix: Fix) -> None:
     name = f"fix {fix.style}"
     for error in _wrong_hooks(fix):
-        raise faults.fault(name, error, fix.place)
-    check_fields(hub, name, fix, fix.place)
+        raise faults.fault(name, error, fix.mark)
+    check_fields(hub, name, fix, fix.mark)
     hooks = fix.hooks()
     for method in dir(type(fix)):
         other = hasattr(Fix, method) or method in STAGES or method.startswith("_")
@@ -124,7 +124,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
                 )
             continue
         gives = len(hook.signature.return_type)
-        with faults.as_script_error(f"fix {fix.style}", moment, function, fix.place):
+        with faults.as_script_error(f"fix {fix.style}", moment, function, fix.mark):
             try:
                 result = function(*[1.0] * takes)
             except (ArithmeticError, ValueError):
@@ -198,8 +198,8 @@ def check_part(hub: Scene, name: str, part: object) -> None:
         elif not any(isinstance(row, table.Scatter) for row in kind.rows):
             error = "none of its rows is a Scatter: nothing reaches the grid"
     if error:
-        raise faults.fault(name, error, hub.place)
-    check_fields(hub, name, part, hub.place)
+        raise faults.fault(name, error, hub.mark)
+    check_fields(hub, name, part, hub.mark)
 
 
 def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
@@ -214,31 +214,31 @@ def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
     return ""
 
 
-def check_fields(hub: Scene, name: str, owner: object, place: Place | None) -> None:
+def check_fields(hub: Scene, name: str, owner: object, mark: Mark | None) -> None:
     for attribute in ("point_fields", "node_fields"):
         kinds = fields_of(owner, attribute)
         if not isinstance(kinds, tuple):
             error = f"{attribute} has to be a tuple of classes, as in ({_shown(kinds)},)"
-            raise faults.fault(name, error, place)
+            raise faults.fault(name, error, mark)
         for kind in kinds:
             field = f"the field {_shown(kind)}"
-            with faults.as_script_error(name, field, kind, place):
+            with faults.as_script_error(name, field, kind, mark):
                 error = _wrong_field(kind) or _wrong_size(kind, hub.domain)
             if error:
-                raise faults.fault(name, f"{field}{error}", place)
+                raise faults.fault(name, f"{field}{error}", mark)
             for column in columns_of(kind):
                 if shows := _shows(hub, column, kind, attribute):
                     error = f"{kind.__name__}: the column '{column}' is {shows}"
-                    raise faults.fault(name, error, place)
+                    raise faults.fault(name, error, mark)
 
 
 def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
     kind = type(law)
     if registry.is_foreign(kind) and (error := _wrong_traits(kind, law_traits(law), LawTraits)):
-        raise faults.fault(name, error, hub.place)
+        raise faults.fault(name, error, hub.mark)
     for column in laws.columns_of(law):
         if shows := _shows(hub, column, None):
-            raise faults.fault(name, f"the column '{column}' is {shows}", hub.place)
+            raise faults.fault(name, f"the column '{column}' is {shows}", hub.mark)
 
 
 def _wrong_field(kind: Any) -> str:
@@ -282,28 +282,28 @@ def _shown(kind: object) -> str:
 class PartInUse(NamedTuple):
     name: str
     kind: type
-    place: Place | None
+    mark: Mark | None
 
 
 def foreign_parts(hub: Scene) -> list[PartInUse]:
     update, method = hub.update, hub.update.method
     parts = [
-        PartInUse(f"{of.kind} {item.style}", type(item), item.place)
+        PartInUse(f"{of.kind} {item.style}", type(item), item.mark)
         for of in (hub.fixes, hub.computes, hub.dumps)
         for item in of.values()
     ]
     parts += [
-        PartInUse(f"{of.kind} {item.style}", type(item.laws[of.kind]), item.place)
+        PartInUse(f"{of.kind} {item.style}", type(item.laws[of.kind]), item.mark)
         for of in (hub.materials, *hub.parts.values())
         for item in of.values()
     ]
-    tags = [("scheme", update.scheme, update.scheme_place)]
+    tags = [("scheme", update.scheme, update.scheme_mark)]
     if method is not None:
         tags_of_method = {"transfer": update.transfer, "basis": method.basis, "method": method}
-        tags = [*((family, tag, method.place) for family, tag in tags_of_method.items()), *tags]
+        tags = [*((family, tag, method.mark) for family, tag in tags_of_method.items()), *tags]
     parts += [
-        PartInUse(f"{family} {registry.name_of(family, type(tag))}", type(tag), place)
-        for family, tag, place in tags
+        PartInUse(f"{family} {registry.name_of(family, type(tag))}", type(tag), mark)
+        for family, tag, mark in tags
         if registry.is_foreign(type(tag))
     ]
     return [part for part in parts if registry.is_foreign(part.kind)]
@@ -322,15 +322,15 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
             suspects = [(part, "") for part in foreign if part.kind in error.classes]
         else:
             places = [(_owner(foreign, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
-            suspects = [(part, place) for part, place in places if part is not None]
+            suspects = [(part, mark) for part, mark in places if part is not None]
         suspects += [(usual, "")] if usual else []
         if not suspects:
             raise
-        part, place = suspects[0]
-        if not (place or isinstance(error, Undefined)):  # report the line that called it
-            place = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
-        cause = f"{faults.cause_of(error)}{place}"
-        raise faults.fault(part.name, cause, part.place, faults.TRACEBACK) from error
+        part, mark = suspects[0]
+        if not (mark or isinstance(error, Undefined)):  # report the line that called it
+            mark = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
+        cause = f"{faults.cause_of(error)}{mark}"
+        raise faults.fault(part.name, cause, part.mark, faults.TRACEBACK) from error
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:

@@ -36,7 +36,7 @@ from karamelo_py.output.point_table import (
 )
 from karamelo_py.points.laws import can, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import NoItem, Place, ScriptError, nearest
+from karamelo_py.script.errors import Mark, NoItem, ScriptError, nearest
 
 
 class Shown:
@@ -503,7 +503,7 @@ def set_columns(
     simulation: Any,
     columns: Mapping[str, ArrayLike],
     ids: np.ndarray | None = None,
-    place: Place | None = None,
+    mark: Mark | None = None,
 ) -> None:
     """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
 
@@ -517,14 +517,14 @@ def set_columns(
         wanted = f"is a number, or one for each of {len(ids)} points"
         if array.shape not in ((), ids.shape):
             raise ScriptError(
-                f"'{name}' {wanted}, not an array of the shape {array.shape}", place=place
+                f"'{name}' {wanted}, not an array of the shape {array.shape}", mark=mark
             )
         if not np.isfinite(array).all():
-            raise ScriptError(f"'{name}' has numbers that are not finite", place=place)
+            raise ScriptError(f"'{name}' has numbers that are not finite", mark=mark)
         try:
             view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
         except ScriptError as error:
-            error.place = error.place or place
+            error.mark = error.mark or mark
             raise
     if view.moved:
         simulation.tiles.unsort(simulation.control)

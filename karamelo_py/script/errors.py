@@ -1,4 +1,4 @@
-"""Errors of a script, with their place in the text and a fix."""
+"""Errors of a script, with their location in the text and a fix."""
 
 import difflib
 import re
@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 _WIDEST_LINE = 160
 
 
-class Place(NamedTuple):
-    """`line` and `column` count from 1; `text` is the source line."""
+class Mark(NamedTuple):
+    """Location in a script: `line` and `column` count from 1; `text` is the source line."""
 
     file: str
     line: int
@@ -52,7 +52,7 @@ class ScriptError(Exception):
         What is wrong, in one sentence without a full stop.
     argument
         Name or index of the wrong argument (from 0; negative from the last one without a name);
-        `karamelo_py.language.signature.call` converts it to a place.
+        `karamelo_py.language.signature.call` converts it to a mark.
     expected
         What would be correct.
     hint
@@ -61,13 +61,13 @@ class ScriptError(Exception):
 
     message: str
     _: KW_ONLY
-    place: Place | None = None
+    mark: Mark | None = None
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
     # Prepended to the message.
     command: str | None = None
-    included: list[Place] = field(default_factory=list)
+    included: list[Mark] = field(default_factory=list)
     others: "list[ScriptError]" = field(default_factory=list)
     # Of syntax errors: the correct statements.
     statements: list = field(default_factory=list)
@@ -92,17 +92,17 @@ class ScriptError(Exception):
     def render(self) -> str:
         physics = {"code": self.code, "cause": self.cause, "resume": self.resume}
         text = render_message(
-            "error", self.sentence, self.place, self.expected, self.hint, **physics
+            "error", self.sentence, self.mark, self.expected, self.hint, **physics
         )
-        for place in self.included:
-            text += f"\n{place.file}:{place.line}: the script above is included here"
+        for mark in self.included:
+            text += f"\n{mark.file}:{mark.line}: the script above is included here"
         return "\n\n".join([text, *(error.render() for error in self.others)])
 
 
 def render_message(
     kind: str,
     message: str,
-    place: Place | None = None,
+    mark: Mark | None = None,
     expected: str | None = None,
     hint: str | None = None,
     *,
@@ -116,8 +116,8 @@ def render_message(
     """
     physics = bool(code) and not codes().get(code, {}).get("script")
     lines = [f"{kind}: {message}"]
-    if place is not None:
-        lines = [f"{place.file}:{place.line}:{place.column}: {lines[0]}", *_marked(place)]
+    if mark is not None:
+        lines = [f"{mark.file}:{mark.line}:{mark.column}: {lines[0]}", *_marked(mark)]
     if expected:
         lines.append(f"expected: {expected}")
     if hint and not physics:
@@ -128,9 +128,9 @@ def render_message(
     return "\n".join(lines)
 
 
-def _marked(place: Place) -> list[str]:
-    text, start = place.text.rstrip(), place.column - 1
-    length = max(place.length, 1)
+def _marked(mark: Mark) -> list[str]:
+    text, start = mark.text.rstrip(), mark.column - 1
+    length = max(mark.length, 1)
     if len(text) > _WIDEST_LINE:
         cut = max(0, start - _WIDEST_LINE // 2)
         end = cut + _WIDEST_LINE
@@ -141,7 +141,7 @@ def _marked(place: Place) -> list[str]:
     # Tabs are copied to align the carets for any tab width.
     before = "".join(c if c == "\t" else " " * _width(c) for c in text[:start].ljust(start))
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
-    number = str(place.line)
+    number = str(mark.line)
     margin = " " * max(len(number), 5)
     # Control characters could garble the terminal.
     shown = re.sub(r"[^\t]", lambda c: c[0] if c[0].isprintable() else "\ufffd", text)

@@ -39,8 +39,8 @@ def evaluate(node: syntax.Node, raw: syntax.Raw, scope: NameScope) -> Value:
     return _function(node, raw, scope)
 
 
-def mark(raw: syntax.Raw, node: syntax.Node) -> Any:
-    return raw.source.place(raw.start + node.start, raw.start + node.end)
+def mark_of(raw: syntax.Raw, node: syntax.Node) -> Any:
+    return raw.source.mark(raw.start + node.start, raw.start + node.end)
 
 
 def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> Value:
@@ -64,14 +64,14 @@ def _texts(node: syntax.BinaryOperation, left: Value, right: Value, raw: syntax.
     guilty, text = (node.left, left) if isinstance(left, str) else (node.right, right)
     message = f"'{text}' is text, and '{node.operator}' needs numbers"
     expected = "a number; texts can be joined with + and compared with == and !="
-    raise ScriptError(message, place=mark(raw, guilty), expected=expected)
+    raise ScriptError(message, mark=mark_of(raw, guilty), expected=expected)
 
 
 def _numeric(node: syntax.Node, raw: syntax.Raw, scope: NameScope, user: str) -> float | Expression:
     value = evaluate(node, raw, scope)
     if isinstance(value, str):
         message = f"'{value}' is text, and {user} needs a number"
-        raise ScriptError(message, place=mark(raw, node), expected="a number")
+        raise ScriptError(message, mark=mark_of(raw, node), expected="a number")
     return value
 
 
@@ -83,7 +83,7 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
         wanted += plural(signature.least, "operand")
         message = f"{node.name} takes {wanted}, not {count}"
         expected = usage(node.name)
-        raise ScriptError(message, place=mark(raw, node), expected=expected, code="arguments")
+        raise ScriptError(message, mark=mark_of(raw, node), expected=expected, code="arguments")
     if node.name == "if":
         condition = _numeric(node.operands[0], raw, scope, "if")
         if isinstance(condition, float):
@@ -108,7 +108,7 @@ def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) ->
         try:
             return Expression(REWRITTEN.get(operation, partial(applied, operation))(*terms))
         except ScriptError as error:
-            error.place = mark(raw, node)
+            error.mark = mark_of(raw, node)
             raise
     try:
         return compute(operation, *values)
@@ -139,14 +139,14 @@ def _impossible(
         literal = isinstance(guilty, syntax.NumberLiteral)
         which = "" if literal else f": {raw.code[guilty.start : guilty.end]} is 0"
         message, expected = f"division by zero{which}", "a number other than 0"
-        place, code = mark(raw, guilty), "division-by-zero"
-        return ScriptError(message, place=place, expected=expected, code=code)
+        mark, code = mark_of(raw, guilty), "division-by-zero"
+        return ScriptError(message, mark=mark, expected=expected, code=code)
     if isinstance(error, OverflowError):
         message = f"the result of {_spelled(operation, shown)} is too large"
-        return ScriptError(message, place=mark(raw, node), expected="at most 1.8e308")
+        return ScriptError(message, mark=mark_of(raw, node), expected="at most 1.8e308")
     return ScriptError(
         f"{_spelled(operation, shown)} is not a real number",
-        place=mark(raw, operands[0] if len(operands) == 1 else node),
+        mark=mark_of(raw, operands[0] if len(operands) == 1 else node),
         expected=_DOMAINS.get(operation, "a finite result"),
     )
 

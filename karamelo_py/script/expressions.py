@@ -45,7 +45,7 @@ class Expression:
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(
-                f"'{value}' is text", place=argument.place, expected="a number or a formula"
+                f"'{value}' is text", push=argument.push, expected="a number or a formula"
             )
         return cls(value)
 
@@ -93,12 +93,12 @@ class Expression:
     def program(self, values: Values) -> formula.Program:
         """Program for present values."""
 
-        def place(name: str) -> tuple[int, int]:
+        def push(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
                 return formula.POINT, POINT_SEEDS.index(name)
             return formula.GLOBAL, values.slot(_published(name, values))
 
-        return terms.program(self._term, place)
+        return terms.program(self._term, push)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
         """Compile a formula without published numbers for a stack of this depth."""
@@ -130,7 +130,7 @@ class Expression:
         if not names:
             return np.array([self.evaluate(values)])
 
-        def place(name: str) -> tuple[int, int]:
+        def push(name: str) -> tuple[int, int]:
             if name in columns:
                 return formula.POINT, names.index(name)
             return formula.GLOBAL, values.slot(_published(name, values))
@@ -141,7 +141,7 @@ class Expression:
         out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
         now, before = (np.ascontiguousarray(part) for part in (rows[:, :3], rows[:, 3:]))
         formula.evaluate_all(
-            terms.program(self._term, place), values.array, now, before, out, scratch
+            terms.program(self._term, push), values.array, now, before, out, scratch
         )
         return out
 

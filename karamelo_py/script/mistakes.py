@@ -191,13 +191,13 @@ def _at_end(at: _Stop) -> Mistake:
     before = at.last
     if before is None:
         return Mistake("there is nothing here", 0, len(at.code), expected="an expression")
-    place = before.start_pos, before.end_pos
+    span = before.start_pos, before.end_pos
     if before.type in _OPERATORS:
         message = f"the expression ends after '{before}'"
-        return Mistake(message, *place, expected=f"{_VALUE} after '{before}'")
+        return Mistake(message, *span, expected=f"{_VALUE} after '{before}'")
     if at.opened:
         return open_parenthesis(at.code, at.opened[0])
-    return Mistake("the expression ends too early", *place, expected=_VALUE)
+    return Mistake("the expression ends too early", *span, expected=_VALUE)
 
 
 def _equals(at: _Stop) -> Mistake:
@@ -211,8 +211,8 @@ def _equals(at: _Stop) -> Mistake:
         return Mistake(f"'{before}=' is not known here", before.start_pos, at.end, expected, longer)
     if first.type == "NAME" and len(tokens) > 1 and tokens[1] == "(" and before == ")":
         formula = f"a formula needs no arguments: {first} = {rest}"
-        place = first.start_pos, before.end_pos
-        return Mistake("only a name can be left of '='", *place, expected, formula)
+        span = first.start_pos, before.end_pos
+        return Mistake("only a name can be left of '='", *span, expected, formula)
     hint = "compare with ==" if at.opened or len(tokens) == 1 else None
     if len(tokens) > 1 and all(token.type in ("NAME", "NUMBER", *_OPERATORS) for token in tokens):
         hint = "a name begins with a letter and has letters, digits and _ only"

@@ -86,20 +86,20 @@ def _tree(code: str) -> syntax.Node:
 
 def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> syntax.Statement:
     kind, name, start, end, parts = span
-    place = source.place(start, start + max(len(name), 1))
+    mark = source.mark(start, start + max(len(name), 1))
     whole = syntax.Raw(source, start, end)
     if kind == "call":
-        return syntax.CommandCall(place, whole, name, tuple(_arguments(source, name, parts)))
+        return syntax.CommandCall(mark, whole, name, tuple(_arguments(source, name, parts)))
     if kind == "evaluation":
-        return syntax.Evaluation(whole.place, whole, parse_expression(whole))
+        return syntax.Evaluation(whole.mark, whole, parse_expression(whole))
     begin, stop = parts
     right = syntax.Raw(source, begin, max(stop, begin))
     if not right.code.strip():
         message = f"nothing is assigned to '{name}'"
         expected = "a number, a text in quotes or an expression after the ="
         hint = f"{name} = 1"
-        raise ScriptError(message, code="syntax", place=whole.place, expected=expected, hint=hint)
-    return syntax.Assignment(place, whole, name, right, parse_expression(right))
+        raise ScriptError(message, code="syntax", mark=whole.mark, expected=expected, hint=hint)
+    return syntax.Assignment(mark, whole, name, right, parse_expression(right))
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
@@ -114,7 +114,7 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
             raise ScriptError(
                 f"{name}: argument {k + 1} is missing",
                 code="syntax",
-                place=source.place(*span(comma)),
+                mark=source.mark(*span(comma)),
                 expected=f"something {'after' if after else 'before'} this comma",
                 hint="leave the comma out, or write NULL where a component is not to be set",
             )
@@ -123,7 +123,7 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
             raise ScriptError(
                 f"{single[0]} is in single quotes",
                 code="syntax",
-                place=source.place(*single.span()),
+                mark=source.mark(*single.span()),
                 expected="text in double quotes",
                 hint=f'write "{single[1]}"{bare}',
             )

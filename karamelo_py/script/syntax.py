@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 # Quoted text comes first: a # in it starts no comment.
 _BLANKS = re.compile(r'"[^"\n]*"|\s+')
@@ -24,14 +24,14 @@ class Source:
     def _starts(self) -> list[int]:
         return [0] + [m.end() for m in re.finditer("\n", self.text)]
 
-    def place(self, start: int, end: int) -> Place:
+    def mark(self, start: int, end: int) -> Mark:
         start = min(max(start, 0), len(self.text))
         line = bisect_right(self._starts, start) - 1
         first = self._starts[line]
         last = self.text.find("\n", first)
         last = len(self.text) if last < 0 else last
         length = max(min(end, last) - start, 1)
-        return Place(self.file, line + 1, start - first + 1, length, self.text[first:last])
+        return Mark(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
         """The characters `start` to before `end`, with comments and line ends blanked."""
@@ -54,9 +54,9 @@ class Mistake(Exception):
     hint: str | None = None
 
     def error(self, source: Source, offset: int = 0) -> ScriptError:
-        place = source.place(offset + self.start, offset + self.end)
+        mark = source.mark(offset + self.start, offset + self.end)
         expected, hint = self.expected, self.hint
-        return ScriptError(self.message, place=place, expected=expected, hint=hint, code="syntax")
+        return ScriptError(self.message, mark=mark, expected=expected, hint=hint, code="syntax")
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,15 +116,15 @@ class Raw:
         return self.source.code(self.start, self.end)
 
     @property
-    def place(self) -> Place:
-        return self.source.place(self.start, self.end)
+    def mark(self) -> Mark:
+        return self.source.mark(self.start, self.end)
 
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """`place` marks its first word."""
+    """`mark` is the location of its first word."""
 
-    place: Place
+    mark: Mark
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:

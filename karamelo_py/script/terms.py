@@ -216,23 +216,23 @@ _MOST_LEVELS = 60
 
 
 def program(
-    root: Term, place: Callable[[str], tuple[int, int]], *, depth: int | None = None
+    root: Term, push: Callable[[str], tuple[int, int]], *, depth: int | None = None
 ) -> formula.Program:
     """Stack program of a term.
 
-    `place` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
+    `push` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
     the program stores no rows.
     """
-    return _Writer(root, place, depth).program()
+    return _Writer(root, push, depth).program()
 
 
 class _Writer:
     """Compiles one program; equal terms have the same number."""
 
-    def __init__(self, root: Term, place: Callable[[str], tuple[int, int]], depth: int | None):
+    def __init__(self, root: Term, push: Callable[[str], tuple[int, int]], depth: int | None):
         self.bare = depth is not None
         self.depth = depth or formula.MAX_DEPTH
-        self.place = place
+        self.push = push
         self.terms: list[tuple[str, tuple[int, ...], Any]] = []
         self.uses: list[int] = []
         self.uniform: list[bool] = []
@@ -262,7 +262,7 @@ class _Writer:
 
     def _is_uniform(self, operation: str, operands: tuple[int, ...], value: Any) -> bool:
         if operation == "name":
-            return self.place(value)[0] != formula.POINT
+            return self.push(value)[0] != formula.POINT
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
@@ -323,7 +323,7 @@ class _Writer:
             self._append(formula.CONSTANT, slot, same)
             return
         if operation == "name":
-            self._append(*self.place(value), same)
+            self._append(*self.push(value), same)
             return
         for operand in operands:
             self._write_or_take(operand)

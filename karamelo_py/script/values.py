@@ -56,9 +56,9 @@ class Values:
         places = {s: first + k for k, s in enumerate(SUFFIXES) if s in suffixes}
         places |= {s: begin + k for k, s in enumerate(further)}
         slots = {}
-        for suffix, place in places.items():
+        for suffix, number in places.items():
             name = f"{ID}_{suffix}" if suffix else ID
-            self._slots[name] = place
+            self._slots[name] = number
             slots[name] = self.publish(name)
         for name, slot in self._of.get(ID, {}).items():
             if name not in slots and self._slots.get(name) == slot:

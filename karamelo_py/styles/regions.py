@@ -233,7 +233,7 @@ class Plane(Primitive):
         length = np.linalg.norm(normal)
         if length == 0:
             message = "the direction across the plane has no length"
-            raise ScriptError(message, place=numbers[d].place, expected="a direction that is not 0")
+            raise ScriptError(message, mark=numbers[d].mark, expected="a direction that is not 0")
         self.normal = normal / (length or 1)
         super().__init__(hub, np.full(d, -np.inf), np.full(d, np.inf), exterior=exterior)
         self.unknown |= bool(np.isnan(values).any())

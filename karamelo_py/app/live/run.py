@@ -39,7 +39,7 @@ class Row(NamedTuple):
 
 class RunPage(Rhythmic, Listener):
     remembers = ()
-    id, place = "live", None
+    id, mark = "live", None
 
     def __init__(self, hub: Hub, title: str):
         self.hub, self.title, self.every = hub, title, 1

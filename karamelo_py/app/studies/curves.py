@@ -211,8 +211,8 @@ class Family:
     def _line(self, choice: dict[str, str], rows: list[Mapping[str, str]]) -> GroupedRuns:
         x = np.zeros(len(rows))
         if self.along:
-            rows.sort(key=self.place)
-            x = np.array([self.place(row) for row in rows], float)
+            rows.sort(key=self.abscissa)
+            x = np.array([self.abscissa(row) for row in rows], float)
         cost, signed = column(rows, self.cost), errors(rows, self.accuracy)
         across = x if self.convergence else cost
         chance = self._chance(rows, x, signed)
@@ -228,7 +228,7 @@ class Family:
         highest = reached(rows[0][name] for name in self.table.variables)
         return by_chance(x[::way], signed[::way], highest)[::way]
 
-    def place(self, row: Mapping[str, str]) -> float:
+    def abscissa(self, row: Mapping[str, str]) -> float:
         end = row[self.along]
         return self.words.index(end) if self.words else number_of(end)
 

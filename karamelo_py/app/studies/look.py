@@ -43,7 +43,7 @@ def known(word: str) -> bool:
     return any(word in family for family in FAMILIES)
 
 
-def place(word: str, others: Sequence[str] = ()) -> int:
+def number(word: str, others: Sequence[str] = ()) -> int:
     """Style number of a word: fixed for methods, else by order."""
     for family in FAMILIES:
         if word in family:
@@ -69,10 +69,10 @@ def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
     looks = []
     for choice in choices:
         head, *rest = (choice[name] for name in names)
-        k = place(head, heads)
+        k = number(head, heads)
         colour = _in_order(head, heads) if numbers else PALETTE[k]
         dashes = taken.setdefault(head, {})
-        wanted = sum(place(v, values[n]) for n, v in zip(names[1:], rest, strict=True))
+        wanted = sum(number(v, values[n]) for n, v in zip(names[1:], rest, strict=True))
         tries = [(wanted + j) % len(DASHES) for j in range(len(DASHES))]
         free = [j for j in tries if j not in dashes.values()]
         looks.append((colour, k, dashes.setdefault(tuple(rest), (free or tries)[0])))

@@ -259,7 +259,7 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
     if exact is not None:
         axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
         ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
-    fixed = [look.place(each.label) for each in curves if look.known(each.label)]
+    fixed = [look.number(each.label) for each in curves if look.known(each.label)]
     places = fixed if len(fixed) == len(curves) else range(1 + (len(curves) > 1), len(curves) + 2)
     for k, each in enumerate(curves):
         colour = look.PALETTE[places[k] % len(look.PALETTE)]

@@ -120,15 +120,15 @@ class Study:
                 with display.bar:
                     self._run(waiting, display)
             except KeyboardInterrupt:
-                place = f"in {self.out}" if self.writes else "kept"
+                where = f"in {self.out}" if self.writes else "kept"
                 of = f"at most {self.most}" if self.most else str(len(cases))
-                state = f"{len(self.rows)} of {of} runs are {place}"
+                state = f"{len(self.rows)} of {of} runs are {where}"
                 print(f"{state}; the same command continues with the rest", file=sys.stderr)
                 raise
         return [self.rows[tuple(case.values())] for case in cases]
 
     def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
-        place: Any = self.elsewhere or Here(self.launch, self.jobs)
+        pool: Any = self.elsewhere or Here(self.launch, self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
         compiled = {kind_of(key) for key in self.rows}
@@ -140,11 +140,11 @@ class Study:
 
         try:
             while queue or running:
-                while len(running) < place.size and (item := ready()):
+                while len(running) < pool.size and (item := ready()):
                     queue.remove(item)
                     case, folder = item
                     started.add(kind_of(case.values()))
-                    running[place.submit(case, folder)] = case
+                    running[pool.submit(case, folder)] = case
                     display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -162,7 +162,7 @@ class Study:
             raise
         finally:
             if self.elsewhere is None:
-                place.close()
+                pool.close()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
         """KeyboardInterrupt if the study was stopped on the page."""

@@ -82,14 +82,14 @@ class Option:
         if len(several) > 1:
             raise ScriptError(
                 f"'{word}' is the ID of {' and of '.join(f'a {kind}' for kind in several)}",
-                place=argument.place,
+                mark=argument.mark,
                 expected="an ID that only one of them has",
                 hint=" and ".join(f"{kind}({word}_{kind}, ...)" for kind in several),
             )
         if word in parts:
             return parts[word]
         said = f"unknown {' or '.join(optional)} '{argument.text}'"
-        raise unknown(said, word or "", parts, place=argument.place)
+        raise unknown(said, word or "", parts, mark=argument.mark)
 
 
 class EosStrength(NamedTuple):
@@ -238,13 +238,13 @@ FAST = 0.02  # of the wave speed; metals yield in faster impacts
 def _locks(law, scene):
     """Return True if flow in load steps conserves volume, which linear cells cannot represent."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
-    return scene.locks and slow and _flows_by_shear(law) and {"place": scene.method.place}
+    return scene.locks and slow and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _locks_at_impact(law, scene):
     """Return True at impact in the total frame, where points never leave their linear cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
-    return scene.locks and fast and _flows_by_shear(law) and {"place": scene.method.place}
+    return scene.locks and fast and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _flows_by_shear(law):

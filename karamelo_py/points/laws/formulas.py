@@ -42,13 +42,13 @@ class FormulaOf:
         value = argument.value_with(cls.names)
         if isinstance(value, str):
             raise ScriptError(
-                f"'{value}' is text", place=argument.place, expected="the formula without quotes"
+                f"'{value}' is text", mark=argument.mark, expected="the formula without quotes"
             )
         formula = Expression(value)
         if others := formula.names.difference(cls.names):
             raise ScriptError(
                 f"{cls.what} cannot depend on {min(others)}",
-                place=argument.place,
+                mark=argument.mark,
                 expected=cls.expected,
             )
         return formula

@@ -37,7 +37,7 @@ class Direction:
         components = [one for one in values if isinstance(one, float)]
         if len(values) != 3 or len(components) != 3 or not any(components):
             message = f"'{argument.text}' is no direction"
-            raise ScriptError(message, place=argument.place, expected="(x, y, z), not (0, 0, 0)")
+            raise ScriptError(message, mark=argument.mark, expected="(x, y, z), not (0, 0, 0)")
         return tuple(one / hypot(*components) for one in components)
 
 
@@ -55,7 +55,7 @@ class EnergyFormula(FormulaOf):
         if not energy.names - {"T"}:
             raise ScriptError(
                 "the energy is a constant: the body has no stress",
-                place=argument.place,
+                mark=argument.mark,
                 expected=cls.expected,
             )
         return energy

@@ -27,7 +27,7 @@ class HyperelasticMaterial(ElasticMaterial):
         if not laws.can(material.whole, laws.deformation):
             message = f"material '{material.id}' has no energy that could soften"
             expected = "a material such as neo-hookean, yeoh, ogden or hyperelastic"
-            raise ScriptError(message, place=argument.place, expected=expected)
+            raise ScriptError(message, mark=argument.mark, expected=expected)
         return material
 
 

@@ -29,7 +29,7 @@ def warn_of_locking(law: type) -> None:
 
     def keeps_volume(law, scene):
         nu = law.lam / (2 * (law.lam + law.G))
-        return scene.locks and nu >= LOCKED and {"nu": nu, "place": scene.method.place}
+        return scene.locks and nu >= LOCKED and {"nu": nu, "mark": scene.method.mark}
 
     known_failure(
         law,

@@ -41,7 +41,7 @@ class ElasticMaterial:
         if not law_traits(material.whole).rebounds or not is_isotropic(material.whole):
             raise ScriptError(
                 f"material '{material.id}' is no isotropic elastic solid, whose stress could relax",
-                place=argument.place,
+                mark=argument.mark,
                 expected="a material such as neo-hookean, ogden, hyperelastic, hencky or linear",
             )
         return material
@@ -80,10 +80,10 @@ class Wlf(NamedTuple):
         numbers = [one for one in values if isinstance(one, float)]
         if not len(values) == len(numbers) == 3:
             message = f"'{argument.text}' is no shift"
-            raise ScriptError(message, place=argument.place, expected=cls.script_kind)
+            raise ScriptError(message, mark=argument.mark, expected=cls.script_kind)
         if not min(numbers[:2]) > 0:
             message = "C1 and C2 of a shift are above 0"
-            raise ScriptError(message, place=argument.place, expected="such as (17.44, 51.6, Tg)")
+            raise ScriptError(message, mark=argument.mark, expected="such as (17.44, 51.6, Tg)")
         return cls(*numbers)
 
 

@@ -114,8 +114,8 @@ def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> 
             try:
                 memory[name] = plain(value, arrays)
             except TypeError as error:
-                place = part.place if isinstance(part, WITH_STYLE) else None
-                why = fault(type(part).__name__, f"remembers: {name} is {error}", place)
+                mark = part.mark if isinstance(part, WITH_STYLE) else None
+                why = fault(type(part).__name__, f"remembers: {name} is {error}", mark)
                 memory[name] = Unwritable(_copied(value), why)
     return memory
 

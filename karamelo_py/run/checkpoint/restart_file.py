@@ -28,7 +28,7 @@ from karamelo_py.run.checkpoint.arrays import (
 )
 from karamelo_py.run.checkpoint.parts import PartStates, RollbackPoint, parts_of
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 if TYPE_CHECKING:
     import h5py
@@ -48,7 +48,7 @@ READ_AT_ONCE = 1 << 22  # bytes per read
 class Restarts(Rhythmic):
     """Writes restart files during a run; the step number replaces the first ``*`` in the name."""
 
-    place: Place | None = None
+    mark: Mark | None = None
     style = ""
 
     def __init__(self, hub: Hub, every: int | ByTime, file: Path):

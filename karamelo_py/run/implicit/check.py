@@ -12,7 +12,7 @@ from karamelo_py.language import registry
 from karamelo_py.points.laws import initial_state
 from karamelo_py.points.laws.strengths.mu_i import yields_early_with_fbar
 from karamelo_py.scene.hub import Hub
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
 # Fix hooks in implicit steps; plug-in hooks may run more than once per step.
@@ -23,13 +23,13 @@ RELAXED = 1e30  # a time over which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
-def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
+def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
     update = hub.update
     method = update.method
     if update.thermal and any(solid.rigid for solid in hub.solids.values()):
         yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
-        yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.place
+        yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.mark
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     kin = method.kinematics(hub)
@@ -45,7 +45,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 "(F-bar), and the passive pressure of sand was 1.8 instead of 3",
                 "anti_volumetric_locking(false), a dilatancy of a third of the friction, or "
                 f"{_EXPLICIT}",
-                solid.place,
+                solid.mark,
             )
         try:
             bears = _bears_shear(law, kin)
@@ -53,14 +53,14 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             yield (
                 f"knows no derivative of {function}, which the law of '{solid.id}' calls",
                 f"another function in the law, or {_EXPLICIT}",
-                solid.place,
+                solid.mark,
             )
             continue
         if not bears and not update.scheme.traits.inertia:
             yield (
                 f"finds no equilibrium of '{solid.id}', which sustains no shear: a gas or fluid",
                 f"scheme(newmark), or {_EXPLICIT}",
-                solid.place,
+                solid.mark,
             )
     for fix in hub.fixes.values():
         ours = registry.origin("fix", fix.style).startswith("karamelo-py ")
@@ -80,7 +80,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             yield (
                 f"knows no fix {fix.style} that changes velocities by what they are",
                 f"fix velocity_nodes without leq, geq and friction, or {_EXPLICIT}",
-                fix.place,
+                fix.mark,
             )
         elif other:
             yield (
@@ -88,7 +88,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
                 + ("" if built_in else f": {other[0]}"),
                 "fix velocity_nodes, or loads: force_particles, edge_traction; velocity_particles "
                 "for rigid solids",
-                fix.place,
+                fix.mark,
             )
         elif (
             not update.scheme.traits.inertia
@@ -98,21 +98,21 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Place | None]]:
             yield (
                 f"has no inertia: the velocities of fix {fix.style} would change nothing",
                 "scheme(newmark)",
-                fix.place,
+                fix.mark,
             )
         elif len(fix.solids) > 1 and fix.friction is None:
             yield (
                 f"cannot work with fix {fix.style}, which finds its force once per step, before "
                 "the points have moved",
                 f"method ulmpm/contacts, or {_EXPLICIT}",
-                fix.place,
+                fix.mark,
             )
         elif fix.follows_points and fix.impulsive:
             yield (
                 f"knows no fix {fix.style}, whose force is what stops a point within a step",
                 "fix impenetrablesurface or indent, or a solid of material rigid in method "
                 f"ulmpm/contacts; or {_EXPLICIT}",
-                fix.place,
+                fix.mark,
             )
 
 
@@ -133,20 +133,20 @@ def check(hub: Hub) -> None:
     if importlib.util.find_spec("scipy") is None:
         raise ScriptError(
             f"{name} needs SciPy",
-            place=update.scheme_place,
+            mark=update.scheme_mark,
             hint="pip install '.[implicit]' in the folder of karamelo-py",
         )
     if update.scheme.solver == "amg" and importlib.util.find_spec("pyamg") is None:
         raise ScriptError(
             "solver=amg needs PyAMG",
-            place=update.scheme_place,
+            mark=update.scheme_mark,
             hint="pip install '.[implicit]' in the folder of karamelo-py, or solver=direct",
         )
-    for reason, instead, place in _reasons(hub):
-        raise ScriptError(f"{name} {reason}", place=place or update.scheme_place, expected=instead)
+    for reason, instead, mark in _reasons(hub):
+        raise ScriptError(f"{name} {reason}", mark=mark or update.scheme_mark, expected=instead)
     if update.scheme.traits.inertia and not update.fixed_dt:
         raise ScriptError(
             f"{name} has no default step",
-            place=update.scheme_place,
+            mark=update.scheme_mark,
             hint="set_dt(...): with twenty steps per vibration the period is right within 1 %",
         )

@@ -28,7 +28,7 @@ from karamelo_py.run.no_number import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.quasi_static import PUBLISHED
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 SUBSTEP_HALVINGS = 10  # maximum, of a load step
 LONG_WAY = 1.0  # cells
@@ -313,7 +313,7 @@ class LoadSteps:
         if not np.all(np.isfinite(numbers)):
             hint = "look for a formula that gives NaN, such as a division by zero"
             trouble = no_number(self.simulation, message, hint)
-            raise self._error(trouble.message, trouble.fix, trouble.place)
+            raise self._error(trouble.message, trouble.fix, trouble.mark)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at their nodes; set nodal velocities.
@@ -347,9 +347,9 @@ class LoadSteps:
             rigid[nodes[led], first : first + s.kin.dimension] = forces[led]
             take_rows(PUBLISH, s, simulation.mode, hooks)
 
-    def _error(self, message: str, hint: str, place: Place | None = None) -> ScriptError:
+    def _error(self, message: str, hint: str, mark: Mark | None = None) -> ScriptError:
         return ScriptError(
-            f"{self._now()}: {message}", place=place or self.simulation.hub.place, hint=hint
+            f"{self._now()}: {message}", mark=mark or self.simulation.hub.mark, hint=hint
         )
 
     def _now(self) -> str:

@@ -124,7 +124,7 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
             hub.warn(
                 f"rigid solid '{solid.id}' rotates or deforms: nothing moves it, and its points "
                 "fly straight on",
-                place=solid.place,
+                mark=solid.mark,
                 hint=f"fix(ID, rigid_body, {solid.id}, ...), or fix velocity_particles",
             )
 
@@ -174,6 +174,6 @@ def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
 
 
 def _error(fix: Fix, message: str, hint: str) -> ScriptError:
-    error = ScriptError(message, place=fix.place, hint=hint)
+    error = ScriptError(message, mark=fix.mark, hint=hint)
     error.command = f"fix {fix.style}"
     return error

@@ -48,7 +48,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import Place, ScriptError, render_message
+from karamelo_py.script.errors import Mark, ScriptError, render_message
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
@@ -90,8 +90,8 @@ def check_scene(hub: Hub) -> None:
                 "temperature(...) with eos-strength",
             )
     except ScriptError as error:
-        if error.place is None:
-            error.place, error.command = method.place, "method"
+        if error.mark is None:
+            error.mark, error.command = method.mark, "method"
         raise
     _check_restrictions(hub)
     if hub.update.scheme.traits.implicit:
@@ -104,7 +104,7 @@ def check_scene(hub: Hub) -> None:
         if solid.rigid:
             raise ScriptError(
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
-                place=solid.place,
+                mark=solid.mark,
                 hint="a basis without domains that deform: linear, a spline, or ugimp",
             )
 
@@ -113,23 +113,23 @@ def _features(hub: Hub) -> Iterator[Feature]:
     """Yield the choices of a scene, and its options without restrictions."""
     update, settings, method = hub.update, hub.settings, hub.update.method
     kin = method.kinematics(hub)
-    place, name = method.place, registry.name_of("method", type(method))
+    mark, name = method.mark, registry.name_of("method", type(method))
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
-    yield Feature("method", name, f"method {name}", place=place)
-    yield Feature("basis", method.basis_name, f"the basis {method.basis_name}", place=place)
-    yield Feature("transfer", transfer, f"transfer {transfer}", place=place)
-    yield Feature("scheme", scheme, f"scheme {scheme}", place=update.scheme_place)
+    yield Feature("method", name, f"method {name}", mark=mark)
+    yield Feature("basis", method.basis_name, f"the basis {method.basis_name}", mark=mark)
+    yield Feature("transfer", transfer, f"transfer {transfer}", mark=mark)
+    yield Feature("scheme", scheme, f"scheme {scheme}", mark=update.scheme_mark)
     yield Feature("kinematics", kin.word, f"{kin.word} scenes")
     if not method.frame.moves:
-        yield Feature("grids of solids", "", f"method {name}", "method(ulmpm, ...)", place)
+        yield Feature("grids of solids", "", f"method {name}", "method(ulmpm, ...)", mark)
     if carried(method.basis, kin) > 0:
         words = f"{type(method.basis).__name__} domains"
-        yield Feature("corners", "", words, "another basis", place)
+        yield Feature("corners", "", words, "another basis", mark)
     if update.transfer.traits.series:
-        yield Feature("series", "", f"transfer {transfer}", "APIC or FLIP", place)
+        yield Feature("series", "", f"transfer {transfer}", "APIC or FLIP", mark)
     if update.thermal:
-        yield Feature("heat", "", "heat conduction", "a mechanical method", place)
+        yield Feature("heat", "", "heat conduction", "a mechanical method", mark)
     if update.anti_locking:
         yield Feature("F-bar", "", "anti_volumetric_locking", "anti_volumetric_locking(false)")
     if settings.precision != "double":
@@ -140,33 +140,33 @@ def _features(hub: Hub) -> Iterator[Feature]:
         yield Feature("gpu", "", "--gpu", "processors, which run the same script: no --gpu")
     for fix in hub.fixes.values():
         if fix.solids or fix.follows_points:
-            yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.place)
+            yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.mark)
 
 
-def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Place | None]]:
+def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | None]]:
     """Yield the restrictions of each capability in use, its words in messages and its line."""
     update, box = hub.update, hub.domain
     if box.periodic:
         yield boundary.PERIODIC, "boundary(periodic)", None
     if update.boundary != "error":
         words = f"boundary({update.boundary})"
-        yield boundary.RESTRICTIONS[update.boundary], words, update.boundary_place
+        yield boundary.RESTRICTIONS[update.boundary], words, update.boundary_mark
     if box.thin:
         yield THIN, "plane_stress" if box.dimension == 2 else "uniaxial_stress", None
     for solid in hub.solids.values():
         if solid.material.fluid is not None:
-            yield solid.material.fluid.restrictions, "pore_water", solid.place
+            yield solid.material.fluid.restrictions, "pore_water", solid.mark
     for fix in hub.fixes.values():
-        yield fix.restrictions, f"fix {fix.style}", fix.place
+        yield fix.restrictions, f"fix {fix.style}", fix.mark
     name = registry.name_of("scheme", type(update.scheme))
-    yield update.scheme.traits.restrictions, f"scheme {name}", update.scheme_place
+    yield update.scheme.traits.restrictions, f"scheme {name}", update.scheme_mark
 
 
 def _check_restrictions(hub: Hub) -> None:
     """Refuse combinations that a capability of the scene does not support."""
     declared = {
-        Feature(restrictions.option, "", words, restrictions.instead, place): restrictions
-        for restrictions, words, place in _restricted(hub)
+        Feature(restrictions.option, "", words, restrictions.instead, mark): restrictions
+        for restrictions, words, mark in _restricted(hub)
         if restrictions is not None
     }
     if declared:
@@ -209,7 +209,7 @@ def lower(
     if comm.size == 1:
         tiles = Tiles(*cut)
     else:
-        tiles = SharedTiles(comm, *cut, one_place=method.fields_per_solid)
+        tiles = SharedTiles(comm, *cut, one_space=method.fields_per_solid)
     contact = method.contact_between(hub, lattices)
     if previous is not None:
         method.resume(contact, previous.contact)

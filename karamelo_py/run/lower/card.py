@@ -67,7 +67,7 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
     single = "" if hub.settings.precision == "single" else "; precision(single)"
     error = ScriptError(
         f"the GPU has no room for the scene: {plural(count, 'point')}{need}; {has}",
-        place=largest(hub).place,
+        mark=largest(hub).mark,
         hint=f"larger cells, or fewer points per cell{single}; {WITHOUT}",
     )
     error.command = "solid"
@@ -92,7 +92,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
         name = registry.name_of("scheme", type(scheme))
         yield ScriptError(
             f"a GPU does not take the row {kind} of scheme {name}",
-            place=hub.update.scheme_place,
+            mark=hub.update.scheme_mark,
             hint=f"another scheme, take.on({kind}, Card) in its plug-in, or {WITHOUT}",
         )
     for fix in hub.fixes.values():
@@ -103,7 +103,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
                 why = "acts from Python in each step" if from_python else "is for processors"
                 yield ScriptError(
                     f"fix {fix.style} '{fix.id}' {why} ({name}): a GPU would wait for it",
-                    place=fix.place,
+                    mark=fix.mark,
                     hint=f"a fix whose hooks are compiled, or {WITHOUT}",
                 )
                 break
@@ -111,7 +111,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
         yield ScriptError(
             f"a GPU does not know basis {hub.update.method.basis_name} yet, whose points see nodes "
             "of several cells",
-            place=hub.update.method.place,
+            mark=hub.update.method.mark,
             hint=f"linear, a spline or uGIMP, or {WITHOUT}",
         )
 

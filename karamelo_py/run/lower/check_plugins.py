@@ -68,12 +68,12 @@ def _one_node(setup: Setup) -> Nodes:
 
 
 def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
-    part = PartInUse(f"fix {fix.style}", type(fix), fix.place)
+    part = PartInUse(f"fix {fix.style}", type(fix), fix.mark)
     says = f"{moment}: {hook.function.__name__} has to return "
     values = (1.0,) * len(fix.formulas)
     for sample, law, state, p in _samples(setup, fix, hook):
         with (
-            as_script_error(part.name, moment, hook.function, fix.place),
+            as_script_error(part.name, moment, hook.function, fix.mark),
             np.errstate(all="ignore"),
         ):
             try:
@@ -83,16 +83,16 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
         expected = len(hook.writes) + hook.publishes
         if not isinstance(result, tuple) or len(result) != expected:
             got = len(result) if isinstance(result, tuple) else repr(result)
-            raise fault(part.name, f"{says}{expected} results, not {got}", part.place)
+            raise fault(part.name, f"{says}{expected} results, not {got}", part.mark)
         for item, new in zip(hook.writes, result, strict=False):
             size = item.shape(setup.kin) if isinstance(item, type) else setup.kin.dimension
             if (got := len(flat((new,)))) != size:
                 name = item.__name__ if isinstance(item, type) else item
                 message = f"{says}{plural(size, 'number')} for {name}, not {got}"
-                raise fault(part.name, message, part.place)
+                raise fault(part.name, message, part.mark)
         if hook.publishes and len(flat(result[-1:])) > len(fix.published):
             message = f"{says}as many totals as published has names, {len(fix.published)}"
-            raise fault(part.name, message, part.place)
+            raise fault(part.name, message, part.mark)
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
@@ -122,19 +122,19 @@ def _expect(part: PartInUse, function: Tag, value: object, count: int, kind: typ
         expected = "tuple" if kind is tuple else "symmetric tensor"
         got = type(value).__name__ + (f" of {len(value)}" if isinstance(value, tuple) else "")
         message = f"{function.__name__} has to return a {expected} of {count}, not a {got}{at}"
-        raise fault(part.name, message, part.place)
+        raise fault(part.name, message, part.mark)
 
 
 def _numbers(part: PartInUse, name: str, values: Iterable, one: Number) -> None:
     for number in values:
         if not isinstance(number, (int, float, np.number)):
-            raise fault(part.name, f"{name} is {number!r} for some point, no number", part.place)
+            raise fault(part.name, f"{name} is {number!r} for some point, no number", part.mark)
         if not np.isfinite(number):
-            raise fault(part.name, f"{name} is {number} for some point", part.place)
+            raise fault(part.name, f"{name} is {number} for some point", part.mark)
         if isinstance(number, np.float64) and type(one) is not np.float64:
             message = f"{name} is a double (float64) in a run of precision(single): its author "
             message += "makes numbers of those that it is given, as in real(0.5, x)"
-            raise fault(part.name, message, part.place)
+            raise fault(part.name, message, part.mark)
 
 
 def try_law(
@@ -144,7 +144,7 @@ def try_law(
     kinds = laws.law_kind(material.law)
     if not any(map(registry.is_foreign, kinds)):
         return
-    part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.place)
+    part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.mark)
     law = law_in(law or law_on(material.law, 1.0, 293.0), type(one))
     kin = kin or KINEMATICS[hub.domain.dimension if hub.domain else 3]()
     for strain in STRAINS:
@@ -156,7 +156,7 @@ def try_law(
             if len(flat(after)) != len(flat(state)):
                 message = f"what a point remembers is {len(flat(state))} numbers at first and "
                 message += f"{len(flat(after))} after a step: their number must not change"
-                raise fault(part.name, message, part.place)
+                raise fault(part.name, message, part.mark)
             _numbers(part, f"what a point remembers after a strain of {strain:g}", flat(after), one)
             for function in (*TENSORS, *NUMBERS):
                 result = function(law, kin, after)
@@ -184,7 +184,7 @@ def _try_flow_stress(part: PartInUse, law: Tag, state: tuple, strain: Number) ->
         _expect(part, hardening.updated_memory, after, len(memory))
         if memory[1:] and not hardening.updated_memory.defined(kind):
             what = f"{', '.join(memory._fields[1:])} would never change: it has no updated_memory"
-            raise fault(part.name, what, part.place)
+            raise fault(part.name, what, part.mark)
 
 
 def _try_basis(hub: Hub, setup: Setup) -> None:
@@ -203,14 +203,14 @@ def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> Non
     line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
     if line is not None:
         if not all(hasattr(line, name) for name in Along._fields):
-            raise fault(part.name, "along has to return an Along", part.place)
+            raise fault(part.name, "along has to return an Along", part.mark)
         for name in ("weights", "gradients", "affine"):
             got = len(getattr(line, name))
             if got != basis.line_nodes and (got or name != "affine"):
                 message = (
                     f"along has to return {basis.line_nodes} {name}, not {got}: register says so"
                 )
-                raise fault(part.name, message, part.place)
+                raise fault(part.name, message, part.mark)
     stencil = locate(basis, kin, grid, at)
     weights, slopes = [], []
     for k in range(support(basis, kin)):
@@ -227,4 +227,4 @@ def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> Non
         if abs(total - wanted) > rounding:
             x = ", ".join(f"{c:g}" for c in at[: kin.dimension])
             message = f"the {message} of a point at {x} add up to {total:.6g}, not to {wanted}"
-            raise fault(part.name, message, part.place)
+            raise fault(part.name, message, part.mark)

@@ -103,7 +103,7 @@ class _Builder:
             address = arrays.WHOLE
             self.whole.append(hook.tag(len(self.rows), (1,) * len(fix.formulas)))
         else:
-            with as_script_error(f"fix {fix.style}", moment, hook.function, fix.place):
+            with as_script_error(f"fix {fix.style}", moment, hook.function, fix.mark):
                 address = address_of(hook.function, hook.signature)
         formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
         holds = hook.holds and (slot >= 0 or not hook.on_nodes)
@@ -218,7 +218,7 @@ def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | N
         if fix.point_by_point:
             _agree(simulation, fix)
     except ScriptError as error:
-        error.place = error.place or fix.place
+        error.mark = error.mark or fix.mark
         raise
 
 

@@ -114,7 +114,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         memory = machine_memory(comm.on_machine) or memory
     if need <= memory.free:
         return
-    place, beside = largest(hub).place, ""
+    mark, beside = largest(hub).mark, ""
     if comm.share_here < 1:
         beside = f" for {comm.on_machine} of {comm.size} processes"
     message = (
@@ -123,11 +123,11 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     )
     if need <= memory.whole:  # other programs may release it
         message += f"{in_words(memory.free)} free: it may not fit"
-        hub.warn(message, place=place, hint=_ways(hub, need, memory.free, copied))
+        hub.warn(message, mark=mark, hint=_ways(hub, need, memory.free, copied))
         return
     hint = _ways(hub, need, memory.whole, copied)
     said = f"{message}{in_words(memory.whole)} in all"
-    error = ScriptError(said, place=place, hint=hint, code="memory")
+    error = ScriptError(said, mark=mark, hint=hint, code="memory")
     error.command = "solid"
     raise error
 
@@ -176,7 +176,7 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
     found = ScriptError(
         f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
         f"memory: {str(error) or 'the system gives no more'}",
-        place=hub.domain.place if of_grid else largest(hub).place,
+        mark=hub.domain.mark if of_grid else largest(hub).mark,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
         code="memory",
     )

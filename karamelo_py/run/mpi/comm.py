@@ -160,7 +160,7 @@ class MpiComm(SerialComm):
 def check_same_run(hub: Scene) -> None:
     """Check that all processes begin the same run; one reports, the others quit."""
     comm = hub.settings.comm
-    present = [hub.place and (hub.place.file, hub.place.line), len(hub.runs)]
+    present = [hub.mark and (hub.mark.file, hub.mark.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
     if (words == words[0]).all():
         return
@@ -170,6 +170,6 @@ def check_same_run(hub: Scene) -> None:
         raise Quit
     raise ScriptError(
         "the processes do not come to the same run",
-        place=hub.place,
+        mark=hub.mark,
         expected="the same script, files and variables for all of them",
     )

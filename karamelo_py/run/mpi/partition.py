@@ -72,15 +72,15 @@ FINE = 1000  # integer work per unit of cost
 class Needs(NamedTuple):
     """Used nodes of a process: boxes of them at k tiles of nodes."""
 
-    place: np.ndarray  # (k,) ascending
+    tile: np.ndarray  # (k,) ascending
     lo: np.ndarray  # (k, d)
     hi: np.ndarray  # (k, d)
 
-    def among(self, place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Intersect boxes (m, d) at places (m,) with these; return indices, first, last."""
-        at = np.minimum(np.searchsorted(self.place, place), len(self.place) - 1)
+    def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
+        """Intersect boxes (m, d) in tiles (m,) with these; return indices, first, last."""
+        at = np.minimum(np.searchsorted(self.tile, tile), len(self.tile) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
-        which = np.flatnonzero((self.place[at] == place) & (low <= high).all(axis=1))
+        which = np.flatnonzero((self.tile[at] == tile) & (low <= high).all(axis=1))
         return which, low[which], high[which]
 
 
@@ -93,11 +93,11 @@ class SharedTiles(Tiles):
         points: int,
         sparse: bool,
         *,
-        one_place: bool,
+        one_space: bool,
     ):
         super().__init__(lattices, basis, points, sparse)
         self.comm = comm
-        self.one_place = one_place  # bodies in contact have nodes at the same positions
+        self.one_space = one_space  # bodies in contact have nodes at the same positions
         self._places = np.concatenate(
             [
                 one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
@@ -244,16 +244,16 @@ class SharedTiles(Tiles):
         order = [k * self.count + occupied(block.tiling)[0] for k, block in enumerate(s.blocks)]
         return super()._boxes(s)._replace(order=np.concatenate(order))
 
-    def _place(self, tile: np.ndarray) -> np.ndarray:
-        return tile % int(self._first_of_nodes[1]) if self.one_place else tile
+    def _tile_of_domain(self, tile: np.ndarray) -> np.ndarray:
+        return tile % int(self._first_of_nodes[1]) if self.one_space else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
         """Find what own boxes reach; add the parts of others' boxes at nodes used here."""
         _, reached = super()._reached(boxes)
-        of, place = self._of[reached.box], self._place(reached.tile)
+        of, tile = self._of[reached.box], self._tile_of_domain(reached.tile)
         me = self.comm.rank
         self._needs = {
-            int(rank): _needs(place[here], reached.begin[here], reached.end[here])
+            int(rank): _needs(tile[here], reached.begin[here], reached.end[here])
             for rank in unique(of)
             for here in [of == rank]
         }
@@ -265,11 +265,11 @@ class SharedTiles(Tiles):
         for rank, needs in self._needs.items():
             if rank != me:
                 which, low, high = needs.among(
-                    place[local], reached.begin[local], reached.end[local]
+                    tile[local], reached.begin[local], reached.end[local]
                 )
                 self._passed[rank] = reached.box[local][which], low, high
         which, low, high = self._needs[me].among(
-            place[others], reached.begin[others], reached.end[others]
+            tile[others], reached.begin[others], reached.end[others]
         )
         pieces = others[which]
         self._from, box = of[pieces], reached.box[pieces]
@@ -320,19 +320,19 @@ class SharedTiles(Tiles):
         else:
             for rank, needs in self._needs.items():
                 if rank < me:
-                    which, low, high = needs.among(self._place(tiles), begin, end)
+                    which, low, high = needs.among(self._tile_of_domain(tiles), begin, end)
                     nodes.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         self._marked = np.concatenate(nodes)
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
-        count = int(self._nodes[0].prod()) if self.one_place else len(self.foreign)
-        place = nodes % count
+        count = int(self._nodes[0].prod()) if self.one_space else len(self.foreign)
+        number = nodes % count
         for rank, boxes in sorted(self._inner.items()):
-            seen = np.isin(place, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
+            seen = np.isin(number, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
             if rank == self.comm.rank:
                 return nodes[~seen]
-            place = np.where(seen, -1, place)
+            number = np.where(seen, -1, number)
         return nodes
 
     def give(self, s: Setup, number: int, kinds: int) -> None:
@@ -385,10 +385,10 @@ def sized(points: Points, count: int) -> Points:
     return made_of(points, [rows_of_points(*shape) for shape in shapes])
 
 
-def _needs(place: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
-    order = np.argsort(place, kind="stable")
-    starts = np.flatnonzero(np.diff(place[order], prepend=-1))
-    return Needs(place[order][starts], *extents(starts, begin[order], end[order]))
+def _needs(tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
+    order = np.argsort(tile, kind="stable")
+    starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
+    return Needs(tile[order][starts], *extents(starts, begin[order], end[order]))
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:

@@ -69,12 +69,12 @@ def bytes_of_node(simulation: Simulation) -> int:
 
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     s, method = simulation.setup, simulation.hub.update.method
-    lattices, one_place = method.lattices(simulation.hub), method.fields_per_solid
+    lattices, one_space = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)
     boxes: list[Boxes] = []  # of all
     of_all = [
         SharedTiles(
-            _PretendedComm(rank, ranks, boxes), lattices, s.basis, *few, one_place=one_place
+            _PretendedComm(rank, ranks, boxes), lattices, s.basis, *few, one_space=one_space
         )
         for rank in range(ranks)
     ]

@@ -41,7 +41,7 @@ class PointField:
         fields = [*hub.fields.particle_names(), *DISPLACEMENTS, *VECTORS, *TENSORS]
         name = argument.words(fields)
         if name not in fields:
-            raise unknown(f"unknown field '{name}'", name, fields, place=argument.place)
+            raise unknown(f"unknown field '{name}'", name, fields, mark=argument.mark)
         ends = AXES[: hub.require_domain().dimension] if name in VECTORS else COMPONENTS
         letter = (VECTORS | TENSORS).get(name)
         return cls(name, tuple(letter + end for end in ends) if letter else (name,))
@@ -280,7 +280,7 @@ class Reference(Compared, Compute):
         columns = read_table(file)
         name = column.text.strip('"')
         if name not in columns:
-            raise unknown(f"{file} has no column '{name}'", name, columns, place=column.place)
+            raise unknown(f"{file} has no column '{name}'", name, columns, mark=column.mark)
         self.along, self.column = next(iter(columns)), name
         order = np.argsort(columns[self.along], kind="stable")
         self.curve = columns[self.along][order], columns[name][order]
@@ -294,7 +294,7 @@ class Reference(Compared, Compute):
             if name not in columns:
                 hint = f"in {file} the coordinate first, then columns named as in dumps"
                 message = f"points have no column '{name}'"
-                raise unknown(message, name, columns, hint, place=column.place)
+                raise unknown(message, name, columns, hint, mark=column.mark)
         refuse_absent(hub, (self.column,))
 
     def refresh(self) -> None:

@@ -245,8 +245,8 @@ class PositionQuantile(Compute):
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
                 up_to = below[axis] + np.cumsum(of_bits[occupied])
-                place = int(np.count_nonzero(up_to < wanted[axis]))
-                digit = occupied[min(place, len(occupied) - 1)]
+                index = int(np.count_nonzero(up_to < wanted[axis]))
+                digit = occupied[min(index, len(occupied) - 1)]
                 below[axis] += of_bits[:digit].sum()
                 first[axis] = first[axis] << BITS | int(digit)
         self.publish_components(_numbers(np.array(first, np.uint64)))

@@ -53,7 +53,7 @@ class Dump(Rhythmic):
             self.write()
 
     def warn_of_absence(self) -> None:
-        self.hub.warn(begins_anew(self.path()), place=self.place)
+        self.hub.warn(begins_anew(self.path()), mark=self.mark)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], owner: str) -> None:
         """Warn that columns are 0 because no point or node (`owner`) stores them."""

@@ -149,10 +149,10 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     faces = [Faces(none, none, none, np.empty(0), np.empty((0, d)))]
     for axis in range(d):
         some = np.flatnonzero(np.abs(pieces.area[:, axis]) > least)
-        of_axis, place = pieces.area[some, axis], pieces.middle[some]
-        depth = solid.domain.depth(place)
+        of_axis, centre = pieces.area[some, axis], pieces.middle[some]
+        depth = solid.domain.depth(centre)
         signs, axes = np.sign(of_axis).astype(np.int64), np.full(len(some), axis)
-        faces.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * depth, place))
+        faces.append(Faces(pieces.point[some], axes, signs, np.abs(of_axis) * depth, centre))
     return joined(faces)
 
 

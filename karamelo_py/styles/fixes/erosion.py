@@ -64,7 +64,7 @@ class Erosion(Fix):
         ids = np.sort(np.concatenate([np.empty(0, np.int64), *tables]))
         if not len(ids):
             return False
-        gone = len(ids), *take_away(self.hub, ids, self.place)
+        gone = len(ids), *take_away(self.hub, ids, self.mark)
         before = (self.hub.values.get(f"{self.id}_{name}") for name in self.published)
         self.publish_all(*map(sum, zip(before, gone, strict=True)))
         return True

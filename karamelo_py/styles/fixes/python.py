@@ -47,14 +47,14 @@ class PythonFunction:
         if not module:
             message = f"'{name}' names no module"
             expected = "module.function, of a module next to the script or an installed one"
-            raise ScriptError(message, place=argument.place, expected=expected)
+            raise ScriptError(message, mark=argument.mark, expected=expected)
         try:
             exists = forget_other(module.partition(".")[0])
             imported = import_module(module)
         except FAILURES as error:
             raise ScriptError(
                 f"the module {module} cannot be imported: {cause_of(error)}",
-                place=argument.place,
+                mark=argument.mark,
                 hint=no_file
                 or (None if exists else f"{module}.py is not in {folder}, nor installed"),
             ) from error
@@ -63,7 +63,7 @@ class PythonFunction:
             close = nearest(function, functions)
             message = f"the module {module} has no function '{function}'"
             hint = no_file or (f"did you mean '{module}.{close}'?" if close else None)
-            raise ScriptError(message, place=argument.place, hint=hint)
+            raise ScriptError(message, mark=argument.mark, hint=hint)
         return getattr(imported, function)
 
 
@@ -162,8 +162,8 @@ class Python(Fix):
             self.hub.warn(
                 f"fix python: {called_as(self.function)} has changed {', '.join(forgotten)}, and "
                 "restart files do not contain that: a restarted run will differ",
-                place=self.place,
-                hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.place}, or in the "
+                mark=self.mark,
+                hint=f"remembers = {(*keeper.names, *forgotten)!r} in {keeper.title}, or in the "
                 "class of an object that is called",
             )
 
@@ -176,7 +176,7 @@ class Python(Fix):
             message = f"{cause_of(error)}{place_in(self.function, error)}"
             failure = ScriptError(
                 f"fix python: {called_as(self.function)}: {message}",
-                place=self.place,
+                mark=self.mark,
                 hint="\n  ".join(["mend the function there:", *steps_to(error)]),
             )
             failure.complete = True
@@ -199,7 +199,7 @@ class Python(Fix):
             raise ScriptError(
                 f"fix python: {called_as(self.function)} returns {first} on one process and "
                 f"{other} on another",
-                place=self.place,
+                mark=self.mark,
                 hint="each has a part of the points: sum by points.total(values) or "
                 "nodes.total(values), the same on all, or leave point_by_point out",
             )
@@ -208,22 +208,22 @@ class Python(Fix):
 class Keeper:
     """The object or module of a function, with the values that it stores between steps.
 
-    `names` are the names in ``remembers``; `place` says where this word belongs.
+    `names` are the names in ``remembers``; `title` names the object.
     """
 
     def __init__(self, function: Callable):
         owner = function.__self__ if inspect.ismethod(function) else function
-        self.place = f"the class {type(owner).__name__}"
+        self.title = f"the class {type(owner).__name__}"
         self.data = vars(owner) if hasattr(owner, "__dict__") else {}
         if inspect.isfunction(owner):
             self.data, owner = owner.__globals__, sys.modules.get(owner.__module__)
-            self.place = f"the module {function.__module__ or '__main__'}"
+            self.title = f"the module {function.__module__ or '__main__'}"
         names = getattr(owner, "remembers", ())
         self.names = (names,) if isinstance(names, str) else tuple(names)
         self.owner, self.function = owner, function
         for name in self.names:
             if not hasattr(owner, name):
-                message = f"{self.place} remembers '{name}', which it does not have"
+                message = f"{self.title} remembers '{name}', which it does not have"
                 expected = "a name that has its first value when the fix is made"
                 raise ScriptError(message, argument="function", expected=expected)
         self.seen = self._look()

@@ -42,7 +42,7 @@ class Components:
     def numbers(self) -> list[float]:
         if not all(item is not None and item.is_constant for item in self.items):
             raise ScriptError(
-                f"{self.argument.text} is no fixed number", place=self.argument.place,
+                f"{self.argument.text} is no fixed number", mark=self.argument.mark,
                 expected="numbers", hint="motion and turning take formulas of time",
             )  # fmt: skip
         return [float(item.constant) for item in self.items if item is not None]
@@ -198,24 +198,24 @@ class RigidBody(Fix):
         before = self.previous
         if before is not None and before.id != self.id and before.id in self.hub.fixes:
             error = ScriptError(
-                f"fix '{before.id}' in line {before.place.line} moves '{self.body.id}' already",
+                f"fix '{before.id}' in line {before.mark.line} moves '{self.body.id}' already",
                 argument="solid",
                 expected="one fix rigid_body for each solid",
                 hint=f"fix({before.id}, rigid_body, {self.body.id}, ...) replaces it",
             )
-            error.place, error.command = self.place, "fix rigid_body"
+            error.mark, error.command = self.mark, "fix rigid_body"
             raise error
         if before is None and self.hub.update.step > 0:
             raise ScriptError(
                 f"solid '{self.body.id}' may have moved in earlier runs",
-                place=self.place,
+                mark=self.mark,
                 expected="fix rigid_body before the first run",
                 hint="fixed=(...) or motion=(...) until it is released: a fix with the same ID "
                 "replaces it, and the body continues",
             )
         if before is not None and before.pivot != self.pivot:
             raise ScriptError(
-                f"fix '{self.id}' had another pivot", place=self.place,
+                f"fix '{self.id}' had another pivot", mark=self.mark,
                 expected="the same pivot, or none in both",
             )  # fmt: skip
         if before is not None:
@@ -250,7 +250,7 @@ class RigidBody(Fix):
             self.reported = 2 * failed
             self.hub.warn(
                 f"impulses on '{self.body.id}' were not found exactly in {failed} steps",
-                place=self.place,
+                mark=self.mark,
                 hint="smaller steps (dt_factor), less friction, or a heavier body",
             )
 
@@ -274,7 +274,7 @@ class RigidBody(Fix):
         if len(given.items) != len(ways):
             what = "formulas" if len(ways) != 1 else "formula"
             raise ScriptError(
-                f"{len(given.items)} components", place=given.argument.place,
+                f"{len(given.items)} components", mark=given.argument.mark,
                 expected=f"{len(ways)} {what}" if ways else "nothing: it does not rotate here",
             )  # fmt: skip
         for way, item, part in zip(ways, given.items, given.argument.listed(), strict=True):
@@ -284,7 +284,7 @@ class RigidBody(Fix):
             item.evaluate(self.hub.values)
             if way not in self.ways and not (item.is_constant and float(item.constant) == 0):
                 raise ScriptError(
-                    f"the body moves along the axis only, not along {WAYS[way]}", place=part.place,
+                    f"the body moves along the axis only, not along {WAYS[way]}", mark=part.mark,
                     expected="0",
                 )  # fmt: skip
         return items
@@ -295,13 +295,13 @@ class RigidBody(Fix):
             name = part.text
             if name not in known:
                 raise ScriptError(
-                    f"the body has no direction '{name}'", place=part.place,
+                    f"the body has no direction '{name}'", mark=part.mark,
                     expected="some of " + ", ".join(known),
                 )  # fmt: skip
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
                 raise ScriptError(
-                    f"{name} is fixed, and {word} prescribes it", place=part.place,
+                    f"{name} is fixed, and {word} prescribes it", mark=part.mark,
                     expected="one of the two",
                 )  # fmt: skip
             self.led[WAYS.index(name)] = Expression(0.0)
@@ -312,7 +312,7 @@ class RigidBody(Fix):
             return []
         if max(self.ways) < 3:
             raise ScriptError(
-                "a body that does not rotate has no pivot", place=pivot.argument.place,
+                "a body that does not rotate has no pivot", mark=pivot.argument.mark,
                 expected="fixed=(...), or a domain in 2D or 3D",
             )  # fmt: skip
         d = self.hub.domain.dimension
@@ -320,7 +320,7 @@ class RigidBody(Fix):
         if velocity is not None or any(self.led[k] is not None for k in range(d)):
             raise ScriptError(
                 "the pivot holds the body, and velocity, motion or fixed moves or holds it too",
-                place=pivot.argument.place,
+                mark=pivot.argument.mark,
                 expected="spin=..., turning=... or fixed=(rx, ...)",
             )
         self.led[:d] = [Expression(0.0)] * d
@@ -351,7 +351,7 @@ class RigidBody(Fix):
             wanted = {2: 1, 3: 3}.get(d, 0) * bool(len(self.ways) > d)
             if len(numbers) != wanted:
                 raise ScriptError(
-                    f"{len(numbers)} moments of inertia", place=inertia.argument.place,
+                    f"{len(numbers)} moments of inertia", mark=inertia.argument.mark,
                     expected=f"{wanted} in {d}D" if wanted else "none: it does not rotate here",
                 )  # fmt: skip
             tensor = np.diag(numbers if d == 3 else [1.0, 1.0, numbers[0]])
@@ -361,7 +361,7 @@ class RigidBody(Fix):
             ):
                 raise ScriptError(
                     f"no body has the moments of inertia {inertia.argument.text}",
-                    place=inertia.argument.place,
+                    mark=inertia.argument.mark,
                     expected="moments above 0, each at most the sum of the other two",
                 )
         if self.pivot:
@@ -484,7 +484,7 @@ class ContactRigidBody(Fix):
         raise ScriptError(
             f"{named(self.hub, number)} is so deep in the body '{self.body.id}' that no way out of "
             "it is the shortest",
-            place=self.place,
+            mark=self.mark,
             expected="points that come less than a cell below its surface",
             hint="another place of the body at the start, smaller steps (dt_factor), or a stiffer "
             "solid",

@@ -195,7 +195,7 @@ class VelocityNodes(Fix):
                 names = " and ".join(f"v{AXES[k]}" for k in axes)
                 count = plural(len(shared), "node")
                 self.hub.warn(
-                    f"fix '{other.id}' (line {other.place.line}) gives {count} of this group "
+                    f"fix '{other.id}' (line {other.mark.line}) gives {count} of this group "
                     f"another {names}: this fix decides there",
                     hint="groups that have no nodes in common, or NULL for one of the components",
                 )
@@ -284,7 +284,7 @@ class Reaction(Compute):
             raise ScriptError(
                 f"fix '{fix.id}' holds nodes of group '{self.group.id}' and further ones: "
                 "its reaction contains both",
-                place=self.place,
+                mark=self.mark,
                 expected="a group that has all nodes of a fix or none",
                 hint=f"two fixes, one for the nodes of {self.group.id}, instead of '{fix.id}'",
             )

@@ -202,7 +202,7 @@ known_failure(
     VelocityOfPoints,
     "velocities of '{other.id}' and '{part.id}'",
     when=lambda fix, scene: list(_conflicts(fix, scene.simulation)),
-    reason="fix '{other.id}' (line {other.place.line}) gives {points} of this group another "
+    reason="fix '{other.id}' (line {other.mark.line}) gives {points} of this group another "
     "{axes}: this fix decides{more}",
     cure="{apart}, or NULL for one of the components",
 )

@@ -14,7 +14,7 @@ from karamelo_py.points.laws.strengths import fbar_fraction, initial_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import Place, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 LOADS = ("ContactForce", "ContactTorque")
 
@@ -57,7 +57,7 @@ class Method:
         Name of the basis in scripts, with its variant.
     thermal
         Whether heat flows.
-    place
+    mark
         Location of the command in the script, for messages.
     frame
         Whether weights belong to present or reference positions.
@@ -70,7 +70,7 @@ class Method:
     basis: NamedTuple
     basis_name = ""
     thermal = False
-    place: Place | None = None
+    mark: Mark | None = None
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False

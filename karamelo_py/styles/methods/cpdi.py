@@ -74,7 +74,7 @@ class Convected(Method):
                 raise ScriptError(
                     f"points of solid '{solid.id}' have {has} around them, and {name} domains "
                     f"cannot be made of those",
-                    place=solid.place,
+                    mark=solid.mark,
                     hint=hint,
                 )
 

@@ -225,11 +225,11 @@ class ULMPMContacts(Method):
             other = by_pair.setdefault(frozenset(pair), fix)
             if other is not fix:
                 first, second = (solid.id for solid in fix.solids)
-                line = f" (line {other.place.line})" if other.place else ""
+                line = f" (line {other.mark.line})" if other.mark else ""
                 error = ScriptError(
                     f"the friction of solids '{first}' and '{second}' is already set by fix "
                     f"'{other.id}'{line}",
-                    place=fix.place,
+                    mark=fix.mark,
                     expected="one fix contact/friction for each pair of solids (solids "
                     "glued together count as one)",
                     hint=f"fix({other.id}, contact/friction, {first}, {second}, ...) replaces it",

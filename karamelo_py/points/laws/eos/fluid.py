@@ -84,12 +84,12 @@ def _swings(eos, scene):
     rough = scene.moves and scene.linear and scene.d > 1
     long = scene.kept > 0.9 and (scene.falls > LONG[0] or scene.passes > LONG[1])
     long = long or (scene.moments and scene.falls > 2 * LONG[0])
-    return {"place": scene.method.place} if rough and long else None
+    return {"mark": scene.method.mark} if rough and long else None
 
 
 def _whirls(eos, scene):
     loose = scene.moves and not scene.linear and scene.kept > 0.9 and scene.d > 1
-    return {"place": scene.method.place} if loose and scene.passes > LONG[1] else None
+    return {"mark": scene.method.mark} if loose and scene.passes > LONG[1] else None
 
 
 known_failure(
@@ -218,7 +218,7 @@ def _shocks(eos, scene):
         return None
     else:
         loss = "this scheme, whose work is not the energy in its front, loses 3 to 15 % of it"
-    return {"place": scene.method.place, "ratio": ratio, "loss": loss}
+    return {"mark": scene.method.mark, "ratio": ratio, "loss": loss}
 
 
 known_failure(
@@ -235,7 +235,7 @@ def _sound(eos, scene):
     jumps = scene.moves and scene.basis.traits.gradient_jumps
     if not jumps or scene.pressure_ratio >= STEP:
         return None
-    return {"place": scene.method.place, "speed": sqrt(1 - 1 / eos.gamma)}
+    return {"mark": scene.method.mark, "speed": sqrt(1 - 1 / eos.gamma)}
 
 
 known_failure(

@@ -112,7 +112,7 @@ known_failure(
     "fast shocks",
     when=lambda eos, scene: (
         (scene.moves and not scene.linear and scene.kept > 0.99 and scene.speed > 0.6)
-        and {"place": scene.method.place}
+        and {"mark": scene.method.mark}
     ),
     reason="points move at {scene.speed:.2g} times the speed of waves, and {scene.transfer_name} "
     "with {scene.basis_name} functions carries such a shock 1 to 3 % too fast",

@@ -134,13 +134,13 @@ class FlowFormula:
     def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
         value = argument.value_with(SEEDS)
         if isinstance(value, str):
-            raise ScriptError(f"'{value}' is text", place=argument.place)
+            raise ScriptError(f"'{value}' is text", mark=argument.mark)
         formula = Expression(value)
         others = formula.names.difference(SEEDS)
         if others:
             raise ScriptError(
                 f"the flow stress cannot depend on {min(others)}",
-                place=argument.place,
+                mark=argument.mark,
                 expected="a formula of ep, epdot and T, the plastic strain, its rate, the "
                 "temperature",
             )

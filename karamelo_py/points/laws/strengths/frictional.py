@@ -157,7 +157,7 @@ FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 
 def _locks(strength, scene):
-    return scene.locks and not scene.even and {"place": scene.method.place}
+    return scene.locks and not scene.even and {"mark": scene.method.mark}
 
 
 def little_dilatancy(strength):

@@ -94,7 +94,7 @@ def _slows(strength, scene):
     if not 0 < SIGNIFICANT * nu < added:
         return None
     return {
-        "place": scene.method.place, "pic": 1 - scene.kept, "added": added, "nu": nu,
+        "mark": scene.method.mark, "pic": 1 - scene.kept, "added": added, "nu": nu,
         "more": 100 * added / nu,
     }  # fmt: skip
 
@@ -102,13 +102,13 @@ def _slows(strength, scene):
 def _reaches(strength, scene):
     splines = not scene.hats and scene.basis.traits.nodes_per_cell == 1
     moved = splines and scene.moving_walls and _viscosity(strength, scene) > 0
-    return moved and {"place": scene.method.place}
+    return moved and {"mark": scene.method.mark}
 
 
 def _reaches_half_a_cell(strength, scene):
     apart = not scene.hats or scene.method.fields_per_solid or not scene.moving_walls
     inside = not apart and _viscosity(strength, scene) > 0 and scene.faces_in_cells
-    return inside and {"place": scene.method.place}
+    return inside and {"mark": scene.method.mark}
 
 
 FOR_FLUIDS = "method(ulmpm, APIC, linear): between plates, force and velocities within 0.1 %"

@@ -76,7 +76,7 @@ class MuI(NamedTuple):
 
 def _jumps(strength, scene):
     rough = scene.moves and scene.linear and scene.kept > 0.9 and scene.d > 1
-    return {"place": scene.method.place} if rough else None
+    return {"mark": scene.method.mark} if rough else None
 
 
 known_failure(
@@ -109,7 +109,7 @@ def _slows(strength, scene):
         grains = strength.mu_s * strength.d * sqrt(p * strength.rho_s) / (0.5 * strength.I0 * rho)
         if added > SLOW * grains:
             pic = 1 - scene.kept
-            return {"place": scene.method.place, "pic": pic, "added": added, "grains": grains}
+            return {"mark": scene.method.mark, "pic": pic, "added": added, "grains": grains}
     return None
 
 

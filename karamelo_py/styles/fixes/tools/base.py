@@ -49,10 +49,10 @@ class ToolFix(PointForces):
         self.now(*components)
         return components
 
-    def from_place(
-        self, points: PointsView | PointTable, place: Sequence[Expression]
+    def from_origin(
+        self, points: PointsView | PointTable, origin: Sequence[Expression]
     ) -> np.ndarray:
-        return points.position.astype(float) - self.now(*place)
+        return points.position.astype(float) - self.now(*origin)
 
     def side(self, points: PointsView) -> np.ndarray:
         """Edges (n,) of the points' cubes."""
@@ -95,8 +95,8 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 class PlaneTool(ToolFix):
     """Base of walls: a plane that may move, with points on the side of its normal."""
 
-    def lay(self, place: Sequence[Expression], normal: Sequence[Expression]) -> None:
-        self.origin = self.of_time("", place)
+    def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
+        self.origin = self.of_time("", origin)
         self.towards = self.of_time("n", normal)
         if not self.hub.rehearsing:  # a rehearsal lacks some values
             unit(self.now(*self.towards))
@@ -104,7 +104,7 @@ class PlaneTool(ToolFix):
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
         """Present depth (n,) of points past the plane, and its normal (d,)."""
         normal = unit(self.now(*self.towards))
-        return -(self.from_place(points, self.origin) @ normal), normal
+        return -(self.from_origin(points, self.origin) @ normal), normal
 
     def depth_of(self, points: PointTable) -> np.ndarray:
         return self.depth(points)[0]
@@ -138,7 +138,7 @@ class BallTool(ToolFix):
     centre: tuple[Expression, ...]
 
     def depth_of(self, points: PointTable) -> np.ndarray:
-        return self.now(self.R) - np.linalg.norm(self.from_place(points, self.centre), axis=1)
+        return self.now(self.R) - np.linalg.norm(self.from_origin(points, self.centre), axis=1)
 
 
 known_failure(

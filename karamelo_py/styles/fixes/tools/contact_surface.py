@@ -129,7 +129,7 @@ class ContactSurface(StiffTool):
         raise ScriptError(
             f"{named(self.hub, number)} is so deep in region '{self.region.id}' of fix "
             f"'{self.id}' that no way out of it is the shortest",
-            place=self.place,
+            mark=self.mark,
             expected="points that come less than a cell below the surface",
             hint="smaller steps (dt_factor), a stiffer body, or a region that moves more "
             "slowly, or is thicker",

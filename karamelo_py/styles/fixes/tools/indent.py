@@ -27,7 +27,7 @@ class Radius(Expression):
             line = ", ".join([ID, style, group, kind, K, R, *centre])
             message = f"the radius is {radius.constant:g}"
             hint = f"with the radius in front of the centre: fix({line})"
-            raise ScriptError(message, place=argument.place, expected="a number above 0", hint=hint)
+            raise ScriptError(message, mark=argument.mark, expected="a number above 0", hint=hint)
         return radius
 
 
@@ -69,7 +69,7 @@ class Indent(BallTool):
 
     def forces(self, points: PointsView) -> np.ndarray:
         K, R = self.now(self.K, self.R)
-        away = self.from_place(points, self.centre)
+        away = self.from_origin(points, self.centre)
         r = np.linalg.norm(away, axis=1)
         depth = np.maximum(R - r, 0)
         self.publish("s", points.total(depth > 0))

@@ -54,7 +54,7 @@ class IndentMinimizePenetration(StiffTool, BallTool):
         self.velocity = self.of_time("v", (vx, vy, vz))
 
     def forces(self, points: PointsView) -> np.ndarray:
-        away = self.from_place(points, self.centre)
+        away = self.from_origin(points, self.centre)
         r = np.linalg.norm(away, axis=1, keepdims=True)
         normal = np.divide(away, r, out=np.zeros_like(away), where=r > 0)
         radius = self.side(points) / 2
