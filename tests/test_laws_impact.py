@@ -13,6 +13,7 @@ from karamelo_py.points.laws import (
     jacobian,
     with_temperature,
 )
+from karamelo_py.points.laws.damages import integrity
 from karamelo_py.points.laws.eos import LinearPressure, VolumeStep, compressed
 from karamelo_py.points.laws.eos.p_alpha import PAlpha
 from karamelo_py.points.laws.eos_strength import EosStrength, volume_energy
@@ -157,6 +158,8 @@ def test_spall_takes_the_time_of_tuler_and_butcher():
     for part, broken in ((0.98, 0), (0.04, 1)):
         state = stretched(law, SPACE, state, np.zeros((3, 3)), n, part * time / n)
         assert damage(law, SPACE, state) == broken
+        left = integrity(law.damage, state.m.damage)
+        assert left == 1 - broken and isinstance(left, float)  # an integer cannot be taken in lanes
     assert np.allclose(stress(law, SPACE, state), 0)
     state = stretched(law, SPACE, state, 0.03 * SHRINK, 1, 1e-9)
     assert pressure_of(law, SPACE, state) > 1

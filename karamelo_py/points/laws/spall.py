@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import where
+from karamelo_py.compiler import real, where
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics.principal import principal
 from karamelo_py.points.laws import column, damage, damage_initiation
@@ -74,4 +74,4 @@ def _initiation_tuler_butcher(damage, memory):
 
 @integrity.on(TulerButcher)
 def _integrity_tuler_butcher(damage, memory):
-    return where(memory.w < 1, 1, 0)
+    return where(memory.w < 1, real(1, memory.w), real(0, memory.w))
