@@ -18,7 +18,7 @@ from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.scene.solid import words_of_volumes
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.styles.meshes import MeshRegion, MeshSolid
+from karamelo_py.styles.meshes import MeshRegion, MeshSolid, near_set
 
 SQUARES = """\
 *NODE
@@ -121,6 +121,70 @@ def test_a_set_of_nodes_is_the_faces_that_it_has(tmp_path):
     np.testing.assert_array_equal(inside, [True, False, False])
 
 
+@pytest.mark.parametrize(
+    ("group", "count", "low", "high"),
+    [
+        ("BASE", 36, (-0.08, -0.08, -0.08), (1.07, 1.07, -0.08)),  # z = 0: the nearest layer
+        ("TOP", 36, (-0.08, -0.08, 1.07), (1.07, 1.07, 1.07)),
+        ("edge", 2, (-0.08, -0.08, 1.07), (-0.08, 1.07, 1.07)),  # no face has its nodes only
+        ("a corner", 1, (1.07, 1.07, 1.07), (1.07, 1.07, 1.07)),
+        ("CUBE", 64, (0.15, 0.15, 0.15), (0.84, 0.84, 0.84)),
+    ],
+)
+def test_sets_of_a_mesh_are_groups(group, count, low, high, tmp_path):
+    """Nodes of cells of 0.23 from -1 on, by hand: sets of faces and nodes have the nearest ones."""
+    (tmp_path / "a.inp").write_text(
+        CUBE + "*NSET, NSET=BASE\n1, 2, 3, 4\n*SURFACE, NAME=TOP\nCUBE, S2\n"
+        '*NSET, NSET="a corner"\n7\n*NSET, NSET=EDGE\n5, 8\n'
+    )
+    hub = SmallHub(3, -1, 2, 0.23)
+    region = near_set(hub, "g", tmp_path / "a.inp", group)
+    axis = np.arange(-1, 2.3, 0.23)
+    x = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
+    chosen = x[region.inside(x)]
+    assert len(chosen) == count
+    np.testing.assert_allclose([chosen.min(axis=0), chosen.max(axis=0)], [low, high], atol=1e-12)
+
+
+@pytest.mark.parametrize("d", [1, 2])
+def test_nodes_of_a_mesh_in_few_dimensions(d, tmp_path):
+    kind, nodes = ("T2D2", "1,1,2") if d == 1 else ("CPS4", "1,1,2,5,4")
+    text = SQUARES + f"*ELEMENT, TYPE={kind}\n{nodes}\n*NSET, NSET=V\n2\n"
+    (tmp_path / "a.inp").write_text(text)
+    hub = SmallHub(d, -1, 2, 0.25)
+    region = near_set(hub, "g", tmp_path / "a.inp", "V")
+    x = np.stack(np.meshgrid(*[np.arange(-1, 2, 0.25)] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    np.testing.assert_array_equal(x[region.inside(x)], [[1, 0][:d]])
+    assert (MeshRegion(hub, tmp_path / "a.inp", "V").sheet is None) == (d == 2)
+
+
+def test_a_group_from_a_mesh_holds_a_body(run_interpreted, tmp_path):
+    """A block held at its base keeps its base; each mistake in a group ends in a message."""
+    (tmp_path / "a.inp").write_text(CUBE + "*NSET, NSET=BASE\n1, 2, 3, 4\n")
+    script = f"""
+        method(tlmpm, FLIP, linear, 1)
+        dimension(3, -1, 2, -1, 2, -1, 2, 0.5)
+        region(body, mesh, {tmp_path}/a.inp)
+        material(m, linear, 1000, 1e6, 0.3)
+        solid(s, region, body, 2, m, 0.5)
+        group(base, nodes, GROUP)
+        fix(hold, velocity_nodes, base, 0, 0, 0)
+        fix(pull, body_force, all, 0, 0, 1)
+        log_modify(custom, step, hold_z)
+        run(1)
+    """
+    log = run_interpreted(script.replace("GROUP", f"mesh, {tmp_path}/a.inp, BASE")).log
+    assert log["hold_z"][-1] == pytest.approx(-1000 * 0.25, rel=1e-6)  # half of a cell's height
+    for wrong, says in (
+        (f"region, {tmp_path}/a.inp, all", "no region follows"),
+        ("mesh, body, BASE", "no mesh follows"),
+        (f"mesh, {tmp_path}/a.inp, BASS", "no physical group 'BASS'"),
+        ("region, body, some", "'of' must be one of all, solid"),
+        (f"mesh, {tmp_path}/a.inp, BASE, s", "nothing can follow the set"),
+    ):
+        assert says in run_interpreted(script.replace("GROUP", wrong), status=1).err
+
+
 def test_included_decks_and_elements_that_no_solid_has(tmp_path):
     (tmp_path / "cube.inp").write_text(CUBE)
     (tmp_path / "a.inp").write_text(
@@ -147,10 +211,17 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.inp", "*Assembly\n*Instance, name=I, part=N\n", "of the part 'N', which is not"),
         ("a.inp", "*HEADING\nnothing\n", "the mesh a.inp is empty"),
         ("a.inp", SQUARES + "*ELEMENT, TYPE=B31\n1, 1, 2\n", "a.inp is empty but for 1 B31"),
-        ("a.mesh", "MFEM mesh v1.0\n", "it is a mesh of MFEM"),
+        ("a.mesh", "MFEM NURBS mesh v1.0\n", "it is of MFEM's kind 'MFEM NURBS mesh v1.0'"),
+        ("a.mesh", "MFEM mesh v1.0\nvertices\n4\nnodes\n", "its elements have curved edges"),
         ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
-        ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "it is a deck of LS-DYNA"),
-        ("a.bdf", "BEGIN BULK\nGRID,1,7,0.,0.,0.\n", "GRID in the coordinate system 7 (CP)"),
+        ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "the mesh a.inp is empty"),
+        ("a.k", "*KEYWORD\n*NODE\n1,&x,0,0\n", "a.k, line 2: *NODE has parameters (&)"),
+        ("a.k", "*NODE\n       1     one\n", "*NODE has a line that is not numbers: 1     one"),
+        ("a.k", "*INCLUDE_TRANSFORM\nb.k\n", "line 1: *INCLUDE_TRANSFORM is not read"),
+        ("a.k", "*ELEMENT_SOLID\n1,1\n1,2,3,4\n2,1\n", "ends in the middle of an element"),
+        ("a.bdf", "GRID,1,7,0.,0.,0.\n", "line 1: *GRID is in the coordinate system 7, which"),
+        ("a.bdf", "\nGRID,1,,x,0.,0.\n", "line 2: *GRID has 'x' instead of a number"),
+        ("a.bdf", "GRID,1\nCORD2R,7\nGRID,2,7\n", "line 2: *CORD2R has three points on a line"),
     ],
 )  # fmt: skip
 def test_decks_that_are_refused_name_the_line(name, text, says, tmp_path):
@@ -159,6 +230,222 @@ def test_decks_that_are_refused_name_the_line(name, text, says, tmp_path):
         volume(tmp_path / name, 2)
     assert says in str(caught.value)
     assert caught.value.argument == "file"
+
+
+DYNA = """\
+$ a cube of two wedges, a tetrahedron, a pyramid and a shell
+*KEYWORD
+*NODE
+       1             0.0             0.0             0.0       0       0
+       2             1.0             0.0             0.0
+       3             1.0             1.0             0.0
+       4             0.0             1.0             0.0
+       5             0.0             0.0             1.0
+       6             1.0             0.0             1.0
+       7             1.0             1.0             1.0
+       8             0.0             1.0             1.0
+*NODE
+9,2.,.5,.5
+*PART
+lower half
+         1         1         1
+*ELEMENT_SOLID
+       1       1       1       2       3       4       5       5       8       8
+$ the other half, with an edge of the upper face for two
+       2       2       5       6       7       8       2       2       3       3
+*ELEMENT_SOLID
+       3       3
+       2       3       7       9       9       9       9       9
+*ELEMENT_SOLID
+       4       4       2       3       7       6       9       9       9       9
+*ELEMENT_SHELL
+       5       5       1       2       3       3
+*ELEMENT_MASS
+       6       1       1.0
+*SET_NODE_LIST_TITLE
+base
+         1
+         1         2         3         4
+*SET_SOLID_GENERATE
+         2
+         1         2
+*SET_PART_LIST
+         3
+         1         4
+*SET_SEGMENT
+         4
+         1         4         8         5
+         1         2        77        77
+*END
+nothing
+"""
+
+
+def test_decks_of_lsdyna(tmp_path):
+    """Collapsed hexahedra by hand: half a cube, the pyramid 1/3, the tetrahedron half of that."""
+    (tmp_path / "a.k").write_text(DYNA)
+    (tmp_path / "b.key").write_text("*KEYWORD\n*INCLUDE\na.k\n*END\n")
+    (tmp_path / "c.inp").write_text(DYNA)
+    for group, right in (
+        (None, 3 / 2), ("1", 1 / 2), ("lower half", 1 / 2), ("2", 1 / 2), ("3", 1 / 6),
+        ("4", 1 / 3), ("solid:2", 1), ("part:3", 5 / 6),
+    ):  # fmt: skip
+        for name in ("a.k", "b.key", "c.inp"):
+            assert volume(tmp_path / name, 3, group) == pytest.approx(right, rel=1e-14), group
+    hub = SmallHub(3, -1, 3, 0.25)
+    solid = MeshSolid(hub, tmp_path / "a.k", hub.materials["steel"], 0.25, group="1")
+    np.testing.assert_allclose(solid.x0, [[1 / 3, 1 / 2, 1 / 3]], rtol=1e-14)
+    assert "left out: 1 ELEMENT_MASS, 1 ELEMENT_SHELL" in hub.warnings[0]
+    for group, inside in (("BASE", [True, False]), ("segment:4", [False, True])):
+        region = MeshRegion(hub, tmp_path / "a.k", group)
+        assert region.inside(np.array([[0.5, 0.5, 0], [0, 0.5, 0.5]])).tolist() == inside
+
+
+def test_lsdyna_in_long_columns_and_second_order(tmp_path):
+    x = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    x += [np.add(x[a], x[b]) / 2 for a, b in ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))]
+    nodes = "".join(f"{k:20}" + "".join(f"{c:20g}" for c in p) + "\n" for k, p in enumerate(x, 1))
+    text = f"*KEYWORD LONG=Y\n*NODE\n{nodes}*ELEMENT_SOLID\n{1:20}{7:20}\n"
+    (tmp_path / "a.k").write_text(text + "".join(f"{k:20}" for k in range(1, 11)) + "\n")
+    (part,) = elements_of(read(tmp_path / "a.k", 3), 3, "7")
+    assert measured(part)[1].sum() == pytest.approx(1 / 6, rel=1e-14)
+    assert part.nodes is not None and part.bulge < 1e-14
+
+
+def test_a_deck_that_another_library_reads(tmp_path):
+    """A bird striking bricks: the deck and its reader are lsdyna-mesh-reader's, volumes VTK's."""
+    library = pytest.importorskip("lsdyna_mesh_reader")
+    vtk = pytest.importorskip("vtk")
+    path = Path(library.__file__).parent / "examples" / "birdball.k"
+    deck = library.Deck(path)
+    (nodes,), (solids,) = deck.node_sections, deck.element_solid_sections
+    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+    for x in nodes.coordinates:
+        points.InsertNextPoint(*x)
+    grid.SetPoints(points)
+    numbers, first, kinds = solids.to_vtk()
+    place = np.searchsorted(nodes.nid, numbers)
+    for a, b, kind in zip(first[:-1], first[1:], kinds, strict=True):
+        grid.InsertNextCell(int(kind), b - a, place[a:b].tolist())
+    sizes = vtk.vtkCellSizeFilter()
+    sizes.SetInputData(grid)
+    sizes.Update()
+    array = sizes.GetOutput().GetCellData().GetArray("Volume")
+    right = sum(array.GetValue(k) for k in range(array.GetNumberOfTuples()))
+    assert len(kinds) == 816 and volume(path, 3) == pytest.approx(right, rel=2e-6)
+
+
+CUBE_IN_NASTRAN = """\
+GRID           1       7     0.0     0.0     0.0
+GRID           2       7     1.0     0.0     0.0
+GRID,3,7,1.,1.,0.
+GRID,4,7,0.,1.,0.
+GRID*                  5               7             0.0             0.0
+*                    1.0
+GRID           6       7     1.0     0.0     1.0
+GRID           7       7     1.0     1.0   10.-1
+GRID           8       7     0.0     1.0     1.0
+CHEXA          1      11       1       2       3       4       5       6+
++              7       8
+CBAR           2      12       1       2
+"""
+
+
+@pytest.mark.parametrize(
+    ("system", "right"),
+    [
+        ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n", 1),
+        ("CORD2R         7       0      5.      5.      5.      5.      6.      5.        \n"
+         "              6.      5.      5.\n", 1),
+        # degrees in the plane and along: a prism with the base of a triangle, of sin(1) / 2
+        ("CORD2C,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n", math.sin(math.pi / 180) / 2),
+        ("CORD1R,7,21,22,23\nGRID,21,,1.,1.,1.\nGRID,22,,1.,1.,3.\nGRID,23,8,4.,0.,0.\n"
+         "CORD2R,8,,0.,1.,1.,1.,1.,1.\n,0.,1.,2.\n", 1),
+    ],
+)  # fmt: skip
+def test_nastran_in_systems_of_coordinates(system, right, tmp_path):
+    """Bulk data only, in all kinds of fields; with BEGIN BULK and other sections, too."""
+    (tmp_path / "a.bdf").write_text(CUBE_IN_NASTRAN + system)
+    (tmp_path / "b.nas").write_text(
+        f"SOL 101\nCEND\nBEGIN BULK\n{system}{CUBE_IN_NASTRAN}ENDDATA\nGRID,1,5\n"
+    )
+    for name in ("a.bdf", "b.nas"):
+        for group in (None, 11):
+            assert volume(tmp_path / name, 3, group) == pytest.approx(right, rel=1e-12)
+    assert read(tmp_path / "a.bdf", 3).left_out == {"CBAR": 1}
+
+
+def test_nastran_in_spheres(tmp_path):
+    """Radius, angle from z and longitude: the corners of a cube of 2 around the origin."""
+    r, down = math.sqrt(3), math.degrees(math.acos(1 / math.sqrt(3)))
+    turns = [225, 315, 45, 135]
+    grids = [f"GRID,{k + 1},7,{r},{180 - down},{t}\n" for k, t in enumerate(turns)]
+    grids += [f"GRID,{k + 5},7,{r},{down},{t}\n" for k, t in enumerate(turns)]
+    text = "CORD2S,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\nCHEXA,1,1,1,2,3,4,5,6\n,7,8\n"
+    (tmp_path / "a.bdf").write_text("GRDSET,,\n" + text + "".join(grids))
+    assert volume(tmp_path / "a.bdf", 3) == pytest.approx(8, rel=1e-12)
+
+
+@pytest.mark.parametrize(("kind", "family"), [("CHEXA", "hexahedron"), ("CPENTA", "wedge")])
+def test_second_order_of_nastran_may_lack_nodes(kind, family, tmp_path):
+    """Straight edges; one element with all nodes in the middle of its edges, one without any."""
+    shape = SHAPES[family]
+    corners = np.array(shape.corners, float)
+    n = len(corners)
+    edges = [of for of in MIDDLES[family] if len(of) == 2]
+    upright = [of for of in edges if of[1] - of[0] == n // 2]
+    flat = [of for of in edges if of not in upright]
+    order = [*flat[: n // 2], *upright, *flat[n // 2 :]]  # as Nastran numbers them
+    x = [*corners, *(corners[list(of)].mean(axis=0) for of in order)]
+    grids = [f"GRID,{k},,{a:.3f},{b:.3f},{c:.3f}\n" for k, (a, b, c) in enumerate(x, 1)]
+    fields = [kind, 1, 1, *range(1, len(x) + 1)]
+    lines = [",".join(map(str, fields[:9]))]
+    lines += ["," + ",".join(map(str, fields[k : k + 8])) for k in range(9, len(fields), 8)]
+    without = [lines[0], "," + ",".join(map(str, fields[9 : 3 + n]))]
+    for last in (lines, without):
+        (tmp_path / "a.bdf").write_text("".join(grids) + "\n".join(last) + "\n")
+        right = {"hexahedron": 8, "wedge": 1}[family]
+        assert volume(tmp_path / "a.bdf", 3) == pytest.approx(right, rel=1e-12)
+
+
+MFEM = """MFEM mesh v1.3
+# two squares and a triangle
+dimension
+2
+elements
+3
+1 3 0 1 4 3
+2 3 1 2 5 4
+2 2 2 6 5
+attribute_sets
+1
+"right" 1 2
+boundary
+1
+4 1 0 3
+bdr_attribute_sets
+1
+"left" 1 4
+vertices
+7
+2
+0 0
+1 0
+2 0
+0 1
+1 1
+2 1
+3 0
+"""
+
+
+def test_meshes_of_mfem(tmp_path):
+    (tmp_path / "a.mesh").write_text(MFEM)
+    (tmp_path / "b.mesh").write_text(MFEM.replace("v1.3", "v1.0"))
+    for group, right in ((None, 2.5), (1, 1), ("2", 1.5), ("right", 1.5)):
+        assert volume(tmp_path / "a.mesh", 2, group) == pytest.approx(right, rel=1e-14)
+    assert volume(tmp_path / "b.mesh", 2) == 2.5
+    assert [lines(tmp_path / "a.mesh", group) for group in ("left", "boundary:4")] == [1, 1]
 
 
 GMSH = """\

@@ -1,6 +1,7 @@
 """Commands that define the domain and its bodies: dimension, boundary, region, solid, group."""
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Literal
 
 from karamelo_py.kernels.equations.periodic import InUse
@@ -17,6 +18,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, own_grids, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
+from karamelo_py.styles.meshes import MeshFile, near_set
 
 _BOUNDS = ("xmin", "xmax", "ymin", "ymax", "zmin", "zmax")
 _WITH_H = {d: (*_BOUNDS[: 2 * d], "h") for d in (1, 2, 3)}
@@ -323,19 +325,31 @@ def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
         )
 
 
+class RegionOrFile:
+    script_kind = "the ID of a region, or the name of a mesh file"
+
+    @classmethod
+    def from_script(cls, hub: Hub, argument: Argument) -> Region | Path:
+        name = argument.word() or argument.text.strip("\"'")
+        is_file = name not in hub.regions and Path(name).suffix.lower() in MeshFile.endings
+        return (MeshFile if is_file else Region).from_script(hub, argument)
+
+
 def group(
     hub: Hub,
     ID: str,
     kind: Literal["particles", "nodes"],
-    by: Literal["region"],
-    region: Region,
-    of: Literal["all", "solid"],
+    by: Literal["region", "mesh"],
+    region: RegionOrFile,
+    of: str | int,
     *solids: Solid,
 ) -> None:
     """Name a set of points or of nodes.
 
     By reference positions of points when the command is read, or positions of nodes. Separate nodes
     of later solids also belong, unless solids are named. The group ``all`` always exists.
+
+    A set of faces, edges or nodes of a mesh selects what is nearer to it than half a cell.
 
     Parameters
     ----------
@@ -344,11 +358,12 @@ def group(
     kind
         ``particles`` or ``nodes``.
     by
-        The word ``region``.
+        ``region`` or ``mesh``.
     region
-        ID of the region that selects the members.
+        ID of the region that selects the members, or name of the mesh file.
     of
-        ``all``, or ``solid`` followed by IDs of solids.
+        ``all``, or ``solid`` followed by IDs of solids. For a mesh: name or number of its set, as
+        in region mesh.
     solids
         Only their points may belong. For nodes, solids on the same grid give the same group.
 
@@ -356,6 +371,7 @@ def group(
     -------
     group(left, nodes, region, wall, all)
     group(impactor, particles, region, box, solid, s1)
+    group(base, nodes, mesh, deck.inp, BASE)
 
     See Also
     --------
@@ -364,7 +380,17 @@ def group(
     if ID == ALL:
         message, expected = "'all' is the group of everything and cannot be changed", "another name"
         raise ScriptError(message, argument="ID", expected=expected)
+    if isinstance(region, Region) != (by == "region"):
+        expected = "the ID of a region" if by == "region" else "the name of a mesh file"
+        raise ScriptError(f"no {by} follows", argument="region", expected=expected)
+    if not isinstance(region, Region):
+        if solids:
+            raise ScriptError("nothing can follow the set of a mesh", argument="solids")
+        region, of = near_set(hub, ID, region, of), "all"
     form = f"group({ID}, {kind}, region, {region.id}"
+    if of not in ("all", "solid"):
+        message = f"'of' must be one of all, solid, not '{of}'"
+        raise ScriptError(message, argument="of", expected="one of all, solid")
     if of == "solid" and not solids:
         expected = f"{form}, solid, solidID, ...)"
         raise ScriptError("no solid is named", argument="of", expected=expected)
@@ -393,4 +419,6 @@ def group(
         )
 
 
-group.syntax = "ID, particles|nodes, region, regionID, all | solid, solidID, ..."
+group.syntax = (
+    "ID, particles|nodes, region, regionID, all | solid, solidID, ... | mesh, file, set of the file"
+)

@@ -45,7 +45,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
     count, _, d = faces.shape
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
-    index = ((middle - middle.min(axis=0, initial=np.inf)) * (1023 / extent)).astype(np.int64)
+    index = ((middle - middle.min(axis=0, initial=np.inf)) / extent * 1023).astype(np.int64)
     code = np.zeros(count, np.int64)  # along a space-filling curve (Morton 1966)
     for bit in range(10):
         for k in range(d):
@@ -217,6 +217,17 @@ def nearest(kin, surface, x, reach):
                     best, face = square, i
             k = _behind(k)
     return _place_on(kin, surface, face, x)
+
+
+def _offset(surface, kin, x, reach):
+    """Return the largest component of the way to the nearest place, `reach` if it is far."""
+    far = reach * sqrt(kin.dimension)
+    if distance(surface, kin, x, far) >= far:
+        return reach
+    way, most = x - nearest(kin, surface, x, far), 0.0
+    for c in range(kin.dimension):
+        most = max(most, abs(way[c]))
+    return most
 
 
 @noinline
@@ -399,5 +410,7 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Positions (n, d) and a reach give depths (n,), < 0 outside, and distances, both at most `reach`.
+# Positions (n, d) and a reach give depths (n,), < 0 outside, distances, and largest components of
+# these, at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
+offsets = _of_positions(_offset)

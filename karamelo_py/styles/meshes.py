@@ -1,13 +1,14 @@
 """Region styles mesh and stl, solid style mesh: shapes from mesh files."""
 
 from collections import Counter
+from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 
-from karamelo_py.kernels.surfaces import Joined, Surface
+from karamelo_py.kernels.surfaces import Joined, Surface, offsets
 from karamelo_py.language.signature import Positive
-from karamelo_py.scene.domain import RELATIVE_TOLERANCE
+from karamelo_py.scene.domain import RELATIVE_TOLERANCE, require_grid
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.meshes.data import Mesh
@@ -88,9 +89,9 @@ class MeshRegion(Enclosed):
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), Exodus (.e), MED, Nastran,
-        CGNS, VTK and any other format that meshio reads; or of a geometry (.geo, .step, .brep),
-        which Gmsh meshes.
+        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), LS-DYNA (.k), Nastran (.bdf),
+        Exodus (.e), MED, CGNS, MFEM, VTK and any other format that meshio reads; or of a geometry
+        (.geo, .step, .brep), which Gmsh meshes.
     group
         Name or number of a physical group; in other formats a set, an instance, a block, a property
         or a surface, and ``name:number`` for numbers of cells in VTK. Default: the whole mesh. A
@@ -125,10 +126,11 @@ class MeshRegion(Enclosed):
             group, exterior = None, EXTERIOR
         domain = hub.require_domain()
         dimension = domain.dimension
-        mesh = read(file, dimension, hub.settings.trusts, domain.h / 2)
+        mesh = read(file, dimension, hub.settings.trusts, domain.h and domain.h / 2)
         parts = elements_of(mesh, dimension, group, lower=group is not None)
         _tell_of_curved_edges(hub, file, max(part.bulge for part in parts))
         flat = parts[0].shape.dimension < dimension
+        self.has_faces = parts[0].shape.dimension == dimension - 1
         faces = flat_faces(parts) if flat else outer_faces(parts)
         lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
         _tell_of_units(hub, file, lo, hi)
@@ -147,7 +149,29 @@ class MeshRegion(Enclosed):
 
     @property
     def sheet(self) -> np.ndarray | None:
-        return self.skin.faces if self.flat else None
+        return self.skin.faces if self.flat and self.has_faces else None
+
+
+class Near(Region):
+    """All positions whose cell has a part of a set of faces, edges or nodes."""
+
+    def __init__(self, region: MeshRegion):
+        d = region.dimension
+        self.reach = require_grid(region.hub).h / 2 - region.tolerance
+        lo, hi = region.box_lo[:d] - self.reach, region.box_hi[:d] + self.reach
+        super().__init__(region.hub, lo, hi, parts=(region,))
+        (self.surface,) = region.skin.surfaces
+
+    def contains(self, x: np.ndarray) -> np.ndarray:
+        return offsets(self.surface, x, self.reach) < self.reach
+
+
+def near_set(hub: Hub, name: str, file: Path, group: str | int) -> Region:
+    """A set of elements as a region; of faces, edges or nodes, what is within half a cell."""
+    region = MeshRegion(hub, file, group)
+    chosen = Near(region) if region.flat else region
+    chosen.id = f"{name} ({file.name})"
+    return chosen
 
 
 # Binary STL files, and most writers of other formats, have single precision.

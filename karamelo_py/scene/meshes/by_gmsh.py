@@ -14,6 +14,7 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
+READS = (".msh", ".msh2", ".msh4", ".med", ".unv", ".cgns")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
 # Names that differ from Gmsh's in lower case.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
@@ -55,10 +56,10 @@ def begin(gmsh: ModuleType) -> None:
 
 
 @contextlib.contextmanager
-def alone(path: Path) -> Iterator[Path]:
+def alone(path: Path, ending: str = "") -> Iterator[Path]:
     """Link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may act."""
     with tempfile.TemporaryDirectory() as folder:
-        link = Path(folder) / path.name
+        link = Path(folder) / (path.name + ending)
         try:
             link.symlink_to(path)
         except OSError:
@@ -106,7 +107,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 def read_by_gmsh(path: Path) -> Mesh:
     """Read a mesh; Gmsh's errors become ValueError."""
-    with alone(path) as link:
+    with alone(path, "" if path.suffix.lower() in READS else ".msh") as link:
         try:
             with _model(link) as gmsh:
                 return _taken(gmsh, of_file=_Header(path))

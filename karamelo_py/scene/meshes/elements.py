@@ -36,6 +36,7 @@ _TETRAHEDRON = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
 SHAPES = {
     shape.name: shape
     for shape in (
+        Shape("vertex", "nodes", 0, (0,), ((),), True),
         Shape("line", "lines", 1, (1, 0), ((-1,), (1,))),
         Shape("triangle", "triangles", 2, (0, 2, 1), _TRIANGLE, True),
         Shape("quad", "quadrilaterals", 2, (0, 3, 2, 1), _SQUARE),
@@ -92,7 +93,7 @@ def elements_of(
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
     highest = max(cells.dimension for cells in chosen)
-    if highest > dimension or (highest < dimension and not lower) or highest < 1:
+    if highest > dimension or (highest < dimension and not lower) or highest < 0:
         strange = [cells.type for cells in chosen if cells.dimension < 0]
         types = ", ".join(dict.fromkeys(strange or [cells.type for cells in chosen]))
         raise ScriptError(
@@ -113,7 +114,9 @@ def elements_of(
     positions = np.ascontiguousarray(mesh.points[:, :dimension])
     kinds: dict[tuple[str, tuple], list[np.ndarray]] = {}
     for cells in wanted:
-        kinds.setdefault((cells.family, _reference(cells)), []).append(cells.nodes)
+        reference = _reference(cells)
+        kept = cells.nodes[:, : len(reference)]
+        kinds.setdefault((cells.family, reference), []).append(kept)
     groups = []
     for (name, reference), parts in kinds.items():
         shape, numbers = SHAPES[name], _once(np.concatenate(parts))

@@ -74,13 +74,12 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
+    """Make simplices (m, d, d): a line or node in 3D is a triangle with equal corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
         whole = _halves(elements.numbers, corners) if corners.shape[1] == 4 else [corners]
-        simplices += [
-            np.concatenate([c, c[:, -1:]], axis=1) if c.shape[1] < d else c for c in whole
-        ]
+        simplices += [np.concatenate([c, *[c[:, -1:]] * (d - c.shape[1])], axis=1) for c in whole]
     return np.concatenate(simplices)
 
 

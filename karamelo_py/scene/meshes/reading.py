@@ -1,6 +1,7 @@
 """Entry point for mesh files: chooses the reader.
 
-Gmsh reads its own formats, MED, UNV and Nastran, and meshes geometries; meshio reads the rest.
+Decks of Abaqus, LS-DYNA and Nastran, Exodus, MFEM and OBJ have readers here. Gmsh reads its own
+formats, MED, UNV and CGNS, and meshes geometries; meshio reads the rest.
 """
 
 import contextlib
@@ -16,35 +17,39 @@ import numpy as np
 
 from karamelo_py.language.kinds import InputFile
 from karamelo_py.scene.meshes.abaqus import read_deck
+from karamelo_py.scene.meshes.by_gmsh import READS as BY_GMSH
 from karamelo_py.scene.meshes.by_gmsh import NoGmsh, alone, mesh_geometry, read_by_gmsh
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.scene.meshes.exodus import ENDINGS as EXODUS
 from karamelo_py.scene.meshes.exodus import read_exodus
 from karamelo_py.scene.meshes.geometry import refuse_commands
+from karamelo_py.scene.meshes.lsdyna import ENDINGS as LSDYNA
+from karamelo_py.scene.meshes.lsdyna import read_lsdyna
+from karamelo_py.scene.meshes.mfem import read_mfem
+from karamelo_py.scene.meshes.nastran import ENDINGS as NASTRAN
+from karamelo_py.scene.meshes.nastran import read_nastran
 from karamelo_py.scene.meshes.obj import read_obj
 from karamelo_py.script.errors import FAILURES, ScriptError
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-_BY_GMSH = (".msh", ".msh2", ".msh4", ".med", ".unv", ".bdf", ".nas", ".cgns")
 # Gmsh takes other text for its geometry language.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
-_BY_ENDING = (".unv", ".bdf", ".nas", ".cgns")  # recognised by ending
+_BY_ENDING = (".unv", ".cgns")  # recognised by ending
 _MED = b"\x89HDF"
 # Files of other programs with endings of meshes: first bytes, and advice.
 _FOREIGN = (
     (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
-    (re.compile(rb"\s*MFEM"), "a mesh of MFEM", "in MFEM, write it as .vtu or .msh"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
     (re.compile(rb"\s*Begin\s+(ModelPart|Properties|Nodes)"), "a model of Kratos",
      "export it as .vtu or .msh"),
-    (re.compile(rb"\s*(\$[^\n]*\n)*\*KEYWORD", re.I), "a deck of LS-DYNA",
-     "in LS-PrePost, export it as .inp (Abaqus)"),
 )  # fmt: skip
 
 
 class MeshFile(InputFile):
-    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *_BY_GMSH, *EXODUS} - {".svg"}
+    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *BY_GMSH, *EXODUS, *LSDYNA} - {
+        ".svg"
+    }
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
@@ -108,6 +113,8 @@ def _by_content(path: Path) -> Mesh:
     for pattern, program, remedy in _FOREIGN:
         if pattern.match(begin):
             raise _unreadable(path, f"it is {program}", hint=remedy)
+    if ending in LSDYNA or re.match(rb"\s*(\$[^\n]*\n)*\*KEYWORD", begin, re.I):
+        return read_lsdyna(path)
     if ending in (".inp", ".msh") and re.search(rb"^ *\*[A-Za-z]", begin, re.M):
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
@@ -119,10 +126,16 @@ def _by_content(path: Path) -> Mesh:
             return read_exodus(path)
         except FAILURES as error:
             raise _unreadable(path, _reason(error)) from None
-    if ending in (".bdf", ".nas"):
-        _refuse_systems(path)
+    if ending in NASTRAN:
+        return read_nastran(path)
+    if begin.lstrip().startswith(b"MFEM"):
+        try:
+            return read_mfem(path)
+        except FAILURES as error:
+            raise _unreadable(path, _reason(error), "in MFEM, write it as .vtu") from None
     why = None
-    if ending in _BY_GMSH and (begin.startswith((*_OF_GMSH, _MED)) or ending in _BY_ENDING):
+    by_content = begin.startswith(_OF_GMSH) or (ending == ".med" and begin.startswith(_MED))
+    if by_content or ending in _BY_ENDING:
         try:
             return read_by_gmsh(path)
         except NoGmsh as error:
@@ -130,22 +143,6 @@ def _by_content(path: Path) -> Mesh:
         except ValueError as error:
             raise _unreadable(path, str(error)) from None
     return _by_meshio(path, why=why)
-
-
-def _refuse_systems(path: Path) -> None:
-    """Refuse Nastran nodes in local coordinate systems: no reader supports them."""
-    with path.open(errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if line[:4].upper() == "GRID":
-                wide = 16 if line[:5].endswith("*") else 8
-                fields = [*line.split(","), "", ""]
-                field = fields[2] if "," in line else line[8 + wide : 8 + 2 * wide]
-                if field.strip(" 0\n"):
-                    raise _unreadable(
-                        path,
-                        f"line {number}: GRID in the coordinate system {field.strip()} (CP)",
-                        "write the nodes in the basic system",
-                    )
 
 
 def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError:

@@ -1,0 +1,273 @@
+"""Parts of decks: numbered nodes and elements, sets of them, merged to one mesh."""
+
+import itertools
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
+from karamelo_py.script.errors import ScriptError
+
+_MOST = 2**31  # bytes of an included file
+# Corners, from 0, of faces S1, S2, ... of Abaqus (Abaqus Analysis User's Guide, "Two- and
+# three-dimensional solid element library").
+_FACES = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": (
+        *((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1)),
+        *((1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)),
+    ),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+}
+SetItems = dict[str, list[np.ndarray | str]]  # numbers, and names of other sets
+
+
+class DeckKeyword(NamedTuple):
+    name: str
+    options: dict[str, str]
+    lines: list[str]
+    number: int  # of its line
+    file: Path
+
+
+def wrong(keyword: DeckKeyword, error: str, expected: str | None = None) -> ScriptError:
+    return ScriptError(
+        f"{keyword.file.name}, line {keyword.number}: *{keyword.name} {error}",
+        argument="file",
+        expected=expected,
+    )
+
+
+def included(keyword: DeckKeyword, name: str, above: tuple[Path, ...]) -> Path:
+    path = keyword.file.parent / name
+    if path in above or not path.is_file() or path.stat().st_size > _MOST:
+        raise wrong(keyword, f"of '{name}', which cannot be read", "a file next to the deck")
+    return path
+
+
+def table_of(keyword: DeckKeyword, least: int, most: int, widths: Sequence[int] = ()) -> np.ndarray:
+    """Numbers (n, most) of the data lines, by commas, or else in columns of `widths`.
+
+    Omitted ones are 0.
+    """
+    ends = list(itertools.accumulate(widths))
+    starts = [0, *ends[:-1]]
+    rows = []
+    for line in keyword.lines:
+        by_columns = widths and "," not in line
+        row = (
+            [line[a:b] for a, b in zip(starts, ends, strict=True)]
+            if by_columns
+            else (line.rstrip().rstrip(",").split(",")[:most])
+        )
+        rows.append([x if x.strip() else "0" for x in row] + ["0"] * (most - len(row)))
+        if len(row) < least:
+            raise wrong(keyword, f"has a line that is too short: {line.strip()}")
+    try:
+        return np.array(rows, float).reshape(-1, most)
+    except ValueError:
+        lines = zip(keyword.lines, rows, strict=True)
+        bad = next(line for line, row in lines if not all(map(_is_number, row)))
+        raise wrong(keyword, f"has a line that is not numbers: {bad.strip()}") from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+class DeckElements(NamedTuple):
+    type: str  # meshio's
+    label: str  # in the deck
+    numbers: np.ndarray  # (n,)
+    nodes: np.ndarray  # (n, c) node numbers of the deck
+
+
+class DeckPart:
+    def __init__(self) -> None:
+        self.numbers: list[np.ndarray] = []
+        self.places: list[np.ndarray] = []
+        self.elements: list[DeckElements] = []
+        self.skipped: Counter[str] = Counter()
+        self.nodes: SetItems = {}
+        self.groups: SetItems = {}
+        self.sides: dict[str, list[tuple[str, str]]] = {}  # elements or their set; S1, S2, ...
+        self.faces: dict[str, list[np.ndarray]] = {}  # node numbers of the deck (n, c)
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # of the nodes that follow
+
+    def add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
+        self.numbers.append(numbers)
+        self.places.append(places)
+
+    def table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Ascending node numbers (n,) and positions; the last definition of a node counts."""
+        if not self.numbers:
+            return np.empty(0, np.int64), np.empty((0, 3))
+        numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
+        unique, last = np.unique(numbers[::-1], return_index=True)
+        return unique, places[::-1][last]
+
+
+class DeckBody(NamedTuple):
+    name: str
+    part: DeckPart
+    move: Callable[[np.ndarray], np.ndarray] = lambda x: x
+
+
+def cylindrical(x: np.ndarray) -> np.ndarray:
+    angle = np.radians(x[:, 1])
+    return np.stack([x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle), x[:, 2]], axis=1)
+
+
+def into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
+    if name:
+        sets.setdefault(name.upper(), []).append(item)
+
+
+def members(sets: SetItems, name: str) -> np.ndarray:
+    """Ascending numbers of a set, or the number itself."""
+    if name.lstrip("-").isdigit() and name not in sets:
+        return np.array([int(name)])
+    return np.unique(np.concatenate([np.empty(0, np.int64), *_resolved(sets, name, ())]))
+
+
+def _resolved(sets: SetItems, name: str, above: tuple[str, ...]) -> Iterator[np.ndarray]:
+    for item in sets.get(name.upper(), ()):
+        if not isinstance(item, str):
+            yield item
+        elif item not in above:
+            yield from _resolved(sets, item, (*above, name))
+
+
+class Numbering(NamedTuple):
+    deck: np.ndarray  # (n,) ascending
+    mesh: np.ndarray  # (n,)
+
+    def of(self, numbers: np.ndarray) -> np.ndarray:
+        """Numbers in the mesh (m,), or -1."""
+        if not len(self.deck):
+            return np.full(len(numbers), -1)
+        at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
+        return np.where(self.deck[at] == numbers, self.mesh[at], -1)
+
+    def listed(self, numbers: np.ndarray) -> np.ndarray:
+        of_mesh = self.of(numbers)
+        return of_mesh[of_mesh >= 0]
+
+
+class Sets:
+    def __init__(self) -> None:
+        self.by_name: dict[str, list[np.ndarray]] = defaultdict(list)
+        self.numbering: dict[str, Numbering] = {}
+
+    def extend(self, name: str, other: str) -> None:
+        self.by_name[name] += list(self.by_name.get(other, ()))
+
+    def listed(self, name: str) -> np.ndarray:
+        return np.concatenate([np.empty(0, np.int64), *self.by_name.get(name, ())])
+
+
+def _names(body: DeckBody, name: str) -> set[str]:
+    return {name, f"{body.name}.{name}"} if body.name else {name}
+
+
+class Merged:
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.points: list[np.ndarray] = []
+        # By type and label: numbers (n,) and nodes (n, c).
+        self.blocks: dict[tuple[str, str], list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
+        self.count = 0
+        self.nodes, self.elements = Sets(), Sets()
+        self.surfaces: dict[str, list[tuple[int, np.ndarray]]] = defaultdict(list)
+        self.faces: dict[str, list[CellBlock]] = defaultdict(list)
+        self.skipped: Counter[str] = Counter()
+
+    def add(self, body: DeckBody) -> None:
+        numbers, places = body.part.table()
+        table = Numbering(numbers, np.arange(len(numbers)) + sum(map(len, self.points)))
+        self.nodes.numbering[body.name] = table
+        self.points.append(body.move(places))
+        self.skipped.update(body.part.skipped)
+        numbered = [np.empty((2, 0), np.int64)]
+        for kind, label, numbers, nodes in body.part.elements:
+            of_mesh = table.of(nodes.ravel()).reshape(nodes.shape)
+            if (of_mesh < 0).any():
+                row, column = np.argwhere(of_mesh < 0)[0]
+                raise ScriptError(
+                    f"{self.path.name}: element {numbers[row]} has the node "
+                    f"{nodes[row, column]}, which is not defined",
+                    argument="file",
+                )
+            rows = self.count + np.arange(len(nodes))
+            self.blocks[kind, label].append((rows, of_mesh))
+            self.count += len(nodes)
+            numbered.append(np.stack([numbers, rows]))
+        pairs = np.concatenate(numbered, axis=1)
+        elements = Numbering(*pairs[:, np.argsort(pairs[0], kind="stable")])
+        self.elements.numbering[body.name] = elements
+        self.elements.by_name[body.name].append(elements.mesh)
+        for of_part, sets in ((body.part.nodes, self.nodes), (body.part.groups, self.elements)):
+            for name in of_part:
+                listed = sets.numbering[body.name].listed(members(of_part, name))
+                for key in _names(body, name):
+                    sets.by_name[key].append(listed)
+        self.add_surfaces(body)
+        for name, faces in body.part.faces.items():
+            for nodes in faces:
+                of_mesh = table.of(nodes.ravel()).reshape(nodes.shape)
+                known = of_mesh[(of_mesh >= 0).all(axis=1)]
+                self.faces[name].append(CellBlock(FACE_TYPES[nodes.shape[1]], known))
+
+    def add_surfaces(self, body: DeckBody) -> None:
+        for name, items in body.part.sides.items():
+            for of, face in items:
+                if of.isdigit():
+                    elements = self.elements.numbering[body.name].listed(np.array([int(of)]))
+                else:
+                    of_body = f"{body.name}.{of}"
+                    in_body = of_body in self.elements.by_name
+                    elements = self.elements.listed(of_body if in_body else of)
+                if re.fullmatch(r"S[1-6]", face):
+                    for key in _names(body, name):
+                        self.surfaces[key].append((int(face[1]) - 1, elements))
+
+    def mesh(self) -> Mesh:
+        cells, numbers = [], []
+        for (kind, label), parts in self.blocks.items():
+            of_block, nodes = map(np.concatenate, zip(*parts, strict=True))
+            numbers.append(of_block)
+            cells.append(CellBlock(kind, nodes, label=label))
+        faces = self.faces
+        for name, items in self.surfaces.items():
+            for side, elements in items:
+                for block, of_block in zip(cells, numbers, strict=True):
+                    corners = _FACES.get(block.family, ())
+                    nodes = block.nodes[np.isin(of_block, elements)]
+                    if side < len(corners) and len(nodes):
+                        kind = FACE_TYPES[len(corners[side])]
+                        faces[name].append(CellBlock(kind, nodes[:, corners[side]]))
+        every = [*cells, *(cell for parts in faces.values() for cell in parts)]
+        none = [np.zeros(len(cell.nodes), bool) for cell in every]
+        sets = {}
+        for name in filter(None, self.elements.by_name):
+            wanted = self.elements.listed(name)
+            sets[name] = [np.isin(of_block, wanted) for of_block in numbers] + none[len(cells) :]
+        for name, of_faces in faces.items():
+            mine = {id(cell) for cell in of_faces}
+            sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
+        points = np.concatenate(self.points)
+        node_sets = {name: np.zeros(len(points), bool) for name in self.nodes.by_name}
+        for name, mask in node_sets.items():
+            mask[self.nodes.listed(name)] = True
+        return Mesh(points, every, sets, node_sets, self.skipped)
