@@ -1,7 +1,6 @@
 """Tracing compiler: Python functions of points, numbers and arrays become kernels on LLVM.
 
-Other packages import these names and the modules of this folder; the folders `trace`, `code` and
-`disk` are private.
+The folders `trace`, `code` and `disk` are private.
 """
 
 from karamelo_py.compiler.code.arguments import forget_array

@@ -61,7 +61,7 @@ def vector(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """Components of a tensor, including the hoop component."""
+    """Count the components of a tensor, including the hoop component."""
     return kin.tensor_size
 
 
@@ -103,7 +103,7 @@ def name_of(kind: type) -> str:
 
 
 def _trait(kind: type, name: str) -> Any:
-    """Return a trait of a field; defaults for one not derived from `Field`."""
+    """Return a trait of a field, with `Field`'s defaults for one not derived from it."""
     return getattr(kind, name, getattr(Field, name))
 
 
@@ -135,9 +135,8 @@ def rows_of_points(
 
     No vector load crosses a line, and the dozens of rows that a visit traverses in parallel fall
     into different cache sets; contiguous rows would collide for n = 512 or 512 000. Rows always
-    have gaps: an array without is another type, and another compilation.
-
-    `room` (k,) is used if long enough (`length_of_rows`).
+    have gaps, because an array without is another type and another compilation. `room` (k,) is used
+    if long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -171,7 +170,7 @@ def as_rows_of_points(array: np.ndarray) -> np.ndarray:
 
 
 def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Select points from an array (..., n): (..., k).
+    """Select points from an array (..., n).
 
     ``np.take`` would first copy arrays with gaps between rows.
     """
@@ -225,12 +224,11 @@ def load(array, p, like):
 
 
 def store(array, p, values):
-    """Set components of point `p` to `values`, unless `array` is None."""
     store_from(array, p, 0, values)
 
 
 def store_from(array, p, first, values):
-    """Set components of point `p` from `first` on."""
+    """Set components of point `p`, starting at `first`."""
     if array is not None:
         values = flat(values)
         for k in range(first, len(values)):
@@ -238,14 +236,12 @@ def store_from(array, p, first, values):
 
 
 def increase(array, p, values):
-    """Add `values` to components of point `p`, unless `array` is None."""
     if array is not None:
         for k, value in enumerate(values):
             array[k, p] += value
 
 
 def forget(array, p, which):
-    """Set components of point `p` to NaN where `which` > 0."""
     if array is not None:
         for k, chosen in enumerate(which):
             value = array[k, p]
@@ -259,9 +255,8 @@ def load_vector(kin, array, p):
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     """Return address and item size in bytes (m, 2), int64, of each row of arrays (..., n).
 
-    Of non-empty arrays; valid while they live and are not resized.
-
-    Raises ValueError if items are not contiguous, or not of 4 or 8 bytes.
+    Empty arrays have none. Addresses are valid while arrays live and are not resized. Raise
+    ValueError if items are not contiguous, or not of 4 or 8 bytes.
     """
     rows: list[tuple[int, int]] = []
     for array in arrays:
@@ -299,10 +294,7 @@ def _row_in_kernels(address, like, count):
 def pick_items(
     address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
-    """Set ``room[c, p]`` to item ``order[p]`` of a row, for p in [begin, end).
-
-    The row has integers of the type of `like`.
-    """
+    """Set ``room[c, p]`` to item ``order[p]`` of a row of integers, for p in [begin, end)."""
     row = _row(address, like, order.size)
     for p in range(begin, end):
         room[c, p] = row[index(order[p])]

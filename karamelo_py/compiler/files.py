@@ -47,7 +47,7 @@ def _guard(directory: Path) -> None:
 def read(path: Path) -> bytes:
     """Read a file that only this user or the administrator can have written.
 
-    Raises OSError if another user can write it, ValueError if it is damaged.
+    Raise OSError if another user can write it, ValueError if it is damaged.
     """
     with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
         _guard(path.parent)
@@ -63,7 +63,6 @@ _reporter = contextvars.ContextVar[Callable[[str], None]]("reporter", default=_w
 
 
 def report(text: str) -> None:
-    """Report a problem by `telling`, or as a warning."""
     _reporter.get()(text)
 
 
@@ -73,7 +72,7 @@ def report_error(error: OSError) -> None:
 
 @contextlib.contextmanager
 def telling(tell: Callable[[str], None]) -> Iterator[None]:
-    """Report problems, each once, through `tell` in this context."""
+    """Report problems through `tell` in this context, each once."""
     texts: list[str] = []
 
     def tell_once(text: str) -> None:

@@ -66,7 +66,7 @@ def _counted(array, i, step):
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
         at = llvm.item_pointer(builder, array, table, (i,))
-        # Bits of non-negative floats are ordered like the floats.
+        # bits of non-negative floats are ordered like the floats
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
 
@@ -139,7 +139,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# Functions of the C library, and NVIDIA's counterparts.
+# functions of the C library that NVIDIA's library has too
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -190,7 +190,6 @@ def text_of(
 
 
 def numbers_of(function: Callable, arguments: tuple, i: int) -> int:
-    """Count the numbers that a function of a thread `i` returns."""
     if INTERPRETED:
         return len(function(*arguments, i))
     kinds = plan_for(arguments).types
@@ -223,8 +222,6 @@ class Code(NamedTuple):
 
 
 class _Coded:
-    """Caches code of thread functions in memory and on disk."""
-
     on_card: bool
     processor: str
     made: Callable[[str], bytes]  # compiles module text
@@ -264,8 +261,6 @@ class _Coded:
 
 
 class Emulator(_Coded):
-    """Runs thread functions on the processor."""
-
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
     copies = 1  # of totals that threads add to
@@ -281,14 +276,12 @@ class Emulator(_Coded):
         return at
 
     def memory(self) -> tuple[int, int]:
-        """Return free and total bytes."""
         return 1 << 60, 1 << 60
 
     def free(self, address: int) -> None:
         del self._rooms[address]
 
     def copy_to(self, target: int, source: int, size: int) -> None:
-        """Copy to device memory; the target is first."""
         ctypes.memmove(target, source, size)
 
     copy = copy_from = copy_to
@@ -313,10 +306,9 @@ class Emulator(_Coded):
         return do
 
     def wait(self) -> None:
-        """Do nothing: launches are done."""
+        pass
 
     def seconds_of(self, launches: Iterable[Callable]) -> list[float]:
-        """Run launches one by one, and time each."""
         seconds = []
         for launch in launches:
             begun = perf_counter()
@@ -335,20 +327,18 @@ class Counted(Emulator):
         return 1 << 40
 
     def free(self, address: int) -> None:
-        """Do nothing: the count is the total use."""
+        pass
 
     def copy_to(self, address: int, there: int, size: int) -> None:
-        """Copy nothing."""
+        pass
 
     copy = copy_from = copy_to
 
     def compiled(self, function: Callable, kinds: tuple, called: dict | None = None) -> None:
-        """Compile nothing."""
+        pass
 
 
 class Card(_Coded):
-    """An NVIDIA GPU, through its driver."""
-
     on_card = True
     copies = 64  # of totals: neighbouring threads use different ones
 
@@ -408,11 +398,9 @@ class Card(_Coded):
         self._do("cuMemcpyHtoD", target, source, size)
 
     def copy(self, target: int, source: int, size: int) -> None:
-        """Copy within device memory; the target is first."""
         self._do("cuMemcpyDtoD", target, source, size)
 
     def copy_from(self, target: int, source: int, size: int) -> None:
-        """Copy from device to program memory; the target is first."""
         self._do("cuMemcpyDtoH", target, source, size)
 
     def made(self, text: str) -> bytes:
@@ -429,7 +417,6 @@ class Card(_Coded):
         self._do("cuLaunchKernel", entry, blocks, 1, 1, THREADS, 1, 1, 0, self._stream, values, 0)
 
     def together(self, launches: Sequence[Callable]) -> Callable:
-        """Combine launches to a graph."""
         mode = self._driver.CUstreamCaptureMode.CU_STREAM_CAPTURE_MODE_RELAXED
         self._do("cuStreamBeginCapture", self._stream, mode)
         for launch in launches:
@@ -477,7 +464,6 @@ class _There(NamedTuple):
 
 
 def _extent(array: np.ndarray) -> int:
-    """Count bytes up to the last item's end."""
     if not array.size:
         return 0
     steps = zip(array.shape, array.strides, strict=True)
@@ -500,11 +486,10 @@ class Images:
     def __init__(self, card: Any):
         self.card = card
         self._known: dict[int, _There] = {}
-        self._rooms: dict[int, int] = {}  # addresses, and sizes
+        self._rooms: dict[int, int] = {}  # sizes by address
         weakref.finalize(self, _free_all, card, self._rooms).atexit = False
 
     def of(self, thing: Any) -> Any:
-        """Replace arrays in nested tuples by images."""
         if isinstance(thing, np.ndarray):
             return self._image(thing)
         if isinstance(thing, tuple):
@@ -551,7 +536,6 @@ class Images:
         return [self._known[id(array)] for array in arrays if id(array) in self._known]
 
     def put_at(self, at: int, content: bytes | bytearray) -> None:
-        """Write bytes to free device memory."""
         room = (ctypes.c_char * len(content)).from_buffer_copy(content)
         self.card.copy_to(at, ctypes.addressof(room), len(content))
 

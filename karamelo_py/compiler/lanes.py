@@ -2,9 +2,9 @@
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
-components). Point functions listed in ``scalarised`` of a class are called lane by lane. Each lane
-has the bits of the same operations on numbers; sums at nodes differ from sums over single points by
-round-off. In a tile's last group, missing lanes load the first point, and contribute nothing.
+components). Functions in ``scalarised`` of a class are called lane by lane. Each lane has the bits
+of the same operations on numbers; sums at nodes differ from sums over single points by round-off.
+In a tile's last group, missing lanes load the first point, and contribute nothing.
 """
 
 import operator
@@ -40,7 +40,7 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM splits wider vectors; narrow registers are too few for that.
+# LLVM splits wider vectors, for which narrow registers are too few.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays prefetched ahead
 
@@ -55,7 +55,6 @@ def _largest(builder: ir.IRBuilder, lanes: Lanes, vector: ir.Value) -> ir.Value:
 
 @in_lanes(scalar_of, _largest)
 def largest(a: float) -> float:
-    """Return the maximum over the lanes."""
     return a
 
 
@@ -92,7 +91,7 @@ def added(total: float, value: float) -> float:
 def beside(first: int, steps: int) -> int:
     """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored: neighbours are addressed relative to the first nodes.
+    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
     """
     return first + steps
 
@@ -113,7 +112,7 @@ def is_one(number: int) -> bool:
 
 @shared
 def prefetch(array: Any, at: tuple) -> None:
-    """Prefetch items of the next iterations over groups."""
+    pass
 
 
 class LaneGroup(LaneType):
@@ -212,7 +211,6 @@ def _of_present(p, value):
 def _either(
     builder: ir.IRBuilder, condition: ir.Value, first: Callable, second: Callable
 ) -> ir.Value:
-    """Branch: `first` if the condition holds, else `second`."""
     results = []
     with builder.if_else(condition) as branches:
         for branch, write in zip(branches, (first, second), strict=True):
@@ -281,7 +279,7 @@ def _load_points(array, at):
         pointer, p = _points_at(builder, array, value, at, index)
 
         def partly(name, here, align, mask):
-            """Lanes without a point get the first point's number."""
+            """Give lanes without a point the first point's number."""
             kinds = [here.type, I32, mask.type, vector]
             load = llvm.external(builder, f"llvm.masked.load.{name}", vector, kinds)
             loaded = builder.call(load, [here, align, mask, ir.Constant(vector, None)])
@@ -345,7 +343,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return pointer
-    # Relative to the first node: one address for its neighbours.
+    # relative to the first node, so that neighbours need one address
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
     return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 
@@ -366,7 +364,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # Parameters: a group mostly has one material.
+        # of parameters: a group mostly has one material
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

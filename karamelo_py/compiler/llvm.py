@@ -15,8 +15,6 @@ _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
 
 
 class LaneType(types.Type):
-    """A type of several points at once."""
-
     width: int
 
 
@@ -51,7 +49,7 @@ def register_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def memory_type(kind: types.Type) -> ir.Type:
-    """Return the LLVM type in memory: booleans take a byte."""
+    """Return the LLVM type in memory, where booleans take a byte."""
     if isinstance(kind, types.Boolean):
         return I8
     if isinstance(kind, types.Record):
@@ -63,7 +61,7 @@ def memory_type(kind: types.Type) -> ir.Type:
 
 @functools.cache
 def is_empty(kind: types.Type) -> bool:
-    """Return True for types without a value, as None and tuples of tags."""
+    """Return True for types without a value, such as None and tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
         return all(map(is_empty, kind))
     return register_type(kind) == NOTHING and not isinstance(kind, types.Record)
@@ -119,7 +117,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
     conversion = _conversion(kind, wanted)
     if conversion is not None:
         if conversion == "sitofp" and isinstance(of, Lanes) and kind.bitwidth > 32:
-            value = builder.trunc(value, ir.VectorType(I32, of.width))  # what every processor can
+            value = builder.trunc(value, ir.VectorType(I32, of.width))  # which every processor can
         return getattr(builder, conversion)(value, to)
     if register_type(of) != to:
         raise TypeError(f"{of} is no {wanted}")
@@ -145,7 +143,6 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
 
 
 def scalar_of(kind: types.Type) -> types.Type:
-    """Return the number type of lanes; other types unchanged."""
     return kind.scalar if isinstance(kind, Lanes) else kind
 
 
@@ -228,7 +225,6 @@ def make_tuple(builder: ir.IRBuilder, kind: types.Type, items: Sequence) -> ir.V
 
 
 def make_struct(builder: ir.IRBuilder, kind: ir.Type, items: Sequence) -> ir.Value:
-    """Build a structure, or an array in registers."""
     made = ir.Constant(kind, ir.Undefined)
     for k, item in enumerate(items):
         made = builder.insert_value(made, item, k)
@@ -249,8 +245,6 @@ def make_array(
 
 
 class ArrayParts:
-    """Parts of an array, extracted on access."""
-
     def __init__(self, builder: ir.IRBuilder, kind: types.Array, value: ir.Value):
         self.builder, self.kind, self.value = builder, kind, value
 
@@ -293,7 +287,6 @@ def byte_pointer(builder: ir.IRBuilder, pointer: ir.Value, offset: ir.Value) -> 
 def external(
     builder: ir.IRBuilder, name: str, result: ir.Type, arguments: Sequence[ir.Type]
 ) -> ir.Function:
-    """Declare an external function, or one of LLVM."""
     declared = builder.module.globals.get(name)
     kind = ir.FunctionType(result, arguments)
     return declared if declared is not None else ir.Function(builder.module, kind, name)

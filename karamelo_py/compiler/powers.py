@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
-Series after range reduction (Muller 2016, "Elementary Functions", chapter 11). Their relative error
-is about two round-off errors; for powers, times |y ln x| if that is above 1. Interpreted, they are
-Python's.
+They are series after range reduction (Muller 2016, "Elementary Functions", chapter 11) with a
+relative error of about two round-off errors; for powers, times |y ln x| if that is above 1.
+Interpreted, they are Python's.
 """
 
 import math
@@ -19,22 +19,21 @@ from karamelo_py.compiler.trace.values import OF_REALS, intrinsic
 
 
 def logarithm(x: float) -> float:
-    """Natural logarithm of a positive number; NaN for negative ones."""
+    """Return the natural logarithm of a positive number, NaN for negative ones."""
     return math.log(x) if x > 0 else (-inf if x == 0 else nan)
 
 
 def logarithm_near_one(x: float) -> float:
-    """The same, in half the time if all numbers are within 1/16 of 1."""
+    """Return the logarithm, in half the time if all numbers are within 1/16 of 1."""
     return logarithm(x)
 
 
 def exponential(x: float) -> float:
-    """e to the power of x."""
     return math.exp(x)
 
 
 def power(x: float, y: float) -> float:
-    """x to the power of y, for x >= 0; infinite for 0 to a negative power."""
+    """Return x^y for x >= 0, infinite for 0 to a negative power."""
     return x**y if x != 0 or y >= 0 else inf
 
 
@@ -46,7 +45,7 @@ class _Bits(NamedTuple):
 
     number: ir.Type
     whole: ir.Type  # the same bits
-    short: ir.Type  # 32-bit integers: every processor converts them to reals
+    short: ir.Type  # 32-bit integers, which every processor converts to reals
     mantissa: int
     bias: int
 
@@ -85,14 +84,14 @@ def _taken_apart(x):
 
 @intrinsic
 def _scaled(x, n):
-    """x 2^n, n an integer in the type of x, |n| <= 2000."""
+    """Return x 2^n for an integer n in the type of x, |n| <= 2000."""
     number, whole, short, mantissa, bias = _bits(x)
 
     def codegen(builder, value, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
         for exponent in (half, builder.sub(n, half)):
-            # In two steps: results may be infinite or denormal.
+            # in two steps, because results may be infinite or denormal
             e = builder.add(exponent, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
@@ -122,7 +121,7 @@ _NEAR_ONE = tuple((-1) ** k / (k + 3) for k in range(11))
 
 @implements(logarithm)
 def _logarithm(x):
-    """ln m = 2 artanh s with s = (m - 1) / (m + 1), up to 0.172."""
+    """Compute ln m = 2 artanh s, with s = (m - 1) / (m + 1) up to 0.172."""
     m, e = _taken_apart(x)
     s = (m - 1) / (m + 1)
     t = s * s
@@ -133,7 +132,7 @@ def _logarithm(x):
 
 @implements(logarithm_near_one)
 def _logarithm_near_one(x):
-    """ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...): no division, short dependency chains."""
+    """Compute ln (1 + r) = r + r^2 (-1/2 + r / 3 - ...), without division or long chains."""
     r = x - 1
     near = abs(r) <= 1 / 16
     square = r * r
@@ -149,7 +148,7 @@ def _exponential(x):
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):
-        """e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""
+        """Compute e^x = 2^n e^r, |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""
         x = min(max(x, -most), most)
         n = (x * (1 / _LN_2) + far) - far  # nearest integer
         r = fma(-n, _REST, fma(-n, _LN_2, x))

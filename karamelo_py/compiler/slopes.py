@@ -1,8 +1,8 @@
 """Dual numbers: a value and its derivatives, in forward mode.
 
-A point function evaluated with them returns exact derivatives: for the stress of a law, its
+A point function evaluated with them returns exact derivatives, for the stress of a law its
 consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the
-same bits as without derivatives. No code is written for a slope that is the literal 0.
+same bits as without derivatives. A slope that is the literal 0 writes no code.
 """
 
 import math
@@ -18,13 +18,12 @@ from karamelo_py.compiler.trace.values import is_literal, rebuilt
 
 @algebra
 class Dual(namedtuple("Dual", "value slopes")):
-    """A number and its derivatives: `value`, and the tuple `slopes` with literal 0s."""
+    """A number and its derivatives; slopes may be literal 0s."""
 
     __slots__ = ()
     __array_ufunc__ = None  # NumPy leaves operations to these
 
     def constant(self, value: Any) -> "Dual":
-        """Return a number with as many slopes, all 0."""
         return Dual(value, (0,) * len(self.slopes))
 
     def chain(self, value: Any, slope: Any) -> "Dual":
@@ -114,7 +113,6 @@ def value_of(x: Any) -> Any:
 
 
 def slopes_of(x: Any, n: int) -> tuple:
-    """Return the `n` slopes of a number, 0 for a constant."""
     return x.slopes if isinstance(x, Dual) else (0,) * n
 
 
@@ -132,7 +130,7 @@ def is_zero(slope: Any) -> bool:
 
 
 def times(factor: Any, slope: Any) -> Any:
-    """Multiply a slope; no code for factors 1 and -1."""
+    """Multiply a slope; factors 1 and -1 write no code."""
     if is_zero(slope):
         return 0
     if is_literal(factor) and abs(factor) == 1:
@@ -155,7 +153,6 @@ def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
 
 
 def size_of(*things: Any) -> int:
-    """Count the slopes of the first number that has any."""
     for x in things:
         if isinstance(x, Dual):
             return len(x.slopes)
@@ -183,7 +180,7 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
 
 
 def _inverse(x):
-    """Return 1/x; 0 for 0, where slopes are infinite."""
+    """Return 1/x, or 0 for 0, where slopes are infinite."""
     return where(x > 0, 1 / where(x > 0, x, 1), 0)
 
 
@@ -252,13 +249,13 @@ def _pow(x, y):
     return _raised(x, y, math.pow(value_of(x), value_of(y)))
 
 
-# Functions with slope 0, or without a real result.
+# functions with slope 0, or without a real result
 for _one in (math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite):
     implements(_one, Dual)(lambda x, do=_one: do(x.value))
 
 
 class NoSlope(TypeError):
-    """A function without derivative; the message names it."""
+    pass
 
 
 def _refused(*functions: Callable) -> None:

@@ -3,7 +3,7 @@
 The body is a function of the address of the loop's arguments, and an index. Waking threads takes as
 long as a small loop, so a kernel with many loops is run by a *team* (`by_team`): its first thread
 executes the kernel, the rest wait for its loops. Each thread has a fixed range of indices, and
-takes those of threads that make no progress (work stealing).
+steals work from threads that make no progress.
 """
 
 import ctypes
@@ -43,11 +43,11 @@ from karamelo_py.compiler.trace.values import (
 
 
 class Serial(NamedTuple):
-    """One thread."""
+    pass
 
 
 class Threaded(NamedTuple):
-    """All threads; `team`: address of a team's shared memory (`new_team`)."""
+    """All threads; `team` is the address of a team's shared memory (`new_team`)."""
 
     team: int = 0
 
@@ -106,8 +106,6 @@ def replaced(address, old, new):
 
 @intrinsic
 def pause(long):
-    """Wait briefly; sleep if `long`."""
-
     def codegen(builder, sleeps):
         def call(name, result, *numbers):
             function = llvm.external(builder, name, result, [I32] * len(numbers))
@@ -127,7 +125,6 @@ def pause(long):
 
 
 def add_among(array, i, j, value):
-    """Add an integer to an array item atomically."""
     array[i, j] += value
 
 
@@ -143,7 +140,7 @@ def _add_among(array, i, j, value):
 
 # --- threads ----------------------------------------------------------------------------------
 
-# Address of the arguments, an index, and the address of the `Failure`.
+# address of the arguments, an index, and the address of the `Failure`
 _TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
 _PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
 _SHARE_OUT = [ctypes.c_int64] * 6
@@ -156,7 +153,7 @@ class _Pools(threading.local):
 
 _pools = _Pools()
 if hasattr(os, "register_at_fork"):
-    # A forked process has none of the threads.
+    # a forked process has none of the threads
     os.register_at_fork(after_in_child=lambda: _pools.of.cache_clear())
 
 
@@ -187,8 +184,6 @@ machine.publish_python("karamelo_share_out", ctypes.CFUNCTYPE(None, *_SHARE_OUT)
 
 
 class _Task(NamedTuple):
-    """Calls a function of an index and the items of a held tuple."""
-
     function: Callable
     kind: HeldTuple
 
@@ -243,7 +238,6 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    """Run a task for each index in [0, count) by a thread pool."""
     chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
@@ -256,28 +250,25 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 
 # --- teams ------------------------------------------------------------------------------------
 
-# Only the leader writes _STATE: it waits, leads, has ended. Every index is processed exactly once:
-# 1. A ticket is the number of the loop and the indices left in a range. An index is taken by a
-#    compare-and-swap of the ticket, so by one thread; tickets of other loops are never equal.
-# 2. The leader releases task, arguments and count before the tickets, and every swap continues that
-#    release: a thread that takes an index has acquired the words of its loop.
-# 3. _DONE lacks a taken index until it is finished, and the leader stays in the loop until _DONE
-#    plus its own indices is the count: the words do not change meanwhile, and by acquiring _DONE
-#    it sees all stores of the others.
-# 4. The leader takes the remaining indices itself: it waits for taken indices, never for a thread
-#    that was preempted, woke late or left.
-# Words, each in a separate cache line.
+# Only the leader writes _STATE: it waits, leads, has ended. Every index is processed once: 1. A
+# ticket is the number of the loop and the indices left in a range. An index is taken by a
+# compare-and-swap of the ticket, so by one thread; tickets of other loops are never equal. 2. The
+# leader releases task, arguments and count before the tickets, and every swap continues that
+# release: a thread that takes an index has acquired the words of its loop. 3. _DONE lacks a taken
+# index until it is finished, and the leader stays in the loop until _DONE plus its own indices is
+# the count: the words do not change meanwhile, and by acquiring _DONE it sees all stores of the
+# others. 4. The leader takes the remaining indices itself: it waits for taken indices, never for a
+# thread that was preempted, woke late or left. Words, each in a separate cache line.
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses, about 0.3 ms; then sleep: cores may be needed
+_SHORT = 8000  # pauses, about 0.3 ms; then sleep, because cores may be needed
 _APART, _LOOKS = 10, 64  # pauses between looks at another range; looks, 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
 _LEFT = (1 << 32) - 1  # of a ticket: the remaining indices; the upper bits are the loop
 
 
 def new_team(threads: int) -> np.ndarray:
-    """Make the shared memory of a team, for `Threaded`."""
     words = np.zeros((_TICKETS // 64 + threads, 8), np.int64)
     words[_SIZE // 64, 0] = threads
     return words
@@ -285,9 +276,9 @@ def new_team(threads: int) -> np.ndarray:
 
 @noinline
 def _take_part(team, k):
-    """Process indices of the present loop, those of thread `k` first; return their number.
+    """Process indices of the present loop, first from thread `k`'s range; return their number.
 
-    A thread's data is in its caches: others take from its range only if that does not shrink for a
+    A thread's data is in its caches, so others take from its range only if it does not shrink for a
     while.
     """
     size = read(team + _SIZE)
@@ -387,7 +378,7 @@ def by_threads(share: Callable) -> Callable:
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
-    @functools.wraps(share, updated=())  # keeps marks of the function
+    @functools.wraps(share, updated=())  # retains marks of the function
     def all_shares(*arguments):
         loop(*arguments)
 

@@ -57,7 +57,6 @@ def _drop(number: int, alive: weakref.ref) -> None:
 
 
 def forget_array(array: np.ndarray) -> None:
-    """Remove an array before it is resized in place."""
     session.arrays.pop(id(array), None)
 
 
@@ -68,8 +67,6 @@ class Address(int):
 
 
 class Plan(NamedTuple):
-    """Layout of the words of arguments."""
-
     text: struct.Struct
     tuples: tuple[tuple[int, int], ...]  # index of a word that is a nested tuple, and its start
     first: int  # start of the arguments themselves
@@ -117,17 +114,14 @@ class ArgumentBuffer:
             elif issubclass(kind, np.generic):
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
-                words.append(signed.item())  # same bits: words are signed
+                words.append(signed.item())  # same bits; words are signed
             else:  # nothing to write: None, classes
                 kinds.append(item)
                 words.append(0)
         return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments to memory; return it and the outermost tuple's address.
-
-        `at`: the address that the memory will be copied to.
-        """
+        """Write the arguments to memory, later at `at`; return it and the tuple's address."""
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
             at = ctypes.addressof(ctypes.c_char.from_buffer(memory))
@@ -146,7 +140,6 @@ def _aligned(at: int, to: int) -> int:
 
 
 def _lay(kind: ir.Type, at: int, places: list[tuple[int, str]]) -> tuple[int, int]:
-    """Add offsets and formats of a type's words; return end and alignment."""
     if isinstance(kind, ir.ArrayType | ir.Aggregate):
         items = [kind.element] * kind.count if isinstance(kind, ir.ArrayType) else kind.elements
         to = max([_lay(item, 0, [])[1] for item in items], default=1)

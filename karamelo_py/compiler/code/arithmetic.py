@@ -19,11 +19,9 @@ from karamelo_py.compiler.llvm import Lanes, scalar_of
 
 
 class Operation(NamedTuple):
-    """A function for operands of some types."""
-
     result: types.Type
-    arguments: tuple[types.Type, ...]  # types that operands are cast to
-    code: Callable  # ``code(builder, values)`` writes it
+    arguments: tuple[types.Type, ...]  # to which operands are cast
+    code: Callable  # ``code(builder, values)``
 
 
 _NUMBER = (types.Number, types.Boolean, Lanes)
@@ -279,7 +277,7 @@ def _size(builder: ir.IRBuilder, kind: types.Type, value: ir.Value) -> ir.Value:
 
 
 def _extreme(sign: str) -> Callable:
-    """Return Python's min or max: the first of equal numbers."""
+    """Return Python's min or max, the first of equal numbers."""
 
     def operation(*kinds: types.Type) -> Operation | None:
         if len(kinds) < 2:
@@ -307,7 +305,6 @@ def _to(kind: types.Type) -> Callable:
 
 
 def _real_of(kind: types.Type) -> types.Type | None:
-    """Return the real type for a type; None for integer lanes."""
     if isinstance(kind, Lanes):
         return None if _is_whole(kind) else kind
     return kind if isinstance(kind, types.Float) else types.float64
@@ -365,7 +362,7 @@ def _scaled(factor: float) -> Callable:
 
 
 def _numpy_extreme(sign: str) -> Callable:
-    """Return NumPy's minimum or maximum; NaN if an operand is."""
+    """Return NumPy's minimum or maximum, NaN if an operand is."""
 
     def operation(a: types.Type, b: types.Type) -> Operation:
         kind = common(a, b)
@@ -399,7 +396,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma: its bits do not depend on the C library."""
+    """Call Python's gamma, whose bits do not depend on the C library."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
@@ -476,7 +473,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names, and functions that convert to reals.
+# NumPy's names, and functions that convert to reals
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,

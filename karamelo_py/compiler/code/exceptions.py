@@ -1,6 +1,6 @@
-"""Exceptions in kernels, raised again by Python after the kernel.
+"""Exceptions in kernels, which Python raises again after the kernel.
 
-Each call by Python has a `Failure`, whose address LLVM functions get as last argument.
+Each call by Python has a `Failure`, whose address is the last argument of LLVM functions.
 """
 
 import ctypes
@@ -34,7 +34,6 @@ _noting = threading.Lock()
 
 
 def note(error: BaseException, at: int) -> None:
-    """Record an exception in the `Failure` at an address."""
     failure = Failure.from_address(at)
     with _noting:
         if not failure.failed:
@@ -44,7 +43,7 @@ def note(error: BaseException, at: int) -> None:
 
 
 def noting(function: Callable) -> Callable:
-    """Record exceptions of a Python function called by kernels, also Ctrl-C.
+    """Record exceptions, also Ctrl-C, of a Python function called by kernels.
 
     Its last argument is the address of the `Failure`.
     """
@@ -84,13 +83,11 @@ machine.publish_python("karamelo_fail", ctypes.CFUNCTYPE(None, *[ctypes.c_int64]
 
 
 def passing(function: ir.Function) -> ir.Function:
-    """Mark a function whose last argument is the address of the `Failure`."""
     function.passes_failure = True
     return function
 
 
 def failure_at(builder: ir.IRBuilder) -> ir.Value:
-    """Return the present `Failure`'s address, or 0."""
     function = builder.function
     return function.args[-1] if hasattr(function, "passes_failure") else llvm.I64(0)
 
@@ -119,10 +116,7 @@ def fail(builder: ir.IRBuilder, kind: Callable, arguments: tuple) -> None:
 
 
 def go_on(builder: ir.IRBuilder, called: Any, regardless: bool) -> None:
-    """Return at once if a called function recorded an exception.
-
-    If `regardless`, continue: the caller checks.
-    """
+    """Return at once if a called function recorded an exception, unless the caller checks."""
     if not hasattr(called, "raises"):
         return
     builder.function.raises = True

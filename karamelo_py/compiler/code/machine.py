@@ -1,6 +1,6 @@
 """LLVM: target processor, optimisation, loading of code.
 
-No fast math: contraction would depend on inlining, and results on threads and restarts.
+There is no fast math: contraction would depend on inlining, so results on threads and restarts.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Return what determines the code besides its text."""
+    """Describe what determines the code besides its text."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 
@@ -45,7 +45,7 @@ def _target() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     _set_options()
     triple = llvm.get_process_triple()
-    # Code stays where it is loaded: x86 needs no tables.
+    # Code stays where it is loaded, so x86 needs no tables.
     where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
     return llvm.Target.from_triple(triple).create_target_machine(
         opt=LEVEL, cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,
@@ -103,7 +103,6 @@ def load(code: bytes, *names: str) -> list[int]:
 
 
 def publish(name: str, address: int) -> None:
-    """Make a function callable by name from code loaded later."""
     llvm.add_symbol(name, address)
 
 
@@ -112,7 +111,7 @@ def is_known(name: str) -> bool:
 
 
 def publish_python(name: str, kind: type, function: Callable) -> None:
-    """Make a Python function callable by code; it must not raise."""
+    """Make a Python function, which must not raise, callable by code."""
     callback = kind(function)
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # code may call it until the end
     publish(name, ctypes.cast(callback, ctypes.c_void_p).value)

@@ -1,10 +1,10 @@
 """Compiled kernels on disk, in two levels.
 
 A file ``.kernel`` has a kernel's name, result and callees. Its key is a hash of the function, the
-argument types and the sources of all that write kernels. Without it, the kernel is traced, and its
+argument types and the sources of all that write kernels. Without it the kernel is traced, and its
 machine code looked up in a file ``.code`` by a hash of the LLVM text.
 
-Files become code: only those that no other user can write, with a correct checksum, are read.
+Files become code, so only those that no other user can write, with a correct checksum, are read.
 Otherwise the kernel is compiled, and the user warned once.
 """
 
@@ -46,7 +46,7 @@ _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
 
 class Unknown(Exception):
-    """A kernel depends on a thing not named in other processes."""
+    pass
 
 
 def short_hash(*words: str) -> str:
@@ -116,7 +116,7 @@ def _words(thing: Any) -> str:
     if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
         named = _names_in(thing.__module__).get(thing.__name__)
         if named is thing or (hasattr(named, "function") and named.function is thing):
-            return f"{thing.__module__}:{thing.__name__}"  # the sources say what it is
+            return f"{thing.__module__}:{thing.__name__}"  # its source says what it is
     function = thing.definition if hasattr(thing, "definition") else thing  # of an intrinsic
     if not isinstance(function, python.FunctionType):
         raise Unknown(repr(thing))
@@ -134,7 +134,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    Raises `Unknown` for a class not found by its name, if of a plug-in or `by_name`.
+    Raise `Unknown` for a class not found by its name, if of a plug-in or `by_name`.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -159,9 +159,9 @@ def describe(numba_type: Any) -> str:
 
 
 class KernelFiles:
-    """The cached kernels of one function, loaded by `load`.
+    """The cached kernels of one function for a `processor`, which `load` loads.
 
-    For a `processor`; `called` are functions inlined in them.
+    `called` are functions inlined in them.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class KernelFiles:
         unit = self._found(key)
         if unit is None:
             with lock.lock(files.folder() / f"{key}.lock"):
-                # Another process may have compiled it since the first look.
+                # another process may have compiled it since the first look
                 unit = self._found(key)
                 if unit is None:
                     unit = compiled()
@@ -242,7 +242,7 @@ def code_of(name: str) -> bytes:
 
 
 def _content(path: Path) -> bytes | None:
-    """Read a file; None if impossible; delete a damaged one."""
+    """Return a file's content, or None; delete a damaged file."""
     try:
         content = files.read(path)
     except (FileNotFoundError, NotADirectoryError):

@@ -1,6 +1,6 @@
 """A lock by which one process compiles a kernel while others wait for its file.
 
-It only saves work: on read-only folders, file systems without locks, and after a timeout, each
+It only saves work: on read-only folders, file systems without locks, and after a timeout each
 process compiles. The system releases it when its process ends.
 """
 
@@ -20,12 +20,11 @@ except ImportError:  # Windows
 PATIENCE = 120.0  # seconds; a longer holder is probably stopped
 PAUSE = 0.02  # seconds between two attempts
 
-waiting = contextlib.nullcontext  # context while a process waits, reported as compilation
+waiting = contextlib.nullcontext  # while a process waits, reported as compilation
 
 
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
-    """Hold the lock on `path`, if available in time."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # read-only, or no locks
             _take(path, stack)

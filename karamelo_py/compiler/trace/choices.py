@@ -20,10 +20,10 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-# Folders whose sources all keys have.
+# folders whose sources all keys have
 ROOMS = "compiler", "script", "points", "kernels", "schemes", "styles"
 
-# Modules outside `ROOMS` of the functions that are being compiled, innermost last.
+# modules outside `ROOMS` of the functions that are being compiled, innermost last
 _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())
 
 
@@ -44,7 +44,7 @@ def modules_of(*things: Any) -> set[str]:
 
 
 def register(made: Callable) -> None:
-    """Put an implementation into all keys, unless determined by the sources of `ROOMS`."""
+    """Put an implementation into all keys, unless the sources of `ROOMS` determine it."""
     is_function = isinstance(made, python.FunctionType)
     has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
     if has_values or modules_of(made):
@@ -52,7 +52,6 @@ def register(made: Callable) -> None:
 
 
 def note(modules: Iterable[str]) -> None:
-    """Record modules elsewhere in the present function."""
     if noted := _noted.get():
         noted[-1].update(modules)
 
@@ -68,7 +67,6 @@ def modules_noted() -> Iterator[set[str]]:
 
 
 def name_of(thing: Any) -> str:
-    """Return ``module:qualified name`` of a function or class."""
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
@@ -78,7 +76,6 @@ def tag_class(numba_type: Any) -> Any:
 
 
 def classes_in(numba_type: Any) -> Iterator[type]:
-    """Yield the classes of tags in a type."""
     if tag_class(numba_type):
         yield numba_type.instance_class
     if isinstance(numba_type, types.BaseTuple):
@@ -87,6 +84,5 @@ def classes_in(numba_type: Any) -> Iterator[type]:
 
 
 def codes_in(code: python.CodeType) -> list[python.CodeType]:
-    """List code objects, including nested functions."""
     inner = (codes_in(c) for c in code.co_consts if isinstance(c, python.CodeType))
     return [code, *itertools.chain.from_iterable(inner)]

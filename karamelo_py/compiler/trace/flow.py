@@ -121,7 +121,7 @@ class Flow:
         self.lowering.read = edge.read
 
     def meet(self, edges: list[Edge]) -> dict[str, Any]:
-        """Merge branches; return the variables that are defined there."""
+        """Merge branches; return the variables that all of them define."""
         first = edges[0]
         if len(edges) == 1:
             self.start(first)
@@ -233,7 +233,6 @@ class Flow:
     def _close_phis(
         self, head: LoopHeader, before: Any, after: Any, values: list, grown: dict
     ) -> None:
-        """Collect new values of the phis of `before`."""
         if isinstance(before, Value | HeldValue):
             path = head.paths[len(values)]
             if is_number_type(after):

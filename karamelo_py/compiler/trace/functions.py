@@ -1,7 +1,7 @@
 """Select functions by argument types, and compile them where they are called.
 
-Each number is a `Value`; operations on it are lowered at once, into the calling function. Tuples
-and classes are Python's and leave no code. `statements` compiles a function's text.
+Each number is a `Value`, whose operations are lowered at once into the calling function. Tuples and
+classes are Python's and leave no code. `statements` compiles a function's text.
 """
 
 import functools
@@ -65,8 +65,6 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
 
 
 class Module:
-    """Presents a module's functions as replacements."""
-
     def __init__(self, module: python.ModuleType, seen: Callable[[Any], Any]):
         self._module, self._seen = module, seen
 
@@ -158,7 +156,7 @@ def _copied(function: Callable) -> AstFunction:
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Trace a method or point function called by plain Python."""
+    """Trace a method or point function that plain Python calls."""
     return _seen(dispatch)(*arguments)
 
 
@@ -203,7 +201,7 @@ def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | Non
 
 
 def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Return the function for argument types; None if none is selected."""
+    """Return the function for argument types, or None."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
         cached = session.functions
@@ -229,7 +227,6 @@ def forget() -> None:
 
 
 def outdate_kernels() -> None:
-    """Let kernels be looked up again: functions changed."""
     session.changes += 1
 
 

@@ -18,7 +18,6 @@ from karamelo_py.compiler.trace.values import HeldValue, builtin
 
 
 def _words(kind: Any) -> str:
-    """Name a type with the modules of its classes."""
     if isinstance(kind, types.BaseTuple) and not isinstance(kind, HeldTuple):
         tag = tag_class(kind) or tuple
         return f"{tag.__module__}.{tag.__qualname__}({', '.join(map(_words, kind))})"
@@ -26,8 +25,6 @@ def _words(kind: Any) -> str:
 
 
 class HeldTuple(types.BaseTuple):
-    """Type of a pointer to the items of a tuple or NamedTuple."""
-
     fields: tuple[str, ...] = ()
     instance_class: Any = None
 
@@ -39,7 +36,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
-        # Short: part of function names.
+        # short, because it is part of function names
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -74,9 +71,9 @@ def held_type(kind: Any) -> Any:
 
 
 def hold(value: Any) -> Any:
-    """Hold `value`: in kernels, tuples with arrays become held tuples.
+    """Make a held tuple of `value` in kernels, if it has arrays.
 
-    A held tuple lives until the calling function returns: pass it on, but do not return it.
+    It lives until the calling function returns: pass it on, but do not return it.
     """
     return value
 
@@ -103,9 +100,9 @@ def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -
 
 
 def at_hand(value: Any) -> Any:
-    """Copy a held tuple to private memory: its items stay in registers.
+    """Copy a held tuple to private memory before a loop, so that items stay in registers.
 
-    For kernels, before their loops; inside, LLVM cannot know that items do not change.
+    Otherwise LLVM cannot know that items do not change.
     """
     return value
 

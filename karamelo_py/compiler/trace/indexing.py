@@ -224,7 +224,6 @@ def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
 
 
 def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
-    """Return an item at an index known at run time."""
     kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
     kind, builder = lowering.unify(*kinds), lowering.builder
     if kind is None:

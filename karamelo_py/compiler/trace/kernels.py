@@ -41,12 +41,10 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 
 
 class Unit(NamedTuple):
-    """Machine code of a function for argument types."""
-
     name: str  # the entry for Python adds ENTRY
     result: types.Type
     code: bytes  # an object file; empty if it is to be read from the disk
-    needs: tuple  # the units that it calls
+    needs: tuple  # units that it calls
     modules: frozenset[str]  # modules elsewhere in it and its needs
     raises: bool  # whether something in it raises exceptions
 
@@ -115,8 +113,8 @@ def written(
 ) -> tuple[ir.Module, types.Type]:
     """Compile a function for argument types; return module and result type.
 
-    The module has `needs`, the units it calls, and `raises`, as in `Unit`. ``entry(module, main,
-    kinds, result)`` writes another entry than Python's.
+    The module has `needs` and `raises`, as in `Unit`. ``entry(module, main, kinds, result)`` writes
+    another entry than Python's.
     """
     with one_at_a_time:
         chosen = traced(function, kinds)
@@ -240,7 +238,7 @@ class Kernel:
 
 
 def kernel(function: Callable) -> Callable:
-    """Make a kernel; interpreted, it is the function itself."""
+    """Make a kernel, or leave the function if interpreted."""
     return function if choices.INTERPRETED else Kernel(function)
 
 
@@ -255,7 +253,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain it: another function does not compile them again.
+    Callers do not contain it, so another function does not compile them again.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -270,7 +268,7 @@ def address_of(function: Callable, signature: types.Type) -> int:
 def address_of_python(function: Callable, signature: types.Type) -> Address:
     """Return the address by which kernels call a Python function of integers.
 
-    Its exceptions are raised after the kernel. While kernels may call it, store the `Address`, not
+    Its exceptions are raised after the kernel. Store the `Address` while kernels may call it, not
     an int made from it.
     """
     if choices.INTERPRETED:

@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 10_000  # of one function; above, a loop is better left to LLVM
+MOST_OPERATIONS = 10_000  # of one function; more are better left to LLVM as a loop
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
@@ -180,7 +180,7 @@ class Lowering:
         key = id(parent), k
         if key not in self.read:
             value = self.builder and item_of(self.builder, parent._kind, parent._value, k)
-            self.read[key] = self.wrapped(parent._kind[k], value), parent  # keeps its id unique
+            self.read[key] = self.wrapped(parent._kind[k], value), parent  # preserves its id
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
@@ -232,7 +232,7 @@ def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.Functi
 
 
 def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
-    """Start an LLVM function; except on GPUs it gets a `Failure`."""
+    """Start an LLVM function, with a `Failure` except on GPUs."""
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
     return exceptions.passing(ir.Function(module, function_type(kinds, result, llvm.I64), name))

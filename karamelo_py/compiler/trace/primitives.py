@@ -69,7 +69,7 @@ def point_function(
     They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection
     happens at compile time. With ``otherwise`` the decorated function is the default.
 
-    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those named in
+    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those in
     ``scalarised`` of a class, because they branch, are called point by point.
     """
 
@@ -95,7 +95,7 @@ def real(value: float, like: Any) -> Any:
 
 
 def lanes_of(numba_type: Any) -> int:
-    """Count the lanes of a type or value; 0 for numbers."""
+    """Count the lanes of a type or value, 0 for numbers."""
     if isinstance(numba_type, tuple | types.BaseTuple):
         return max(map(lanes_of, numba_type), default=0)
     return numba_type.width if isinstance(numba_type, LaneType) else 0
@@ -144,7 +144,7 @@ def _round_off(like):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index: saves a test at each access (10 % of a sweep)."""
+    """Return `i` as a non-negative array index, which saves a test per access (10 % of a sweep)."""
     return i
 
 
@@ -181,7 +181,7 @@ def select(condition, a, b):
 
 @shared
 def where(condition: bool, a: float, b: float) -> float:
-    """Select `a` if `condition`, else `b`; evaluates both."""
+    """Select `a` if `condition`, else `b`; evaluate both."""
     return a if condition else b
 
 
@@ -279,7 +279,6 @@ def _lane_address(builder: ir.IRBuilder, stored: Value, k: ir.Value) -> ir.Value
 
 @in_kernels
 def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: tuple) -> Any:
-    """Apply a function of numbers to each lane of its arguments."""
     builder = lowering.builder
     width = lanes_of(tuple(map(lowering.kind_of, arguments)))
     kinds: set[types.Type] = set()
@@ -321,7 +320,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         return run(None)
     count = I64(width)
     if not unrolled:
-        # Hides the count from LLVM: the loop remains, with one copy of the function.
+        # Hides the count from LLVM, so that the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
     with llvm.counted(builder, count) as k:
         result = run(k)

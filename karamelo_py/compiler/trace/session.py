@@ -1,6 +1,6 @@
 """Memory of the compiler: implementations, functions, types, arrays and machine code.
 
-One per process, like LLVM's engine and the names by which machine code calls other machine code.
+There is one per process, like LLVM's engine and the names by which machine code calls other code.
 """
 
 import itertools
@@ -15,7 +15,7 @@ class Session:
     """Caches; one Python thread at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
-        # Filled by decorators on import.
+        # filled by decorators on import
         self.choosers: dict[Callable, list[Callable]] = {}  # implementations by argument types
         self.builtins: dict[Callable, Callable] = {}  # code of functions (`values.builtin`)
         self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)
@@ -25,7 +25,7 @@ class Session:
         self.operations: dict[tuple, Any] = {}
         self.outdated = False  # whether functions have to be selected again
         self.changes = 0  # of implementations that compiled kernels may contain
-        self.loaded: dict[str, list[int]] = {}  # addresses, by names of kernels
+        self.loaded: dict[str, list[int]] = {}  # addresses by names of kernels
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
         self.arrays: dict[int, Any] = {}  # that kernels were called with, by id

@@ -1,4 +1,4 @@
-"""Front end: compiles a function's text, statement by statement.
+"""Compiles a function's text, statement by statement.
 
 Python's own values are computed at once. For conditions known only at run time, both branches are
 written, and variables merge as phis of SSA form. A loop over a known range is unrolled if short or
@@ -37,7 +37,7 @@ def _stored(node: ast.AST) -> frozenset[str]:
 
 @functools.cache
 def _globals_in(code: python.CodeType) -> frozenset[str]:
-    """List globals; from Python 3.12 on also variables of comprehensions."""
+    """List globals, and from Python 3.12 on variables of comprehensions."""
     loads = (i for one in codes_in(code) for i in dis.get_instructions(one))
     return frozenset(i.argval for i in loads if i.opname == "LOAD_GLOBAL")
 
@@ -104,7 +104,7 @@ class AstFunction:
         self.__code__ = code = function.__code__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
-        # For loops, by all that determines their code: types of initial literals by name; None:
+        # Types of initial literals by name, for each loop and all that determines its code; None:
         # unrolled.
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
@@ -146,7 +146,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within`: functions whose closures are read."""
+    """Replace values by types; `within` are functions whose closures are read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):
@@ -182,8 +182,6 @@ _WORDS = {
 
 
 class AstCompiler:
-    """Compiles one call of a function."""
-
     def __init__(self, walked: AstFunction, names: dict[str, Any], free: dict[str, Any]):
         self.walked, self.names, self.free = walked, names, free
         self.depth = 0  # of branches and loops in the kernel
@@ -473,7 +471,6 @@ class AstCompiler:
     # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
-        """Compile statements; record the place of a failure."""
         for statement in statements:
             if not self.goes:
                 return
@@ -609,7 +606,7 @@ class AstCompiler:
         return loops[key] is not None
 
     def without_code(self, do: Callable[[], None]) -> None:
-        """Determine types only; restore the state."""
+        """Determine types only, and restore the state."""
         go_back, here = self.state(), values.now()
         typed = type(here)(here.seen)
         typed.read = dict(here.read)

@@ -48,7 +48,7 @@ def _only_at_run_time(use: str) -> Callable:
     return ask
 
 
-# Active lowerings, innermost last; separate for each Python thread.
+# active lowerings, innermost last; separate for each Python thread
 _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
 
 
@@ -100,15 +100,15 @@ def _in_type_of(model: Any, kind: Any, thing: Any) -> Any:
     return thing
 
 
-# Replacements of functions called by address, in modules containing all they call.
+# replacements of functions called by address, in modules containing all they call
 _replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
 @contextmanager
 def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write GPU modules in this context, which contain all they call.
+    """Write GPU modules, which contain all they call, in this context.
 
-    `called`: the inlined function of each signature called by address.
+    `called` maps each signature called by address to the inlined function.
     """
     before = _replacements.set(tuple(called.items()))
     try:
@@ -287,7 +287,6 @@ def implementations(kind: type) -> dict[Callable, Callable] | None:
 
 
 def implemented(function: Callable, arguments: tuple) -> Callable | None:
-    """Return the implementation for a number type among the arguments."""
     for a in arguments:
         if isinstance(a, tuple):
             table = implementations(type(a))
@@ -302,7 +301,7 @@ def is_literal(thing: Any) -> bool:
 
 
 class Emitted:
-    """Calls a function with another version in kernels."""
+    """Calls a function that has another version in kernels."""
 
     def __init__(self, function: Callable):
         self.seen = function
@@ -327,7 +326,7 @@ class Emitted:
 
 
 OF_WHOLE = {min, max, abs, int, bool}
-# Functions whose literals adapt to the other operands; more are added by name.
+# functions whose literals adapt to the other operands; more are added by name
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
 LONG = 8  # iterations up to which a known range is unrolled without need
