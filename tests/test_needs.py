@@ -395,10 +395,202 @@ def test_heat_that_does_not_flow_and_averages_that_change_nothing(advice):
         assert found.startswith(said) and bool(found) == bool(said)
 
 
+SPACE = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 6, 0, 5, 0, 2, 1)
+region(box, {region})
+material(rubber, neo-hookean, 1, 100, 0.3)
+solid(body, region, box, 2, rubber, 1)
+fix(v, initial_velocity_particles, all, {v})
+{held}
+run(1)
+"""
+HELD = "fix(walls, velocity_nodes, all, NULL, NULL, 0)"
+
+
+def test_space_for_what_is_plane(advice):
+    slab = SPACE.format(region="block, 1, 4, 1, 3, 0, 2", v="0.1*x0, 0.2, 0", held=HELD)
+    said = advice(slab)
+    assert "the same along z" in said and "4 times the points of plane strain" in said
+    assert "dimension(2, 0, 6, 0, 5, 1)" in said
+    # Free to move along z, moved by a formula of z, or another shape in each layer: no.
+    for old, new in (
+        (HELD, ""), ("0.1*x0", "0.1*z0"), ("block, 1, 4, 1, 3, 0, 2", "sphere, 2, 2, 1, 1")
+    ):  # fmt: skip
+        assert "the same along" not in advice(slab.replace(old, new))
+
+
+PLATE = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, {box}, 0, 14, -2, 4, 1)
+region(box, block, 1, 11, 1, 13, 0, {thick})
+material(rubber, neo-hookean, 1, 100, 0.3)
+solid(body, region, box, 1, rubber, 1)
+{fixes}
+run(1)
+"""
+
+
+def test_plane_stress_for_a_thin_plate(advice):
+    pull = "fix(v, initial_velocity_particles, all, 0.1*x0, 0, 0)"
+    said = advice(PLATE.format(box=12, thick=2, fixes=pull))
+    assert "a plate with free faces, and nothing acts along z: 2 times the points of" in said
+    assert "dimension(2, 0, 12, 0, 14, 1) and plane_stress(true, thickness=2)" in said
+    bent = "fix(v, initial_velocity_particles, all, 0, 0, 0.1*x0)"
+    held = (
+        "group(all_nodes, nodes, region, box, all)\n"
+        + pull
+        + ("\nfix(hold, velocity_nodes, all_nodes, NULL, NULL, 0)")
+    )
+    for thick, fixes in ((4, pull), (2, bent), (2, held)):
+        assert "plane stress" not in advice(PLATE.format(box=12, thick=thick, fixes=fixes))
+
+
+def test_a_plane_for_what_is_a_line(advice):
+    text = plane(more="fix(walls, velocity_nodes, all, 0, NULL)", side=8)
+    said = advice(text)
+    assert "the same along x" in said and "8 times the points of a line" in said
+    assert "dimension(1, 0, 8, 1), with y called x" in said
+
+
+STANDS = """
+method(ulmpm, FLIP, linear, 0.99)
+dimension({domain}, 0.1)
+region(box, block, {box})
+material(soil, neo-hookean, 1000, 1e4, 0.3)
+solid(body, region, box, 2, soil, 0.1)
+{groups}
+{fixes}
+run(1)
+"""
+
+
+def walls(**regions: str) -> str:
+    """Groups of the nodes in regions."""
+    return "\n".join(
+        f"region({name}, block, {where})\ngroup({name}, nodes, region, {name}, all)"
+        for name, where in regions.items()
+    )
+
+
+def foot(end: str) -> str:
+    """Walls about a square, and the nodes above it up to x = `end`."""
+    return walls(
+        floor="-INF, INF, -INF, 0", left="-INF, 0, -INF, INF", right="1, INF, -INF, INF",
+        foot=f"-INF, {end}, 0.5, INF",
+    )  # fmt: skip
+
+
+SQUARE = {"domain": "2, 0, 1, 0, 1", "box": "0, 1, 0, 0.5", "groups": foot("INF")}
+BOX = "fix(l, velocity_nodes, left, 0, NULL)\nfix(r, velocity_nodes, right, 0, NULL)\n"
+FLOOR = "fix(b, velocity_nodes, floor, 0, 0)\nfix(w, body_force, all, 0, -9.81)\n"
+PRESS = "fix(p, velocity_nodes, foot, NULL, -0.1)\n"
+
+
+@pytest.mark.parametrize(
+    ("fixes", "changed", "said"),
+    [
+        (BOX + FLOOR, {}, "the same along x"),  # uniaxial strain
+        (BOX + FLOOR + PRESS, {}, "the same along x"),
+        (BOX + FLOOR + PRESS, {"groups": foot("0.5")}, ""),  # a footing
+        (FLOOR, {}, ""),  # bulges to both sides
+        (FLOOR + BOX.splitlines()[0], {}, ""),  # a column that collapses
+        (BOX + FLOOR, {"box": "0, 0.7, 0, 0.5"}, ""),  # free to move as far as the wall
+        (BOX.replace("left, 0, NULL", "left, 0, NULL, mu=0.3") + FLOOR, {}, ""),
+        (BOX + FLOOR.replace("0, -9.81", "0, -9.81*x"), {}, ""),
+    ],
+)
+def test_a_line_only_between_walls_that_act_alike(advice, fixes, changed, said):
+    """What is held at its foot only, or moved by a part of the width, is no line."""
+    found = advice(STANDS.format(**{**SQUARE, "fixes": fixes, **changed}))
+    assert said in found if said else "the same along" not in found
+
+
+def test_plane_strain_only_between_walls(advice):
+    space = {
+        "domain": "3, 0, 1, 0, 1, 0, 0.2", "box": "0.2, 0.8, 0, 0.5, 0, 0.2",
+        "groups": walls(floor="-INF, INF, -INF, 0, -INF, INF", low="-INF, INF, -INF, INF, -INF, 0",
+                        high="-INF, INF, -INF, INF, 0.2, INF"),
+    }  # fmt: skip
+    floor = "fix(b, velocity_nodes, floor, 0, 0, 0)\nfix(w, body_force, all, 0, -9.81, 0)\n"
+    low, high = (f"fix({w}, velocity_nodes, {w}, NULL, NULL, 0)\n" for w in ("low", "high"))
+    assert "the same along z" in advice(STANDS.format(**space, fixes=floor + low + high))
+    for fixes in (floor, floor + low):
+        assert "the same along" not in advice(STANDS.format(**space, fixes=fixes))
+
+
+def test_bodies_of_which_one_ends_before_the_other_are_no_line(advice):
+    """Side by side between the walls: each is the same along x, both together are not."""
+    text = STANDS.format(**{**SQUARE, "box": "0, 0.5, 0, 0.5"}, fixes=BOX + FLOOR)
+    second = "region(rest, block, 0.5, 1, 0, 0.5)\nsolid(other, region, rest, 2, soil, 0.1)\n"
+    assert advice(text.replace("region(floor", second + "region(floor")) == ""
+
+
+def test_scenes_that_need_their_dimensions_are_told_nothing_of_them(advice):
+    for script in ("in.footing", "in.vertical_bar"):
+        assert "dimension(" not in advice(INPUTS / script), script
+    assert "dimension(1, 0, 10, 0.625)" in advice(INPUTS / "in.column")  # rollers everywhere
+
+
+def test_space_for_what_is_round(advice):
+    rod = SPACE.format(region="cylinder, z, 3, 2.5, 2, 0, 2", v="0, 0, -1",
+                       held="fix(f, body_force, all, 0, 0, sin(z))")  # fmt: skip
+    said = advice(rod)
+    assert "cylinders about one axis" in said and "6.28 times the points" in said
+    assert "axisymmetric(true)" in said
+    assert advice(rod.replace("sin(z)", "sin(x)")) == ""
+    assert advice(rod.replace("0, 0, -1", "0.1, 0, -1")) == ""
+    half = walls(half="-INF, 3, -INF, INF, -INF, INF") + "\n"
+    part = rod.replace("fix(f, body_force, all", half + "fix(f, body_force, half")
+    assert advice(part) == ""
+
+
 def test_wide_functions_where_no_point_crosses(advice):
     said = advice(plane(method="tlmpm, FLIP, cubic-spline, 1"))
     assert "cubic-spline sees 16 nodes per point" in said and "with 4 nodes" in said
     assert advice(plane(method="ulmpm, FLIP, cubic-spline, 1")) == ""
+
+
+PULLED = "fix(pull, body_force, all, 0, -1)"
+
+
+def test_a_scene_with_two_equal_sides(advice):
+    """A square of 4 x 4 cells about x = 4, a plane of nodes; its weight acts along y."""
+    said = advice(plane(more=PULLED))
+    assert said.startswith("the scene is the same on both sides of x = 4: twice the points")
+    assert said.endswith("half of it, and the nodes at x = 4 held in x")
+    assert "y = 4" in advice(plane(more=PULLED.replace("0, -1", "-1, 0")))
+
+
+@pytest.mark.parametrize(("hi", "mirrored"), [("INF", True), ("3", False)])
+def test_a_box_with_two_equal_sides(advice, hi, mirrored):
+    """A floor below all of it, or below its left half."""
+    text = f"""
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 6, 0, 6, 0, 6, 1)
+region(b, block, 1, 5, 1, 4, 0, 3)
+material(m, neo-hookean, 1, 1000, 0.3)
+solid(s, region, b, 1, m, 1, 0)
+region(f, block, -INF, {hi}, -INF, INF, 0, 0)
+group(floor, nodes, region, f, all)
+fix(h, velocity_nodes, floor, 0, 0, 0)
+fix(g, body_force, all, 0, 0, -0.1)
+run(1)
+"""
+    assert ("on both sides of x = 3" in advice(text)) == mirrored
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        PULLED.replace("0, -1", "1, -1"),
+        PULLED.replace("-1)", "-x)"),
+        "region(left, block, 2, 3, 2, 6)\ngroup(left, nodes, region, left, all)\n"
+        + PULLED.replace("all", "left"),
+    ],
+)
+def test_what_acts_on_one_side_more_is_no_mirror(advice, more):
+    assert "both sides" not in advice(plane(more=more))
 
 
 def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
@@ -415,6 +607,10 @@ def test_half_of_a_scene_gives_the_results_of_the_whole(state_interpreted):
         beyond = np.sort(all_of[name][all_of["x"] > 4])
         assert np.ptp(beyond) > 0
         assert np.sort(right[name]) == pytest.approx(beyond, rel=1e-9, abs=1e-12)
+
+
+def test_no_mirror_between_nodes(advice):
+    assert "both sides" not in advice(plane(more=PULLED, n=3))
 
 
 def test_output_that_takes_longer_than_the_steps(lowered):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.advice.facts import SceneFacts
+from karamelo_py.advice.lesser import lesser_models
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
 from karamelo_py.points.laws import parameter
@@ -28,7 +29,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 
 def suggestions(hub: Hub, simulation: Simulation) -> list[Advice]:
-    rules = _unread, _of_parts, _averaging, _output
+    rules = _unread, _of_parts, _averaging, lesser_models, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
