@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 from textwrap import dedent
 from typing import Any
 
@@ -36,6 +36,20 @@ os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.g
 # each process of tests also rewrites the assertions of all modules, for 6 s.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
+
+# Thousands of small files are replaced, and a disk makes a run wait for each. Files are left for a
+# reader if a test fails.
+MEMORY = Path("/dev/shm")
+FOLDER = "PYTEST_DEBUG_TEMPROOT"
+in_memory = ""
+if FOLDER not in os.environ and MEMORY.is_dir() and shutil.disk_usage(MEMORY).free > 2**31:
+    in_memory = os.environ[FOLDER] = mkdtemp(prefix="karamelo-py-", dir=MEMORY)
+
+
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    if in_memory and exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+        shutil.rmtree(in_memory, ignore_errors=True)
+
 
 # Where a script asks for a GPU, the processor takes its part.
 os.environ["KARAMELO_PY_GPU"] = "emulated"

@@ -315,6 +315,8 @@ SCENE = """
 )
 def test_scenes_are_those_of_the_built_in_law(run_interpreted, law, scheme, thin):
     script = SCENE.replace("SCHEME", scheme).replace("THIN", thin)
+    if "quasi-static" in scheme:
+        script = script.replace("2, law", "1, law").replace("run(3)", "run(1)")
     found = [
         run_interpreted(script, "-var", "law", name, folder=name).log["Es"]
         for name in ("built", law)

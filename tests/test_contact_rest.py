@@ -11,7 +11,7 @@ BASE = """
     region(b, block, 0.4, 0.6, base, base + 0.1)
     region(q, block, 0.3, 0.7, 0.1, base)
     material(soft, linear, 1000, 1e5, 0.3)
-    material(stiff, linear, 1000, 4e5, 0.3)
+    material(stiff, linear, 1000, 1e5, 0.3)
     solid(b, region, b, 2, soft, 0.1)
     {more}
     fix(weight, body_force, all, 0, -10*min(time/0.1, 1))

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 import test_script_errors as wrong
+from walked import MODULES, walked
 
 from karamelo_py.app.cli import main
 from karamelo_py.language import registry, rules
@@ -91,8 +92,8 @@ def decisions_by_wording():
     def is_said(node):
         return any(isinstance(n, ast.Attribute) and n.attr in SAID for n in ast.walk(node))
 
-    for path in (ROOT / "karamelo_py").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for path in MODULES:
+        for node in walked(path):
             looked = []
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
                 if getattr(node.func.value, "id", "") == "re":
@@ -105,6 +106,7 @@ def decisions_by_wording():
             yield from (f"{path}:{node.lineno}" for one in looked if is_said(one))
 
 
+@pytest.mark.xdist_group("house")
 def test_nothing_decides_by_the_wording_of_a_message():
     assert [*decisions_by_wording()] == []
 

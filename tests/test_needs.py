@@ -276,8 +276,8 @@ def test_what_check_says_of_the_memory_of_the_process(tmp_path, monkeypatch, cap
     path.write_text(re.sub(r"(?m)^(dump|plot|save_plot)\(.*$", "", text), encoding="utf-8")
     # What this process compiled before may lie in another cache than that of its children.
     peak_of(path, "run", compiled=True, threads=1, N=20)
-    said = peak_of(path, compiled=True, threads=1, find=r"(\d+) MiB with the program", N=450)
-    assert said == pytest.approx(peak_of(path, "run", compiled=True, threads=1, N=450), rel=0.15)
+    said = peak_of(path, compiled=True, threads=1, find=r"(\d+) MiB with the program", N=300)
+    assert said == pytest.approx(peak_of(path, "run", compiled=True, threads=1, N=300), rel=0.15)
 
 
 # --- What could be left out ----------------------------------------------------------------------

@@ -25,8 +25,8 @@ SCENES = {
 def lend(source: Path, target: Path) -> None:
     """Give the kernels in one folder to another one, which runs beside it do not write to."""
     target.mkdir(parents=True, exist_ok=True)
-    for path in source.glob("*.kernel"):
-        if not (target / path.name).exists():
+    for path in source.iterdir():
+        if path.suffix in (".kernel", ".code") and not (target / path.name).exists():
             shutil.copy(path, target)
 
 

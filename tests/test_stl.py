@@ -41,11 +41,12 @@ def test_a_cube(stl):
     np.testing.assert_array_equal(outside.inside(nodes), ~want)
 
 
-def test_a_sphere(stl):
+def test_a_sphere(tmp_path):
     """The volume of the polyhedron, by the divergence theorem, to within the lattice of points."""
     points, triangles = sphere_surface(0.4, 24, 12, (0.05, 0, 0))
     hub = SmallHub(3, -0.5, 0.5, 0.1)
-    solid = hub.solid("s", STL(hub, stl(points, triangles)))
+    path = write(tmp_path / "body.stl", points, {"triangle": triangles}, binary=True)
+    solid = hub.solid("s", STL(hub, path))
     assert math.isclose(solid.volume0.sum(), enclosed_volume(points, triangles), rel_tol=5e-4)
     assert not hub.warnings
 

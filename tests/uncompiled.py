@@ -11,12 +11,14 @@ import functools
 import gc
 import io
 import json
+import math
 import os
 import sys
 import traceback
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 MOST_PLACES = 1000  # whose stencils are kept
 
@@ -150,7 +152,7 @@ def quick_records() -> None:
 
 
 def chosen_at_once(function, *arguments):
-    """A point function called as plain Python, as `PointFunction` does it, but for one class."""
+    """Call a point function as plain Python, as `PointFunction` does, but faster for one class."""
     if function.tags == 1:
         chosen = function._nearest.get((arguments[0].__class__,))
         if chosen is not None:
@@ -158,13 +160,61 @@ def chosen_at_once(function, *arguments):
     return function._plain(*arguments)
 
 
+def quick_totals(totals: ModuleType) -> None:
+    """Let Python's integers do the exact sums of `totals`: the same digits, 5 % of the time."""
+    by_limbs = totals.add_to, totals.add_many
+    first = -1074 + 53  # the exponent of the smallest number, as of a mantissa's last bit
+
+    def whole(x: float) -> int:
+        mantissa, exponent = math.frexp(x)
+        number, shift = int(mantissa * 2.0**53), exponent - first
+        return number << shift if shift >= 0 else number >> -shift
+
+    def put(totals_of_all, row: int, total: int) -> None:
+        sign, total = (1, total) if total > 0 else (-1, -total)
+        limb = ((total & -total).bit_length() - 1) >> 5
+        total >>= 32 * limb
+        while total:
+            totals_of_all[row, limb] += sign * (total & totals.DIGIT)
+            total >>= 32
+            limb += 1
+
+    def add_many(totals_of_all, row: int, terms, count: int) -> None:
+        if totals.many_threads():
+            by_limbs[1](totals_of_all, row, terms, count)
+            return
+        finite = [x for x in terms[:count].tolist() if math.isfinite(x)]
+        totals_of_all[row, totals.LOST] += count - len(finite)
+        total = sum(map(whole, filter(None, finite)))
+        if total:
+            put(totals_of_all, row, total)
+
+    def add_to(totals_of_all, row: int, x: float) -> None:
+        if totals.many_threads() or not math.isfinite(x):
+            by_limbs[0](totals_of_all, row, x)
+        elif x:
+            put(totals_of_all, row, whole(x))
+
+    def carry(total) -> None:
+        digits, carried = total.tolist(), 0
+        for k in range(totals.LOST - 1):
+            digit = digits[k] + carried
+            carried, digits[k] = digit >> 32, digit & totals.DIGIT
+        digits[totals.LOST - 1] += carried
+        total[:] = digits
+
+    totals.add_to, totals.add_many, totals.carry = add_to, add_many, carry
+
+
 def main() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
     import karamelo_py
     from karamelo_py.compiler.trace.functions import PointFunction
+    from karamelo_py.kernels import totals
     from karamelo_py.points.basis import product
 
+    quick_totals(totals)  # before others import them
     # Before the bases are there, which register them: a tenth of what steps take.
     product._locate_product, product._entry_product = remembered(
         product._locate_product, product._entry_product

@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,11 +26,11 @@ NAME = "run.json"
 Json = dict[str, Any]
 
 
+@cache
 def surroundings() -> Json:
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
-        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "processor": processor(),
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.release()}",
@@ -38,12 +39,10 @@ def surroundings() -> Json:
 
 
 def processor() -> str:
-    try:
+    with suppress(OSError):
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.lower().startswith("model name"):
                 return line.partition(":")[2].strip()
-    except OSError:
-        pass
     return platform.processor() or platform.machine()
 
 
@@ -113,6 +112,7 @@ class RunRecord:
             "wall_s": time.perf_counter() - self._begun,
             "runs": self.runs,
             "messages": self.messages,
+            "date": datetime.now().astimezone().isoformat(timespec="seconds"),
             **surroundings(),
         }
         with suppress(ScriptError):  # other output reports a full disk
