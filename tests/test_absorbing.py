@@ -77,6 +77,7 @@ def test_a_wave_leaves_saturated_ground(run_script):
     assert energy[-1] < 0.003 * energy[0]
 
 
+@pytest.mark.xdist_group("absorbing")
 def test_on_a_gpu(run_script):
     """Compiled, as hooks called by address are bound to loops then."""
     script = (

@@ -333,10 +333,13 @@ def test_scenes_are_those_of_the_built_in_law(run_interpreted, law, scheme, thin
         pytest.param("hyperbolic", "scheme(quasi-static)", marks=pytest.mark.full),
     ],
 )
-def test_compiled_formulas_have_the_numbers_of_the_built_in_law(run_script, law, scheme):
+def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
+    run_script, run_interpreted, law, scheme
+):
     script = SCENE.replace("SCHEME", scheme).replace("THIN", "")
     found = [
-        run_script(script, "-var", "law", name, folder=name).log["Es"] for name in ("built", law)
+        run(script, "-var", "law", name, folder=name).log["Es"]
+        for run, name in ((run_interpreted, "built"), (run_script, law))
     ]
     assert found[1] == pytest.approx(found[0], rel=1e-7)
 

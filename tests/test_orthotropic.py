@@ -137,7 +137,7 @@ def test_a_bar_that_would_flatten_is_refused(run_interpreted):
         assert "not the same in y and z" in run_interpreted(script, status=1).err
 
 
-def test_compiled_lanes_are_hookes_law(run_script):
+def test_compiled_lanes_are_hookes_law(run_script, run_interpreted):
     script = """
         law = "built"
         method(tlmpm, FLIP, linear, 1)
@@ -156,8 +156,8 @@ def test_compiled_lanes_are_hookes_law(run_script):
         run(5)
     """
     found = [
-        run_script(script, "-var", "law", name, folder=name).log["Es"][-1]
-        for name in ("built", "axes")
+        run(script, "-var", "law", name, folder=name).log["Es"][-1]
+        for run, name in ((run_interpreted, "built"), (run_script, "axes"))
     ]
     assert found[1] == pytest.approx(found[0], rel=1e-8)
 
