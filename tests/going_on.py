@@ -167,6 +167,17 @@ eos(rock, p-alpha, stone, 1.2, 0.1, 5)
 damage(spall, tuler-butcher, 0.1, 1, 0.01)
 material(rock, eos-strength, rock, thin, spall)
 solid(rock, region, first, 2, rock, 0.1)
+region(middle, block, 0.4, 0.5)
+eos(gel, stiffened-gas, 2, 4, 20, p=1)
+damage(gel, formula, max(s1 - p, 0)/9)
+material(gel, eos-strength, gel, thin, gel)
+solid(gel, region, middle, 2, gel, 0.1)
+region(other, block, 0.5, 0.6)
+eos(iron, mie-grueneisen, 2, 7, 1.5, 2, Q1=1.5)
+damage(iron, cochran-banner, 0.1, 0.01)
+strength(iron, plastic, 50, 0.2)
+material(iron, eos-strength, iron, iron, iron)
+solid(iron, region, other, 2, iron, 0.1)
 fix(light, detonation, all, (x0 - 0.8)/30)
 fix(v, initial_velocity_particles, all, sin(9*x0))
 run(4)
@@ -182,6 +193,13 @@ FLOWS = {
     "h": "swift, 80, 0.4, 0.5, 0.01, 0.5",
     "i": "linear, 80",
     "j": "johnson-holmquist-2, 80, 0.9, 0.6, 0.3, 0.6, 0, 1, 0.2, 2.8, 1.5, 0.005, 1",
+    "k": "steinberg-guinan, 80, 0.2, 36, 0.45, 0.7, 0.03, 0.0004",
+    "l": "mts, 46, 0.04, 0.0008, 1.6, 1e7, 0.67, 1, 2.4, 0.9, 0.35, 1e8, 0.1",
+    "m": "norton, 80, 10, 4",
+    "n": "perzyna, 80, 0.3, 0.5, 0.03, 5",
+    "o": "hjc, 80, 0.8, 1.6, 0.6, 0, 1, 0.5, 0.1, 7, 0.04, 1, 0.01",
+    "p": "crushable-foam, 80, 0.4, 0.1",
+    "q": "gurson, 80, 0.4, 0.01, 0.1, 0.01",
 }
 
 

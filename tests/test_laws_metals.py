@@ -8,13 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from laws import TURN, integrated, isochoric, mises, start, stress, stretched, worked
 from tensors import every_kinematics, symmetric_flat
+from tensors import flat as matrix
 
+from karamelo_py.compiler import on_numbers
+from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.laws import law_in
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import (
     Absent,
     advance,
+    cauchy_stress,
     dissipated_energy,
     energy_density,
     initial_state,
@@ -29,6 +33,7 @@ from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths import initial_memory
 from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic, plastic_increment
 from karamelo_py.points.laws.strengths.metals import JohnsonCook, Swift
+from karamelo_py.points.laws.strengths.rates import Mts, Norton, Perzyna, SteinbergGuinan
 from karamelo_py.points.laws.temperatures import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
@@ -317,3 +322,90 @@ def test_single_precision():
     assert float(plastic_strain(single, kin, state)) == pytest.approx(
         plastic_strain(law, kin, double), rel=1e-4
     )
+
+
+# ---- high pressures, and creep ------------------------------------------------------------------
+
+
+def test_strength_of_steinberg_and_guinan():
+    """Y0 (1 + beta ep)^n (1 + A p J^(1/3) - B (T - 300)), bounded by Ymax (1980)."""
+    part = SteinbergGuinan.given(48.0, 0.12, 36.0, 0.45, 0.2, 0.028, 3.77e-4, T=400.0)
+    law = EosStrength(EOS, part)
+    for steps in (20, 1):
+        state = stretched(law, Space(), start(law, Space()), np.diag([-0.01, 0, 0]), steps)
+        p, ep = K * (1 - state.J), plastic_strain(law, Space(), state)
+        hard = min(0.12 * (1 + 36 * ep) ** 0.45, 0.2)
+        exact = hard * (1 + 0.028 * p * state.J ** (1 / 3) - 3.77e-2)
+        assert mises(law, Space(), state) == pytest.approx(exact, rel=1e-10)
+        assert (hard == 0.2) == (steps == 20)
+
+
+@pytest.mark.parametrize("n", [1.0, 3.0, 8.0])
+def test_stress_relaxes_by_creep(n):
+    """q^(1-n) = q0^(1-n) + (n - 1) 3 G A t (Norton 1929), exactly exponential for n = 1."""
+    rate = 3 * G * 0.1  # per time, at q = 0.3
+    law = EosStrength(EOS, Norton.given(G, 0.1 * 0.3 ** (1 - n), n))
+    state = stretched(law, Space(), start(law, Space()), isochoric(0.3 / (3 * G)), 1, 1e-12)
+    for dt, steps, rel in ((1e-4, 400, 2e-2), (1e9, 1, None)):
+        end = stretched(law, Space(), state, np.zeros((3, 3)), steps, dt)
+        t = dt * steps * rate
+        exact = np.exp(-t) if n == 1 else (1 + (n - 1) * t) ** (1 / (1 - n))
+        if rel:
+            assert mises(law, Space(), end) == pytest.approx(0.3 * exact, rel=rel)
+        else:
+            assert mises(law, Space(), end) < 0.3 * 0.1
+
+
+def test_steady_creep_and_flow():
+    """q = (rate/A)^(1/n), and (Y + H ep)(1 + (eta rate)^(1/n)) (Perzyna 1966), for any step."""
+    creep = EosStrength(EOS, Norton.given(G, 0.2, 4.0, Q=1000.0, T=500.0))
+    state = stretched(creep, Space(), start(creep, Space()), isochoric(1e-2), 20, 0.1)
+    exact = (0.1 / (0.2 * np.exp(-2))) ** 0.25
+    assert mises(creep, Space(), state) == pytest.approx(exact, rel=1e-2)
+    flow = EosStrength(EOS, Perzyna(G, 0.4, 0.5, 0.03, 5.0))
+    state = stretched(flow, Space(), start(flow, Space()), isochoric(1e-2), 20, 1e-4)
+    after = stretched(flow, Space(), state, isochoric(1e-2), 1, 1e-4)
+    ep, before = plastic_strain(flow, Space(), after), plastic_strain(flow, Space(), state)
+    exact = (0.4 + 0.5 * ep) * (1 + (0.03 * (ep - before) / 1e-4) ** 0.2)
+    assert mises(flow, Space(), after) == pytest.approx(exact, rel=1e-10)
+
+
+def test_threshold_of_copper():
+    """The differential equation of Follansbee & Kocks (1988) at a constant rate."""
+    part = Mts.given(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01)
+    law, rate, T = EosStrength(EOS, part), 1e3, 293.0
+    state = stretched(law, Space(), start(law, Space()), isochoric(1e-3), 200, 1e-3 / rate)
+    ep = plastic_strain(law, Space(), state)
+    ss = 0.9 * (rate / 1e8) ** (part.k * T / (0.35 * 45.8))
+    s = integrated(lambda t, s: 2.39 * (1 - np.tanh(2 * s / ss) / np.tanh(2)), 0.01, ep, 2000)
+    assert state.m.strength.threshold == pytest.approx(s, rel=3e-3)
+    S = (1 - part.k * T / (1.6 * 45.8) * log(1e7 / rate)) ** 1.5
+    assert mises(law, Space(), state) == pytest.approx(0.04 + S * s, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    "strength",
+    [
+        SteinbergGuinan.given(48.0, 0.12, 36.0, 0.45, 0.64, 0.028),
+        Norton.given(G, 0.2, 4.0),
+        Perzyna(G, 0.4, 0.5, 0.03, 5.0),
+        Mts.given(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01),
+    ],
+    ids=lambda s: type(s).__name__,
+)
+def test_tangents_of_rates(strength):
+    """Against differences of fourth order."""
+    law, space, h = EosStrength(EOS, strength), Space(), 1e-4
+    state = stretched(law, space, start(law, space), isochoric(0.01), 3, 1e-3)
+
+    def after(e):
+        dl = matrix(space, np.diag([-0.01 + e, 0.004, 0.0]))
+        return np.array(stress(law, space, advance(law, space, state, dl, 1e-3)))
+
+    def stress_of(dl):
+        return cauchy_stress(law, space, advance(law, space, state, dl, 1e-3))
+
+    slope = (8 * (after(h) - after(-h)) - after(2 * h) + after(-2 * h)) / (12 * h)
+    dl = matrix(space, np.diag([-0.01, 0.004, 0.0]))
+    exact = [slopes_of(x, 9)[0] for x in on_numbers(stress_of)(seeded(dl))]
+    assert exact[:3] == pytest.approx(np.diag(slope), abs=1e-8 * 200 + 1e-6)

@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.language.arguments import Named
 from karamelo_py.language.by_dimension import finite
 from karamelo_py.language.scene import Scene
-from karamelo_py.points.laws import can, constrained_velocity, law_kind, parameter, specific_volume
+from karamelo_py.points.laws import can, constrained_velocity, law_parts, parameter, specific_volume
 from karamelo_py.points.laws.doubts import reference_temperatures
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.scene.domain import Domain
@@ -104,8 +104,8 @@ class Solid(Named):
                 f"T0 = {T0:g}, and the material counts temperatures from {first:g}",
                 hint="kelvin throughout, or degrees Celsius throughout",
             )
-        kinds = law_kind(self.material.law)
-        if self.T0 is None and any("initial_temperature" in kind._fields for kind in kinds):
+        starts = [parameter(law, "initial_temperature", 1) for law in law_parts(self.material.law)]
+        if self.T0 is None and 0 in starts:
             begins = "has no thermal stress at" if self.warm else "starts at"
             hub.warn(
                 f"the solid {begins} the temperature 0: neither it nor its material says one",

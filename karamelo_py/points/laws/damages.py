@@ -25,6 +25,7 @@ class FlowStep(NamedTuple):
     heat: Any  # `Warm` or ()
     dt: Any
     stress: Any  # Cauchy stress of intact material
+    expansion: Any  # relative change of volume
 
 
 @point_function()
@@ -127,7 +128,7 @@ def _initiation_johnson_cook_damage(damage, memory):
 
 @damage_after.on(JohnsonCookDamage)
 def _damage_after_johnson_cook_damage(damage, memory, step):
-    strain, triaxiality, heat, dt, _ = step
+    strain, triaxiality, heat, dt, _, _ = step
     grows = (strain > 0) & (triaxiality > _CLOSED)
     if not any_lane(grows):
         return memory

@@ -184,7 +184,7 @@ def _idle_heat(law, scene):
 def _strained(law, heat):
     strength, damage, results = law.strength, law.damage, []
     if damage_after.defined(type(damage)):
-        step = FlowStep(0.1, 1.0, heat, 1.0, nothing(Space()))
+        step = FlowStep(0.1, 1.0, heat, 1.0, nothing(Space()), 0.0)
         results.append(damage_after(damage, initial_damage(damage, 1.0), step))
     if flow_stress.defined(type(strength)):
         before = before_flow(strength, strengths.initial_memory(strength, 1.0), heat)
@@ -321,13 +321,16 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     viscous = viscous_after(law, J, m, tr(strain) / dt)
     viscous_work = sum(viscous) * (before - J)
     volumes = eos.VolumeStep(before, J, dt)
-    energy = eos.compressed(law.eos, m.energy, volumes, work + viscous_work)
-    crushed = eos.crush_work(law.eos, m.energy, energy, volumes)
+    memories = zip((m.strength, memory), volumes, strict=False)
+    elastic = [strengths.elastic_ratio(law.strength, old, j) for old, j in memories]
+    elastic = eos.VolumeStep(*elastic, dt)
+    energy = eos.compressed(law.eos, m.energy, elastic, work + viscous_work)
+    crushed = eos.crush_work(law.eos, m.energy, energy, elastic)
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
     intact = State(J, s, now)
-    damage = damage_after_flow(law, intact, flow, dt)
+    damage = damage_after_flow(law, intact, flow, volumes)
     heat = heated(law.temperature, m.heat, (work + crushed) * laws.specific_volume(law.eos))
     gone = work + crushed + viscous_work + released(law, kin, intact, damage)
     loss = tuple([lost + gone for lost in m.loss])
@@ -406,7 +409,7 @@ def integrity_of(law, memory):
     return 1 if isinstance(law.damage, Absent) else integrity(law.damage, memory)
 
 
-def damage_after_flow(law, state, strain, dt):
+def damage_after_flow(law, state, strain, volumes):
     if isinstance(law.damage, Absent):
         return ()
     J, s, m = state
@@ -414,7 +417,8 @@ def damage_after_flow(law, state, strain, dt):
     bound = von_mises(s) + 1e-3 * abs(p)
     stressed = bound > 0
     triaxiality = where(stressed, -p / where(stressed, bound, 1), 0)
-    step = FlowStep(strain, triaxiality, m.heat, dt, s - p * I)
+    expansion = volumes.j / volumes.before - 1
+    step = FlowStep(strain, triaxiality, m.heat, volumes.dt, s - p * I, expansion)
     return damage_after(law.damage, m.damage, step)
 
 

@@ -15,10 +15,11 @@ from karamelo_py.compiler import importable, real, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
-from karamelo_py.script import terms
+from karamelo_py.script import evaluation, syntax, terms
 from karamelo_py.script.derivatives import OF_ONE, is_number
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+from karamelo_py.script.parser import parse_text
 from karamelo_py.script.terms import Term
 
 WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
@@ -38,7 +39,7 @@ class FormulaOf:
     expected: ClassVar[str]
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Expression:
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
         value = argument.value_with(cls.names)
         if isinstance(value, str):
             raise ScriptError(
@@ -52,6 +53,28 @@ class FormulaOf:
                 expected=cls.expected,
             )
         return formula
+
+
+class Constants:
+    """Names in a ready formula: constants, or else seeds."""
+
+    def __init__(self, numbers: dict[str, float]):
+        self.numbers = numbers
+
+    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> float | Expression:
+        return self.numbers[name] if name in self.numbers else Expression.seed(name)
+
+    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Any:
+        raise NotImplementedError(node.name)
+
+    def hides(self, name: str) -> bool:
+        return False
+
+
+def with_numbers(formula: str, **numbers: float) -> Expression:
+    """Return a ready formula with its constants; other names stay names."""
+    raw, node = parse_text(formula)
+    return Expression(evaluation.evaluate(node, raw, Constants(numbers)))
 
 
 def check_operations(formula: Term, argument: str, known: set[str] = KNOWN) -> None:

@@ -15,13 +15,11 @@ from karamelo_py.points.laws.by_energy import (
     OfInvariants,
     law_of,
 )
-from karamelo_py.points.laws.formulas import FormulaOf
+from karamelo_py.points.laws.formulas import FormulaOf, with_numbers
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.thermoelastic import expanding
-from karamelo_py.script import evaluation, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.script.parser import parse_text
 
 SEEDS = (*INVARIANTS, "I3", *FIBRES, *STRETCHES, "T")
 
@@ -138,26 +136,8 @@ class HyperelasticFormula(OfInvariants, Fields):
         return expanding(law_of(rho, energy, unit, T), cp, kappa, alpha, T)
 
 
-class _Numbers:
-    """Names in a ready formula: constants, or else seeds."""
-
-    def __init__(self, numbers: dict[str, float]):
-        self.numbers = numbers
-
-    def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> float | Expression:
-        return self.numbers[name] if name in self.numbers else Expression.seed(name)
-
-    def command(self, node: syntax.FunctionCall, raw: syntax.Raw) -> Any:
-        raise NotImplementedError(node.name)
-
-    def hides(self, name: str) -> bool:
-        return False
-
-
 def ready(rho: float, formula: str, directions: Sequence[float] = (), **numbers: float) -> Any:
-    raw, node = parse_text(formula)
-    value = evaluation.evaluate(node, raw, _Numbers(numbers))
-    return law_of(rho, Expression(value), directions)
+    return law_of(rho, with_numbers(formula, **numbers), directions)
 
 
 VOLUME = "K/2*(J - 1)^2"

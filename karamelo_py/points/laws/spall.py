@@ -1,13 +1,24 @@
-"""Damage tuler-butcher."""
+"""Damages by stress: tuler-butcher, cochran-banner, formula."""
 
-from typing import Any, NamedTuple
+from collections import namedtuple
+from typing import Any, ClassVar, NamedTuple
 
 from karamelo_py.compiler import real, where
 from karamelo_py.compiler.powers import power
+from karamelo_py.points.kinematics import dev, tr, von_mises
 from karamelo_py.points.kinematics.principal import principal
 from karamelo_py.points.laws import column, damage, damage_initiation
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
+from karamelo_py.points.laws.formulas import (
+    Code,
+    FormulaOf,
+    ProgramWriter,
+    check_operations,
+    evaluated,
+    in_lanes,
+)
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.temperatures import temperature_or
 
 
 class TulerButcher(NamedTuple):
@@ -34,7 +45,7 @@ class TulerButcher(NamedTuple):
 
     See Also
     --------
-    damage_johnson_cook, eos shock, material eos-strength
+    cochran-banner, formula, eos shock, material eos-strength
     """
 
     in_lanes = True
@@ -75,3 +86,175 @@ def _initiation_tuler_butcher(damage, memory):
 @integrity.on(TulerButcher)
 def _integrity_tuler_butcher(damage, memory):
     return where(memory.w < 1, real(1, memory.w), real(0, memory.w))
+
+
+class CochranBanner(NamedTuple):
+    """Spall by cracks that open gradually.
+
+    Parameters
+    ----------
+    sigma0
+        Tension, as a pressure, at which cracks begin to open.
+    D0
+        Opening at which nothing is left, a length: 50e-6 m for copper.
+
+    Example
+    -------
+    damage(spall, cochran-banner, 2.2e9, 50e-6)
+
+    Notes
+    -----
+    Tension is at most sigma0 (1 - (w/D0)^(2/3)) (Cochran & Banner 1977, J. Appl. Phys. 48,
+    2729-2737). At that bound the opening w grows by the volume strain times the cell size. The
+    fraction D of the stress of intact material is lost, and never heals. Dump columns: damage, and
+    damage_init, w over D0.
+
+    See Also
+    --------
+    tuler-butcher, formula, eos shock, material eos-strength
+    """
+
+    in_lanes = True
+
+    sigma0: float
+    D0: float
+    cell_size: float = 0.0  # set when the scene is lowered
+
+    @classmethod
+    def given(cls, sigma0: AboveZero, D0: AboveZero):
+        return cls(sigma0, D0)
+
+
+column(CochranBanner, "damage", damage)
+column(CochranBanner, "damage_init", damage_initiation)
+
+
+class Opened(NamedTuple):
+    w: Any  # opening over D0
+    left: Any  # of the stress
+
+
+@initial_damage.on(CochranBanner)
+def _initial_damage_cochran_banner(damage, like):
+    return Opened(0.0, 1.0)
+
+
+@damage_after.on(CochranBanner)
+def _damage_after_cochran_banner(damage, memory, step):
+    tension = 1 / 3 * tr(step.stress)
+    bound = damage.sigma0 * cracked(memory.w)
+    opens = memory.left * tension > bound
+    wider = where(opens, max(step.expansion, 0) * damage.cell_size / damage.D0, 0)
+    w = min(memory.w + wider, 1)
+    left = damage.sigma0 * cracked(w) / where(opens, tension, 1)
+    return Opened(w, where(opens, min(memory.left, left), memory.left))
+
+
+def cracked(w):
+    """Return the fraction of the tension that cracks of the opening `w` leave."""
+    some = w > 0
+    return 1 - where(some, power(where(some, w, 1), 2 / 3), 0)
+
+
+@initiation.on(CochranBanner)
+def _initiation_cochran_banner(damage, memory):
+    return memory.w
+
+
+@integrity.on(CochranBanner)
+def _integrity_cochran_banner(damage, memory):
+    return memory.left
+
+
+class RateFormula(FormulaOf):
+    """Script argument: a growth rate of damage."""
+
+    script_kind: ClassVar[str] = "a formula of s1, p, q, t, epdot, T and w"
+    names = ("s1", "p", "q", "t", "epdot", "T", "w")
+    what = "the growth of damage"
+    expected = script_kind
+
+
+class ByRate:
+    __slots__ = ()
+    scalarised = ("damage_after",)
+    start: ClassVar[int]
+    rate: ClassVar[Code]
+    directed: ClassVar[bool]  # s1 is needed
+
+
+DamageFields = namedtuple("DamageFields", ("brittleness", "initial_temperature"))
+
+
+class DamageFormula(ByRate, DamageFields):
+    """Failure whose growth is a formula of stress, flow rate and temperature.
+
+    Parameters
+    ----------
+    rate
+        Growth of w per time: a formula of the largest principal stress s1, pressure p, von Mises
+        stress q and triaxiality t = -p/q of intact material, plastic strain rate epdot, temperature
+        T and w.
+    brittleness
+        D grows from 0 to 1 while w grows from 1 to 1 + 1/brittleness; by default at once.
+    T
+        Temperature, if neither the material nor its solid has one.
+
+    Example
+    -------
+    damage(spall, formula, max(s1 - 1e9, 0)^2/1.2e11)
+    damage(ductile, formula, epdot/(0.54 + 4.89*exp(-3.03*t)), brittleness=10)
+
+    Notes
+    -----
+    Negative rates count as 0. A broken point sustains pressure only. Dump columns: damage, and
+    damage_init, which is w.
+
+    See Also
+    --------
+    damage_johnson_cook, tuler-butcher, cochran-banner, strength formula, eos formula
+    """
+
+    __slots__ = ()
+    syntax = "rate[, brittleness=][, T=293]"
+
+    @classmethod
+    def given(
+        cls, rate: RateFormula, *, brittleness: AboveZero = 1e30, T: FromZero = 293.0
+    ) -> NamedTuple:
+        term = rate._term
+        check_operations(term, "rate")
+        writer = ProgramWriter(RateFormula.names)
+        codes: dict[str, Any] = {"rate": writer.code(term), "directed": "s1" in rate.names}
+        codes["style"] = "formula"
+        codes["in_lanes"] = in_lanes(codes["rate"])
+        fields = {"brittleness": brittleness, "initial_temperature": T}
+        made = writer.law(ByRate, fields, codes)
+        column(type(made), "damage", damage)
+        column(type(made), "damage_init", damage_initiation)
+        return made
+
+
+@initial_damage.on(ByRate)
+def _initial_damage_by_rate(damage, like):
+    return Pulled(0.0)
+
+
+@damage_after.on(ByRate)
+def _damage_after_by_rate(damage, memory, step):
+    p = -1 / 3 * tr(step.stress)
+    largest = max(*principal(step.stress)[0]) if damage.directed else p
+    T = temperature_or(step.heat, damage.initial_temperature)
+    q = von_mises(dev(step.stress))
+    at = (largest, p, q, step.triaxiality, step.strain / step.dt, T, memory.w)
+    return Pulled(memory.w + max(evaluated(damage.rate, damage, at), 0) * step.dt)
+
+
+@initiation.on(ByRate)
+def _initiation_by_rate(damage, memory):
+    return memory.w
+
+
+@integrity.on(ByRate)
+def _integrity_by_rate(damage, memory):
+    return where(memory.w < 1, 1, 1 - min((memory.w - 1) * damage.brittleness, 1))

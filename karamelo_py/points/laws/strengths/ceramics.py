@@ -1,12 +1,18 @@
-"""Strength johnson-holmquist-2."""
+"""Strengths johnson-holmquist-2 and hjc."""
 
 from math import inf, sqrt
 from typing import NamedTuple
 
-from karamelo_py.compiler import real, where
+from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.points.kinematics import dev, inner, von_mises
-from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
+from karamelo_py.points.laws.eos import (
+    VolumeStep,
+    at_pressure,
+    bulk_modulus,
+    compressed,
+    pressure,
+)
 from karamelo_py.points.laws.parameters import AboveZero, FromZero, reference_rate
 from karamelo_py.points.laws.strengths import (
     added_energy,
@@ -105,9 +111,76 @@ class JohnsonHolmquist2(NamedTuple):
         return self._replace(epsdot0=reference_rate(self.epsdot0, self.C, "C"))
 
 
+class Concrete(NamedTuple):
+    """Strength of concrete under impact (Holmquist, Johnson, Cook).
+
+    Parameters
+    ----------
+    G
+        Shear modulus.
+    A, B, N
+        Strength over fc: A (1 - D) + B P*^N, with P* = P/fc.
+    C
+        Rate coefficient; 0 for none.
+    epsdot0
+        Reference strain rate; may be 0 if C is.
+    fc
+        Uniaxial compressive strength.
+    T
+        Largest tension, as a pressure.
+    smax
+        Bound of the strength over fc.
+    D1, D2
+        Strain to failure: D1 (P* + T*)^D2.
+    efmin
+        Least strain to failure.
+
+    Example
+    -------
+    eos(solid, linear, 2640, 30e9)
+    eos(concrete, p-alpha, solid, 1.1, 16e6, 800e6)
+    strength(c, hjc, 14.86e9, 0.79, 1.6, 0.61, 0.007, 1, 48e6, 4e6, 7, 0.04, 1, 0.01)
+    material(concrete, eos-strength, concrete, c)
+
+    Notes
+    -----
+    The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and smax fc;
+    in tension A falls to 0 at -T (1 - D). D grows by the plastic strain and, with eos p-alpha, by
+    the volume strain of crushed pores, over the strain to failure (Holmquist, Johnson & Cook 1993,
+    14th Int. Symp. Ballistics, 591-600). Their pressure in three pieces is not built in: eos
+    p-alpha has the same parts, or eos formula. Dump columns: ep, damage, opened (the volume ratio
+    of gaps).
+
+    See Also
+    --------
+    johnson-holmquist-2, eos p-alpha
+    """
+
+    in_lanes = True
+    beta = 0.0
+
+    G: AboveZero
+    A: AboveZero
+    B: FromZero
+    N: FromZero
+    C: FromZero
+    epsdot0: FromZero
+    fc: AboveZero
+    T: AboveZero
+    smax: AboveZero
+    D1: AboveZero
+    D2: FromZero
+    efmin: AboveZero
+
+    def checked(self):
+        return self._replace(epsdot0=reference_rate(self.epsdot0, self.C, "C"))
+
+
+remembers(Concrete, ep=0.0, damage=0.0, bulking=0.0, opened=1.0)
 remembers(JohnsonHolmquist2, ep=0.0, damage=0.0, bulking=0.0, opened=1.0)
 
 
+@elastic_ratio.on(Concrete)
 @elastic_ratio.on(JohnsonHolmquist2)
 def _elastic_ratio_johnson_holmquist(strength, memory, j):
     return j / memory.opened
@@ -137,30 +210,56 @@ def rate_factor(strength, step):
     return 1 + strength.C * logarithm(max(rate, 1))
 
 
+@point_function()
 def limits(strength, p, factor):
-    """Return the intact and broken strengths, and P* + T*."""
+    """Return the intact and broken strengths, and the strain to failure."""
+
+
+@limits.on(JohnsonHolmquist2)
+def _limits_johnson_holmquist(strength, p, factor):
     above = max(p + strength.T, 0) / strength.PHEL
     intact = strength.A * power(above, strength.N) * factor
     broken = strength.B * power(max(p, 0) / strength.PHEL, strength.M) * factor
     scale = 1.5 * (strength.HEL - strength.PHEL)
-    return scale * intact, scale * min(min(broken, strength.sfmax), intact), above
+    failure = max(strength.D1 * power(above, strength.D2), LEAST_STRAIN)
+    return scale * intact, scale * min(min(broken, strength.sfmax), intact), failure
 
 
+@limits.on(Concrete)
+def _limits_concrete(strength, p, factor):
+    above = max(p + strength.T, 0)
+    confined = strength.B * power(max(p, 0) / strength.fc, strength.N) * factor
+    cohesion = strength.A * min(above / strength.T, 1) * factor
+    failure = max(strength.D1 * power(above / strength.fc, strength.D2), strength.efmin)
+    ends = [strength.fc * min(end, strength.smax) for end in (cohesion + confined, confined)]
+    return *ends, failure
+
+
+def pores_crushed(strength, before, after):
+    """Return the volume strain of pores that counts as damage."""
+    if not (isinstance(strength, Concrete) and hasattr(after, "alpha")):
+        return 0
+    return logarithm(before.alpha / after.alpha)
+
+
+@respond.on(Concrete)
 @respond.on(JohnsonHolmquist2)
 def _respond_johnson_holmquist(strength, law, kin, step, memories):
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
     lowest = -strength.T * (1 - memory.damage)
     warm = sum(thermal_pressure(law.temperature, heat))
-    whole = ratio_at_pressure(law.eos, lowest - memory.bulking - warm, heat)
+    before = step.j / memory.opened
+    energy = compressed(law.eos, memories.energy, VolumeStep(before, before, step.dt), 0)
+    whole, _ = at_pressure(law.eos, before, energy, lowest - memory.bulking - warm, heat)
     opened = max(step.j / whole, 1)
-    p_eos = pressure(law.eos, step.j / opened, memories.energy, heat) + warm
+    p_eos = pressure(law.eos, step.j / opened, energy, heat) + warm
     p = p_eos + memory.bulking
-    intact, broken, above = limits(strength, p, rate_factor(strength, step))
+    intact, broken, failure = limits(strength, p, rate_factor(strength, step))
     q, flow = von_mises(trial), intact - memory.damage * (intact - broken)
     x = max(q - flow, 0) / (3 * strength.G)
-    failure = max(strength.D1 * power(above, strength.D2), LEAST_STRAIN)
-    damage = min(memory.damage + x / failure, 1)
+    lost = x + pores_crushed(strength, memories.energy, energy)
+    damage = min(memory.damage + lost / failure, 1)
     weaker = intact - damage * (intact - broken)
     # shear energy released beyond the plastic work
     released = where(x > 0, (flow * flow - weaker * weaker) / (6 * strength.G), 0)

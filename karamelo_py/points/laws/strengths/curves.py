@@ -5,16 +5,21 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import real
+from karamelo_py.compiler import implements, real, shared
+from karamelo_py.compiler.slopes import Dual, value_of
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import TableFile
+from karamelo_py.points.laws.formulas import FormulaOf
 from karamelo_py.points.laws.parameters import AboveZero, FromZero, Numbers
-from karamelo_py.points.laws.strengths import remembers, shear_response
-from karamelo_py.points.laws.strengths.hardening import flow_stress, radial_return
-from karamelo_py.points.laws.temperatures import temperature_or
+from karamelo_py.points.laws.strengths import remembers, respond, shear_response
+from karamelo_py.points.laws.strengths.hardening import (
+    flow_stress,
+    radial_return,
+    respond_at_pressure,
+    surroundings,
+)
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression
 from karamelo_py.script.formula import CONSTANT, POINT, SPREAD, UNIFORM
 from karamelo_py.script.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.script.reading import read_text
@@ -118,32 +123,27 @@ def _flow_stress_tabulated(strength, before, increment, dt):
     return strength.stress[last], 0 * x
 
 
-SEEDS = ("ep", "epdot", "T")
+SEEDS = ("ep", "epdot", "T", "p", "J")
 DEPTH = 8  # of the stack, a tuple
 
 
-class FlowFormula:
-    """Script argument: a formula of plastic strain, its rate and temperature, as numbers.
+class FlowFormula(FormulaOf):
+    """Script argument: a flow stress.
 
-    Each instruction has two: the operation, and a constant or the index of an input.
+    Two numbers per instruction: the operation; a constant or the index of an input.
     """
 
-    script_kind: ClassVar[str] = "a formula of ep, epdot and T"
+    script_kind: ClassVar[str] = "a formula of ep, epdot, T, p and J"
+    names = SEEDS
+    what = "the flow stress"
+    expected = (
+        "a formula of ep, epdot, T, p and J: plastic strain, its rate, temperature, "
+        "pressure, volume ratio"
+    )
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
-        value = argument.value_with(SEEDS)
-        if isinstance(value, str):
-            raise ScriptError(f"'{value}' is text", mark=argument.mark)
-        formula = Expression(value)
-        others = formula.names.difference(SEEDS)
-        if others:
-            raise ScriptError(
-                f"the flow stress cannot depend on {min(others)}",
-                mark=argument.mark,
-                expected="a formula of ep, epdot and T, the plastic strain, its rate, the "
-                "temperature",
-            )
+        formula = super().from_script(hub, argument)
         program = formula.program_of(SEEDS, DEPTH)
         instructions = []
         for operation, operand in program.code:
@@ -163,7 +163,7 @@ class FlowStress(NamedTuple):
         Shear modulus.
     Y
         The flow stress: a formula of the equivalent plastic strain ep, its rate epdot in the step,
-        and the temperature T.
+        the temperature T, the pressure p and the volume ratio J.
     T
         Temperature, if neither the material nor its solid has one.
 
@@ -199,7 +199,7 @@ class FlowStress(NamedTuple):
 def _check_formula(law: FlowStress) -> None:
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
-            Y = value(law, ep, epdot, law.initial_temperature)
+            Y = value(law, ep, epdot, surroundings(law, ()))
             if np.isnan(Y) or np.inf == Y:
                 raise ScriptError(
                     f"the flow stress is {Y:g} where ep = {ep:g}, epdot = {epdot:g}, "
@@ -208,11 +208,11 @@ def _check_formula(law: FlowStress) -> None:
                     expected="a number for every plastic strain and rate from 0 on",
                     hint="max(epdot, 1) excludes a zero rate; T=... begins at another T",
                 )
-    if not value(law, 1e-6, 1.0, law.initial_temperature) > 0:
+    if not value(law, 1e-6, 1.0, surroundings(law, ())) > 0:
         raise ScriptError("the flow stress is not above 0 at first", argument="Y")
 
 
-def value(strength, ep, epdot, T):
+def value(strength, ep, epdot, around):
     """Evaluate the formula in double precision."""
     stack = (0.0,) * DEPTH  # top first
     for k in range(int(strength.count)):
@@ -221,7 +221,8 @@ def value(strength, ep, epdot, T):
         if op == CONSTANT:
             stack = (operand, *stack[:-1])
         elif op == POINT:
-            seed = ep if operand == 0 else (epdot if operand == 1 else T)
+            seed = ep if operand == 0 else (epdot if operand == 1 else around.T)
+            seed = seed if operand < 3 else (around.p if operand == 3 else around.J)
             stack = (real(seed, 1.0), *stack[:-1])
         elif op < FIRST_BINARY:
             stack = (of_one(op, stack[0]), *stack[1:])
@@ -233,18 +234,35 @@ def value(strength, ep, epdot, T):
 
 
 remembers(FlowStress, ep=0.0)
-shear_response.on(FlowStress)(radial_return)
+respond.on(FlowStress)(respond_at_pressure)
+
+
+@shared
+def with_slopes(flow, strength, ep, epdot, around):
+    return flow
+
+
+@implements(with_slopes, Dual)
+def _with_slopes_by_pressure(flow, strength, ep, epdot, around):
+    plain = value_of(around)
+    for name, size in (("p", 1e-4 * strength.G), ("J", 1e-6)):
+        at = getattr(plain, name)
+        ends = [value(strength, ep, epdot, plain._replace(**{name: at + h})) for h in (size, -size)]
+        flow = flow + (ends[0] - ends[1]) / (2 * size) * (getattr(around, name) - at)
+    return flow
 
 
 @flow_stress.on(FlowStress)
 def _flow_stress_flow_stress(strength, before, increment, dt):
-    T = temperature_or(before.heat, strength.initial_temperature)
+    around = surroundings(strength, before.heat)
+    plain = value_of(around)
     near = 1e-6 * (increment + 1e-4)
     # double precision, because the difference is small
     here = real(before.memory.ep, 1.0) + increment
-    stress = max(value(strength, here, increment / dt, T), 0.0)
-    beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, T), 0.0)
+    stress = max(value(strength, here, increment / dt, plain), 0.0)
+    beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, plain), 0.0)
     flow = max(real(stress, increment), 0)
     slope = real((beyond - stress) / near, increment)
+    flow = with_slopes(flow, strength, here, increment / dt, around)
     # a slope of -3 G or less has no solution
     return flow, max(slope, -2 * strength.G)

@@ -14,8 +14,10 @@ from karamelo_py.compiler import (
 )
 from karamelo_py.compiler.slopes import Dual, value_of
 from karamelo_py.points.kinematics import dev, von_mises
+from karamelo_py.points.laws.eos import pressure
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import remembers, shear_response
+from karamelo_py.points.laws.temperatures import temperature_or, thermal_pressure
 
 
 def elastic_trial(G, s, strain):
@@ -138,6 +140,30 @@ def radial_return(strength, kin, step, memory, heat):
     flow = q - 3 * strength.G * x
     after = updated_memory(strength, memory, x, step.dt)
     return onto_yield_surface(trial, q, flow, x), after, flow * x
+
+
+class Around(NamedTuple):
+    """Surroundings of a flow stress that depends on pressure; takes the place of `heat`."""
+
+    T: Any
+    p: Any
+    J: Any
+
+
+def respond_at_pressure(strength, law, kin, step, memories):
+    """Radial return with a flow stress at the pressure and volume after the step."""
+    heat = memories.heat
+    p = pressure(law.eos, step.j, memories.energy, heat)
+    p += sum(thermal_pressure(law.temperature, heat))
+    around = Around(temperature_or(heat, strength.initial_temperature), p, step.j)
+    return radial_return(strength, kin, step, memories.strength, around)
+
+
+def surroundings(strength, heat):
+    """Return `heat` of `respond_at_pressure`; else no pressure, at the volume of rest."""
+    if len(heat) > 1:
+        return heat
+    return Around(temperature_or(heat, strength.initial_temperature), 0.0, 1.0)
 
 
 # Newton's method takes one to three; bisection one per bit.
