@@ -349,6 +349,10 @@ SCENES = {
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
     "ground": block(2, *EDGES, size=SIZE),
+    "corrected accelerations": block(
+        2, "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
+        "fix(hold, velocity_nodes, low, NULL, 0)", *SWAYS, transfer="APIC", size=SIZE,
+    ).replace("spline)", "spline, mass=corrected)"),
 }  # fmt: skip
 OUTPUTS = """\
 dump(d1, all, particle, 2, all.txt, x, y, s11)

@@ -20,6 +20,7 @@ def method(
     transfer: StyleOf("transfer"),
     basis: StyleOf("basis"),
     *options: Argument,
+    mass: Literal["lumped", "corrected"] = "lumped",
 ) -> None:
     """Choose the method, the velocity transfer and the basis functions.
 
@@ -37,6 +38,9 @@ def method(
         (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the velocity
         gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp. ``R4``,
         ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
+    mass
+        ``corrected``: remove most of the error of the lumped masses from the accelerations, with
+        APIC, AFLIP or MLS and splines.
 
     Example
     -------
@@ -45,6 +49,7 @@ def method(
     method(ulmpm, FLIP, cpgimp, 1, stretch)
     method(ulcpdi, FLIP, linear, 0.99, Q4)
     method(tlmpm, FLIP, linear, 0.99, thermo-mechanical)
+    method(ulmpm, APIC, cubic-spline, mass=corrected)
 
     Notes
     -----
@@ -79,7 +84,7 @@ def method(
     for family, part in parts.items():
         check_part(hub, f"{family} {call.names[family]}", part)
     chosen.basis_name = f"{basis} {call.variant}".strip()
-    chosen.mark = hub.mark
+    chosen.mark, chosen.corrected = hub.mark, mass == "corrected"
     hub.update.thermal = chosen.thermal
 
 

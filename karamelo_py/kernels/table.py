@@ -16,6 +16,12 @@ from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
 from karamelo_py.kernels.equations import fbar, loss, strain, xpic
 from karamelo_py.kernels.equations import node_updates as nodes
+from karamelo_py.kernels.equations.corrected_acceleration import (
+    Acceleration,
+    CorrectAcceleration,
+    StoreAcceleration,
+    correct_acceleration,
+)
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
 from karamelo_py.kernels.equations.move import Move
@@ -389,6 +395,12 @@ def average_stress(s: Setup) -> tuple:
     return NodeTask(fbar.TakeMeanStress()), Sweep(visit, moves=False, reported=None)
 
 
+def corrected(s: Setup) -> tuple:
+    if field(s.nodes.fields, Acceleration) is None:
+        return ()
+    return NodeTask(StoreAcceleration()), NodeTask(correct_acceleration)
+
+
 def at_nodes_with(kind: type, task: Tag) -> Any:
     return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
@@ -442,6 +454,7 @@ WORK_OF_LOADS = WorkOfLoads()
 # the deforming velocity must satisfy contact too, unless it is v*
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
+CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
 SERIES = SceneTask(sum_series, "series of XPIC")
 
@@ -469,6 +482,7 @@ UPDATE = (
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
     NodeTask(nodes.NodalUpdate()),
+    CORRECTION,
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
 )

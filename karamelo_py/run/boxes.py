@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import forget_array
-from karamelo_py.compiler.fields import SummedField, records
-from karamelo_py.kernels.arrays import Buffers, Nodes, Setup, Tag
+from karamelo_py.compiler.fields import SummedField, field, records
+from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
 from karamelo_py.kernels.contact import SeparateFields
+from karamelo_py.kernels.equations.corrected_acceleration import Acceleration
 from karamelo_py.kernels.heat import Conducting
 
 SPAN = 256  # maximum nodes of a span
@@ -136,9 +137,10 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
     return [nodes.sums, nodes.velocity, *declared]
 
 
-def beyond(contact: Tag) -> int:
-    """Return how many cells further contact reads sums."""
-    return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
+def beyond(s: Setup) -> int:
+    """Return how many cells further contact, or the correction of accelerations, reads sums."""
+    corrected = field(s.nodes.fields, Acceleration) is not None
+    return max(s.contact.looks_beyond if isinstance(s.contact, SeparateFields) else 0, corrected)
 
 
 def room_of(rows: int, array: np.ndarray) -> np.ndarray:

@@ -120,7 +120,7 @@ class SimulationOnCard(Simulation):
         if not self.hub.checking:
             self.refuse()
         super()._make_ready()
-        if self._setup.contact:  # prepared for the fixes of this run
+        if self._setup.contact or self.hub.update.method.corrected:  # prepared for the fixes
             self._sent = False
 
     def compile(self) -> None:

@@ -142,7 +142,8 @@ class Update:
     @property
     def words(self) -> str:
         scheme = _with_numbers(registry.name_of("scheme", type(self.scheme)), self.scheme)
-        return f"{self.words_of_state} {scheme}" + " thermo-mechanical" * self.thermal
+        more = " thermo-mechanical" * self.thermal + " mass=corrected" * self.method.corrected
+        return f"{self.words_of_state} {scheme}{more}"
 
     @property
     def words_of_state(self) -> str:

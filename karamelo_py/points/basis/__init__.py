@@ -30,6 +30,10 @@ class BasisTraits(NamedTuple):
     # h^2 / D, and max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: the stiffness of
     # a point alone at its nodes.
     lone: tuple[float, float] | None = None
+    # D / h^2 where it is constant: mapping to the nodes and back damps waves by it.
+    spread: float | None = None
+    # Fraction of the stable step with corrected accelerations, in the updated frame.
+    corrected_share: float = 0.8
     bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
     drift_limits: DriftLimits | None = None  # None: as similar bases
     # Data stored for a domain, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),

@@ -60,6 +60,7 @@ class QuadraticSpline(NamedTuple):
         steady_moment=True,
         steep_edge=False,
         lone=(4.0, 6.0),
+        spread=1 / 4,
         courant_still=1.25,
     )
 
@@ -169,6 +170,8 @@ class CubicSpline(NamedTuple):
         steady_moment=True,
         steep_edge=False,
         lone=(3.0, 3.14),
+        spread=1 / 3,
+        corrected_share=0.95,
         courant_total=1.25,
         courant_still=1.4,
         courant_strained_first=1.0,

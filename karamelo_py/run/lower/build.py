@@ -49,6 +49,7 @@ from karamelo_py.scene.lattice import table
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Mark, ScriptError, render_message
+from karamelo_py.styles.methods.base import CORRECTED
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
 SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
@@ -146,6 +147,8 @@ def _features(hub: Hub) -> Iterator[Feature]:
 def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | None]]:
     """Yield the restrictions of each capability in use, its words in messages and its line."""
     update, box = hub.update, hub.domain
+    if update.method.corrected:
+        yield CORRECTED, "mass=corrected", update.method.mark
     if box.periodic:
         yield boundary.PERIODIC, "boundary(periodic)", None
     if update.boundary != "error":
@@ -205,7 +208,8 @@ def lower(
     basis = type(method.basis)(*(real(x) for x in method.basis))
     if fixes := fixes_of_walls(hub):
         basis = with_walls(fixes, lattices, basis)
-    cut = lattices, basis, sum(solid.count for solid in hub.solids.values()), sparse(hub)
+    count = sum(solid.count for solid in hub.solids.values())
+    cut = lattices, basis, count, sparse(hub), method.corrected
     if comm.size == 1:
         tiles = Tiles(*cut)
     else:

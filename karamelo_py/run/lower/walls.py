@@ -1,4 +1,4 @@
-"""Walls inside the grid: faces of cells all of whose nodes are held."""
+"""Held nodes, and walls inside the grid: faces of cells all of whose nodes are held."""
 
 import math
 from collections.abc import Iterator
@@ -6,8 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels.arrays import Setup
+from karamelo_py.kernels.equations.corrected_acceleration import Held
 from karamelo_py.points.basis import walled
 from karamelo_py.points.basis.splines import ABOVE, BELOW
+from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 
@@ -57,3 +61,14 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
         cell = cell[(cell[:, k] > 0) & (cell < lattice.cells[:d]).all(axis=1)]
         if len(cell):
             yield k, cell
+
+
+def mark_held(hub: Hub, s: Setup) -> None:
+    """Mark the nodes and directions that fixes hold in this run (`Held`)."""
+    held = field(s.nodes.fields, Held)
+    if held.any():  # pages that are never written take no memory
+        held[:] = 0
+    for fix in hub.fixes.values():
+        for k, formula in enumerate(fix.formulas if fix.prescribes_velocity else ()):
+            if formula is not None:
+                held[slice(None) if fix.group.all else fix.nodes, k] = 1

@@ -92,10 +92,11 @@ class SharedTiles(Tiles):
         basis: Tag,
         points: int,
         sparse: bool,
+        corrected: bool,
         *,
         one_space: bool,
     ):
-        super().__init__(lattices, basis, points, sparse)
+        super().__init__(lattices, basis, points, sparse, corrected)
         self.comm = comm
         self.one_space = one_space  # bodies in contact have nodes at the same positions
         self._places = np.concatenate(
@@ -199,7 +200,7 @@ class SharedTiles(Tiles):
 
     def _boxes(self, s: Setup) -> Boxes:
         local, me = self.own_boxes(s), self.comm.rank
-        self._looks_beyond = beyond(s.contact) > 0
+        self._looks_beyond = beyond(s) > 0
         of_all = {me: local, **dict(enumerate(self.comm.allgather(local)))}
         if len(local.grid):
             low, high = local.lo.min(axis=0), local.hi.max(axis=0)
@@ -257,7 +258,7 @@ class SharedTiles(Tiles):
             for rank in unique(of)
             for here in [of == rank]
         }
-        self._inner = self._inner_boxes(boxes) if self._looks_beyond else {}
+        self._owned = self._owned_boxes(boxes) if self._looks_beyond else []
         local, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
         self._passed, self._from = {}, of[:0]
         if not len(local):
@@ -283,16 +284,19 @@ class SharedTiles(Tiles):
             *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
         ), result
 
-    def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
-        """Shrink boxes to nodes whose neighbours are in them, too, by process."""
+    def _owned_boxes(self, boxes: Boxes) -> list[dict[int, tuple]]:
+        """Boxes of nodes whose neighbours are in them, too, by process; and all boxes."""
         low = np.where(boxes.lo > 0, boxes.lo + 1, 0)
         end = self._nodes[boxes.grid] - 1
         high = np.where(boxes.hi < end, boxes.hi - 1, end)
-        return {
-            int(rank): (boxes.grid[here], low[here], high[here])
-            for rank in unique(self._of)
-            for here in [self._of == rank]
-        }
+        return [
+            {
+                int(rank): (boxes.grid[here], first[here], last[here])
+                for rank in unique(self._of)
+                for here in [self._of == rank]
+            }
+            for first, last in ((low, high), (boxes.lo, boxes.hi))
+        ]
 
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         first, steps = super()._number(s, boxes)
@@ -327,13 +331,12 @@ class SharedTiles(Tiles):
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
         count = int(self._nodes[0].prod()) if self.one_space else len(self.foreign)
-        number = nodes % count
-        for rank, boxes in sorted(self._inner.items()):
-            seen = np.isin(number, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
-            if rank == self.comm.rank:
-                return nodes[~seen]
-            number = np.where(seen, -1, number)
-        return nodes
+        number, owner = nodes % count, np.full(len(nodes), -1)
+        for of_ranks in self._owned:
+            for rank, boxes in sorted(of_ranks.items()):
+                seen = np.isin(number, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
+                owner[seen & (owner < 0)] = rank
+        return nodes[owner != self.comm.rank]
 
     def give(self, s: Setup, number: int, kinds: int) -> None:
         """Begin to exchange the contributions of tiles to other processes' nodes."""

@@ -5,8 +5,10 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from karamelo_py.kernels.equations.corrected_acceleration import Acceleration, Held
 from karamelo_py.kernels.equations.fbar import FBar, FBarOfSoil, PointByPoint
 from karamelo_py.language import registry
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.points.basis.cpdi import Element
 from karamelo_py.points.frames import Updated
 from karamelo_py.points.laws import can
@@ -17,6 +19,13 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import Mark, ScriptError
 
 LOADS = ("ContactForce", "ContactTorque")
+CORRECTED = Restrictions(
+    "mass=corrected", "mass=lumped",
+    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell.
+    only={"transfer": ("APIC", "AFLIP", "ASFLIP", "MLS", "TPIC", "TFLIP"),
+          "basis": ("quadratic-spline", "cubic-spline")},
+    without=("periodic", "pore_water", "implicit"),
+)  # fmt: skip
 
 
 def publish_loads(hub: Hub, solid: Solid) -> None:
@@ -59,6 +68,8 @@ class Method:
         Whether heat flows.
     mark
         Location of the command in the script, for messages.
+    corrected
+        Whether accelerations are corrected for the lumped masses.
     frame
         Whether weights belong to present or reference positions.
     own_grids
@@ -71,12 +82,17 @@ class Method:
     basis_name = ""
     thermal = False
     mark: Mark | None = None
+    corrected = False
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
     fields_per_solid: ClassVar[bool] = False
 
     def __init__(self, hub: Hub, heat: Literal["mechanical", "thermo-mechanical"] = "mechanical"):
         self.thermal = heat == "thermo-mechanical"
+
+    @property
+    def node_fields(self) -> tuple[type, ...]:
+        return (Acceleration, Held) if self.corrected else ()
 
     @property
     def regular_points(self) -> bool:
