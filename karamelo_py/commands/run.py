@@ -13,6 +13,7 @@ from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Po
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
 from karamelo_py.run.checkpoint import restart_file
+from karamelo_py.run.condition import RunCondition
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.run.lower.build import check_scene
 from karamelo_py.run.lower.card import refuse, take_card
@@ -194,7 +195,7 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     run, run_time, run_while
     """
     _check("run_until", condition)
-    carry_out(hub, condition=condition, until=True, halve=on_trouble == "halve")
+    carry_out(hub, condition=RunCondition(condition, until=True), halve=on_trouble == "halve")
 
 
 def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop") -> None:
@@ -216,7 +217,7 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     run, run_time, run_until
     """
     _check("run_while", condition)
-    carry_out(hub, condition=condition, until=False, halve=on_trouble == "halve")
+    carry_out(hub, condition=RunCondition(condition, until=False), halve=on_trouble == "halve")
 
 
 def _check(command: str, condition: Expression) -> None:

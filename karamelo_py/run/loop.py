@@ -1,16 +1,21 @@
-"""One run: steps in chunks, outputs when due, events for listeners."""
+"""One run: steps in chunks, outputs when due, events for listeners.
+
+`output.schedule` writes log and dumps, `run.rollback` judges steps and stops a run, and
+`run.step_size` chooses the step.
+"""
 
 import signal
 import time
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass, field
-from math import inf, isfinite, isnan
+from math import inf, isfinite
 from pathlib import Path
 from types import FrameType
 
 import numpy as np
 
 from karamelo_py.run.backend import Backend
+from karamelo_py.run.condition import RunCondition
 from karamelo_py.run.listening import Listener, Trouble
 from karamelo_py.run.mpi.comm import check_same_run
 from karamelo_py.run.rollback import RollBack, Stopped
@@ -18,8 +23,6 @@ from karamelo_py.run.timings import Timings
 from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
-from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression
 
 SECONDS_PER_CHUNK = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
 
@@ -32,15 +35,13 @@ class Interrupted(Exception):
 class RunLoop:
     """Runs a scene for a number of steps, to a time, or by a condition.
 
-    It ends when the condition holds (`until`) or fails. With `halve`, a failure returns to the last
-    good state and halves the step.
+    With `halve`, a failure returns to the last good state and halves the step.
     """
 
     hub: Hub
     steps: int | None = None
     end_time: float = inf
-    condition: Expression | None = None
-    until: bool = False
+    condition: RunCondition | None = None
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
@@ -129,8 +130,7 @@ class RunLoop:
 
         while self._goes_on(simulation):
             rollback.before()
-            step, compiled = simulation.step, timings.on["compilation"][0]
-            begun = timings.on["steps"][0]
+            step, begun = simulation.step, timings.on["steps"][0]
             kept = (step // most + 1) * most  # where a state may be stored
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             end = min([end, *((step // every + 1) * every for every in rhythms)])
@@ -148,7 +148,7 @@ class RunLoop:
             with timings.counted("output"):
                 if self._steps_left(simulation):
                     hub.output.write()
-                self._show_progress(simulation, anew=timings.on["compilation"][0] > compiled)
+                self._show_progress(simulation)
 
     def _goes_on(self, simulation: Backend) -> bool:
         if not self._steps_left(simulation):
@@ -156,15 +156,12 @@ class RunLoop:
         if self.condition_allows():
             self._agree(simulation)
             return not self.interrupted
-        if simulation.step == self.first_step:
-            # A forgotten or reversed comparison would end the run at once.
-            holds = "holds" if self.until else "does not hold"
-            self.hub.warn(
-                f"the condition {holds} before the first step of this run: it takes none",
-                hint="run_until ends where its condition is anything but 0, run_while where it is "
-                "0; comparisons are 1 or 0",
-            )
+        if self.condition and simulation.step == self.first_step:
+            self.condition.warn_of_no_step(self.hub)
         return False
+
+    def condition_allows(self) -> bool:
+        return self.condition is None or self.condition.allows(self.hub)
 
     def _agree(self, simulation: Backend) -> None:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signalled]))[0])
@@ -174,31 +171,12 @@ class RunLoop:
         end_time = simulation.control.step[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
 
-    def condition_allows(self) -> bool:
-        if self.condition is None:
-            return True
-        values = self.hub.values
-        if self.condition.names - {"time", "timestep", "dt"}:
-            self.hub.refresh_values()
-        holds = self.condition.evaluate(values)
-        if isnan(holds):
-            lost = sorted(name for name in self.condition.names if isnan(values.get(name)))
-            raise ScriptError(
-                f"step {self.hub.update.step}: the run condition is not a number: "
-                + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
-                expected="values that are numbers at every step",
-            )
-        return bool(holds) != self.until
-
-    def _show_progress(self, simulation: Backend, within: str = "", anew: bool = False) -> None:
+    def _show_progress(self, simulation: Backend, within: str = "") -> None:
         console, fraction = self.hub.console, None
         if self.steps:
             fraction = (simulation.step - self.first_step) / self.steps
         elif isfinite(self.end_time) and self.end_time > self.first_time:
             fraction = (simulation.time - self.first_time) / (self.end_time - self.first_time)
-        if anew:
-            console.end_run()
-            console.begin_run(simulation.step, fraction or 0.0)
         console.progress(simulation.step, simulation.time, fraction, within)
 
     def _note(self, number: int, _: FrameType | None = None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -155,6 +156,20 @@ class SceneArrays:
             self.setup.contact,
             carried_on(self.control),
         )
+
+    def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
+        """Return the largest velocity component relative to a common velocity."""
+        velocities = (block.points.v for block in self.setup.blocks)
+        # No copy: there may be millions of points.
+        components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
+        largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
+        return float(self.comm.allreduce_max(np.array([largest], float))[0])
+
+    def in_tiles(self) -> bool:
+        unsorted = 0
+        for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
+            unsorted += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
+        return not self.comm.allreduce(np.array([unsorted]))[0]
 
     def leaving(self) -> np.ndarray:
         s, then = self.setup, 1 - self.now

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -99,20 +99,6 @@ class Simulation(SceneArrays):
     def changed(self) -> None:
         super().changed()
         self.steps.measured = self.energy_watch.followed = False
-
-    def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """Return the largest velocity component relative to a common velocity."""
-        velocities = (block.points.v for block in self.setup.blocks)
-        # No copy: there may be millions of points.
-        components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
-        largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
-        return float(self.comm.allreduce_max(np.array([largest], float))[0])
-
-    def in_tiles(self) -> bool:
-        unsorted = 0
-        for points, tiling in ((block.points, block.tiling) for block in self.setup.blocks):
-            unsorted += tiling.range[: tiling.count[0], 1].max(initial=0) != points.mass.size
-        return not self.comm.allreduce(np.array([unsorted]))[0]
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
         """Delete points (ascending ids), without renumbering; return their mass and energy.

@@ -172,8 +172,7 @@ class StepSize:
         if not self.measured:
             # Else the last step has measured: runs in pieces take the steps of a whole run.
             simulation, motion = self.simulation, self.motion
-            motion.common[:] = common_velocity(simulation, float(motion.weight))
-            self._measure()
+            self._measure(float(motion.weight))
             motion.wave = motion.speed = 0.0
             if motion.weight != 1:
                 motion.wave = motion.rate - simulation.fastest(motion.common[0])
@@ -181,15 +180,16 @@ class StepSize:
             self.measured = True
         choose_dt(self.control)
 
-    def _measure(self) -> None:
-        measure(self.simulation.setup)
-        self.motion.rate = self.simulation.comm.allreduce_max(np.array([self.motion.rate]))[0]
+    def _measure(self, weight: float) -> None:
+        simulation, motion = self.simulation, self.motion
+        motion.common[:] = common_velocity(simulation, weight)
+        measure(simulation.setup)
+        motion.rate = simulation.comm.allreduce_max(np.array([motion.rate]))[0]
 
     def rate_with(self, weight: float) -> float:
         motion = self.motion
         common, rate = motion.common.copy(), float(motion.rate)
-        motion.common[:] = common_velocity(self.simulation, weight)
-        self._measure()
+        self._measure(weight)
         other = float(motion.rate)
         motion.common[:], motion.rate = common, rate
         return other

@@ -1,0 +1,36 @@
+"""The condition of run_until and run_while."""
+
+from math import isnan
+from typing import NamedTuple
+
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.expressions import Expression
+
+
+class RunCondition(NamedTuple):
+    formula: Expression
+    until: bool  # the run ends when it holds, else when it fails
+
+    def allows(self, hub: Hub) -> bool:
+        values = hub.values
+        if self.formula.names - {"time", "timestep", "dt"}:
+            hub.refresh_values()
+        holds = self.formula.evaluate(values)
+        if isnan(holds):
+            lost = sorted(name for name in self.formula.names if isnan(values.get(name)))
+            raise ScriptError(
+                f"step {hub.update.step}: the run condition is not a number: "
+                + (f"{lost[0]} is NaN" if lost else "a part of it is NaN"),
+                expected="values that are numbers at every step",
+            )
+        return bool(holds) != self.until
+
+    def warn_of_no_step(self, hub: Hub) -> None:
+        """A forgotten or reversed comparison would end the run at once."""
+        holds = "holds" if self.until else "does not hold"
+        hub.warn(
+            f"the condition {holds} before the first step of this run: it takes none",
+            hint="run_until ends where its condition is anything but 0, run_while where it is "
+            "0; comparisons are 1 or 0",
+        )
