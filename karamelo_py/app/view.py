@@ -329,7 +329,7 @@ class Drawing:
         if column is not None and column not in first.columns:
             raise unknown_column(f"the dump has no column '{column}'", column, first.columns)
         column = column or ("type" if dimension > 1 else "x")
-        types = np.unique(first.columns["type"]).astype(int) if column == "type" else []
+        types = map(int, np.unique(first.columns["type"]) if column == "type" else ())
         apart = ("field", "only", "title", "dpi")
         words = {name: value for name, value in look.items() if name not in apart}
         words["window"] = tuple((words.pop(f"{x}min"), words.pop(f"{x}max")) for x in "xyz")

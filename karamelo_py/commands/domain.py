@@ -162,6 +162,7 @@ def boundary(
 
 def set_periodic(hub: Hub, directions: list[int]) -> None:
     domain = require_grid(hub)
+    h = domain.lattice.h
     if not directions or max(directions) >= domain.dimension:
         raise ScriptError(
             "the scene has no such direction" if directions else "no direction is named",
@@ -170,9 +171,9 @@ def set_periodic(hub: Hub, directions: list[int]) -> None:
         )
     for k in directions:
         length = domain.hi[k] - domain.lo[k]
-        if abs(domain.cells_of_period(k) * domain.h - length) > 1e-6 * domain.h:
+        if abs(domain.cells_of_period(k) * h - length) > 1e-6 * h:
             raise ScriptError(
-                f"the length of the domain, {length:g}, is no multiple of the cells ({domain.h:g})",
+                f"the length of the domain, {length:g}, is no multiple of the cells ({h:g})",
                 argument="directions",
                 expected="dimension(...) with whole cells in periodic directions",
             )
@@ -231,13 +232,13 @@ def _refuse_second(hub: Hub) -> None:
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
     values = forms.read(hub, bounds, count)
     places = {name: argument.mark for name, argument in zip(values, bounds, strict=True)}
-    lo = [values[name] for name in _BOUNDS[0 : 2 * count : 2]]
-    hi = [values[name] for name in _BOUNDS[1 : 2 * count : 2]]
-    for low, high in zip(_BOUNDS[::2], _BOUNDS[1 : 2 * count : 2], strict=False):
-        if values[high] <= values[low]:
-            message = f"{high} = {values[high]:g} must be above {low} = {values[low]:g}"
+    names = _BOUNDS[0 : 2 * count : 2], _BOUNDS[1 : 2 * count : 2]
+    lo, hi = ([float(values[name]) for name in ends] for ends in names)
+    for low, high, a, b in zip(*names, lo, hi, strict=True):
+        if b <= a:
+            message = f"{high} = {b:g} must be above {low} = {a:g}"
             raise ScriptError(message, mark=places[high], expected=forms.line(count))
-    h = values.get("h")
+    h = float(values["h"]) if "h" in values else None
     if h is not None and h <= 0:
         message = f"the cell size h = {h:g} must be above 0"
         raise ScriptError(message, mark=places["h"], expected=forms.line(count))

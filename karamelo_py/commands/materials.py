@@ -175,12 +175,12 @@ def load_path(
     strains = dict(zip(COMPONENTS, (exx, eyy, ezz, exy, exz, eyz), strict=True))
     stresses = dict(zip(COMPONENTS, (sxx, syy, szz, sxy, sxz, syz), strict=True))
     angles = {"xy": gxy, "xz": gxz, "yz": gyz}
-    shear = [name for name, value in angles.items() if value is not None]
-    for name in shear:
+    shear = {name: value for name, value in angles.items() if value is not None}
+    for name, angle in shear.items():
         if strains[name] is not None:
             message = f"g{name} and e{name} are the same strain, with and without rotation"
             raise ScriptError(message, argument=f"g{name}", expected="one of them")
-        strains[name] = angles[name] / 2
+        strains[name] = angle / 2
     prescribed = *strains.values(), *stresses.values(), volumetric, duration
     if not turn and all(value is None for value in prescribed):
         raise ScriptError(
@@ -192,7 +192,7 @@ def load_path(
         duration=1.0 if duration is None else duration,
         strain={name: value for name, value in strains.items() if value is not None},
         stress={name: value for name, value in stresses.items() if value is not None},
-        shear=shear,
+        shear=[*shear],
         volumetric=volumetric,
         turn=turn,
     )

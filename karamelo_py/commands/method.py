@@ -271,8 +271,8 @@ class _Call:
                 )
         values: dict[str, dict[str, Any]] = {family: {} for family in FAMILIES}
         for family, p in slots:
-            if argument := chosen.get((family, p.name)):
-                values[family][p.name] = signature.convert(self.hub, p, argument)
+            if value := chosen.get((family, p.name)):
+                values[family][p.name] = signature.convert(self.hub, p, value)
         return {
             family: signature.make(
                 style, self.hub, f"{family} {self.names[family]}", **values[family]
@@ -340,7 +340,9 @@ class _Call:
             *typed[: len(asked)], *(p.name if by_name else "1" for p in lacking),
             *(argument.text for argument in self.options if _word(argument, kept)),
         ]  # fmt: skip
-        return f"method({', '.join(words if option in (None, *words) else [*words, option])})"
+        if option and option not in words:
+            words.append(option)
+        return f"method({', '.join(words)})"
 
     def _is_number(self, argument: Argument) -> bool:
         word = argument.word()

@@ -263,7 +263,7 @@ def populate_cylindrical_coordinates(
     placed = _polar(values, dict(zip(values, (a.mark for a in lattice), strict=True)))
     if not region.unknown:
         placed = _kept(hub, region, placed)
-    T0, solid.T0 = solid.T0, values["T0"]
+    T0, solid.T0 = solid.T0, float(values["T0"])
     try:
         replace_points(hub, solid, placed, may_be_empty=region.unknown)
     except ScriptError as error:
@@ -333,7 +333,7 @@ def _kept(hub: Hub, region: Region, placed: Placement) -> Placement:
     used = slice(0, domain.dimension)
     return placed._replace(
         x0=placed.x0[kept],
-        volume=placed.volume[kept],
+        volume=np.asarray(placed.volume)[kept],
         half_size=placed.half_size[kept],
         lo=np.maximum(placed.lo, region.lo[used]),
         hi=np.minimum(placed.hi, region.hi[used]),

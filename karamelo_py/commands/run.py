@@ -9,6 +9,7 @@ from karamelo_py.advice.narrator import Narrator
 from karamelo_py.advice.report import report
 from karamelo_py.language import registry
 from karamelo_py.language.kinds import kind_of
+from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument, NonNegative, OutputFile, Positive
 from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.schedule import RESTART
@@ -238,7 +239,7 @@ class EveryOrNever(Every):
     script_kind = "a whole number of steps, time(T), or 0 for never"
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> int | ByTime:
+    def from_script(cls, hub: Scene, argument: Argument) -> int | ByTime:
         if argument.text.startswith("time"):
             return super().from_script(hub, argument)
         return _STEPS_OR_NEVER.convert(hub, argument)

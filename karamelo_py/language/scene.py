@@ -25,6 +25,7 @@ class Scene(Protocol):
     computes: Any
     dumps: Any
     values: Any
+    functions: dict[str, Any]
     asked: set[str]
     update: Any
     output: Any

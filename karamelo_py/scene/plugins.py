@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import Undefined, places_of
-from karamelo_py.compiler.fields import columns_of, fields_of, start_of
+from karamelo_py.compiler.fields import Field, columns_of, fields_of, start_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.heat import Supply
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
@@ -42,7 +42,7 @@ from karamelo_py.script.values import in_a_row
 
 SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "traits")}
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
-COLUMNS = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
+COLUMNS: dict[str, Any] = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
 ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelling
 
@@ -182,7 +182,7 @@ def misfit(function: Callable, count: int) -> str:
     return ""
 
 
-def check_part(hub: Scene, name: str, part: object) -> None:
+def check_part(hub: Scene, name: str, part: Any) -> None:
     """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
     family, kind = name.partition(" ")[0], type(part)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
@@ -254,7 +254,7 @@ def _wrong_field(kind: Any) -> str:
     return ""
 
 
-def _wrong_size(kind: type, domain: Any) -> str:
+def _wrong_size(kind: type[Field], domain: Any) -> str:
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
         size, start = kind.shape(kin), start_of(kind)

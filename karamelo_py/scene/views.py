@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from karamelo_py.compiler.fields import field, name_of
+from karamelo_py.compiler.fields import Field, field, name_of
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations.heat import Supply, Temperature
 from karamelo_py.kernels.equations.internal_force import Force
@@ -196,7 +196,7 @@ class NodesView(View):
     def _vectors(self, name: str, first: int = 0) -> np.ndarray:
         return getattr(self._nodes, name)[:, first : first + self._d]
 
-    def _declared(self, kind: type) -> np.ndarray:
+    def _declared(self, kind: type[Field]) -> np.ndarray:
         return _declared(kind, "node")(self._nodes)[:, : kind.shape(self._kin)]
 
     def _get(self, kind: type) -> np.ndarray:

@@ -156,7 +156,8 @@ def side_by_side(options: Namespace) -> int:
     if not options.accuracy:
         raise ScriptError(f"-versus {options.versus}", expected="-accuracy COLUMN with it")
     out = out_file(options.o, *pictures.SUFFIXES) if options.o else None
-    pairs, values = [], []
+    pairs: list = []
+    values: list = []
     for path in options.tables:
         table = read(path, options.where)
         more, two = pictures.pairs(table, options.versus, options.accuracy, options.cost)
