@@ -6,7 +6,6 @@ from typing import Any
 from karamelo_py.advice import crossing, energy, explain, known_failures
 from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.advice.step_size import (
-    NO_LIMITS,
     own_step_instead,
     own_step_instead_of,
     stable_step,
@@ -99,7 +98,6 @@ class Narrator(Listener):
             facts["own_dt"] = dt = own_step_instead_of(simulation)
             shown["own dt"] = words_of_own_step(simulation, dt) if dt else None
             facts["limited_by"] = simulation.ruling_limit
-            self.limits, self.least = {facts["limited_by"]}, simulation.steps.limit
             shown["limited by"] = f"{words_of_limit(simulation)}; {words_of_share(simulation)}"
         if why and simulation.moves:
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
@@ -122,8 +120,6 @@ class Narrator(Listener):
             hub.warn(gain.message, hint=gain.fix, code=gain.code, cause=gain.cause)
             watch.told_of_growth = True
         self._tell_of_loss(simulation, WITHIN)
-        if simulation.step % simulation.states_every == 0 and not simulation.implicit:
-            self._tell_of_limit(simulation)
         update = hub.update
         if update.boundary == "reflect" and not update.warned_of_bounces and simulation.bounces:
             update.warned_of_bounces = True
@@ -132,18 +128,6 @@ class Narrator(Listener):
                 "the edge of the domain; more are only counted",
                 mark=update.boundary_mark,
             )
-
-    def _tell_of_limit(self, simulation: Simulation) -> None:
-        name, limit, before = simulation.ruling_limit, simulation.steps.limit, self.least
-        if name in NO_LIMITS or (name in self.limits and limit > 0.5 * before):
-            return
-        self.limits.add(name)
-        self.least = min(limit, before)
-        words = (
-            f"step {simulation.step}, time {simulation.time:.6g}: the step is limited by "
-            f"{words_of_limit(simulation)} now: {limit:.4g} is stable, {before:.4g} before"
-        )
-        self.hub.console.say(render_message("note", words))
 
     def _tell_of_loss(self, simulation: Simulation, within: float) -> None:
         hub, watch = self.hub, simulation.energy_watch

@@ -9,7 +9,6 @@ from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 LOST = 2.05  # times the stable step: every run above it failed
 EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
-NO_LIMITS = ("set_dt", "end")  # of stability
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
