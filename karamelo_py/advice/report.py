@@ -41,7 +41,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
     if not isfinite(simulation.fastest()):
         raise endless_speed(simulation)
     simulation.sort_if_due()
-    set_up = machine_memory.age()
     say = hub.console.say
     s = simulation.setup
     thin = {1: "uniaxial stress", 2: "plane stress"}
@@ -85,7 +84,6 @@ def report(hub: Hub, end_time: float = inf) -> None:
         why = unknown_work(hub)
         say(f"energy         is {not_watched(why) if why else 'monitored'}")
     say(f"threads        {simulation.threads}")
-    say(f"set-up         {set_up:.2g} s from the start of the program on, without compiling")
     say("")
     say(f"{'':<34}numbers     bytes")
     for block in s.blocks:

@@ -1,6 +1,5 @@
 """Memory of this machine, and of a job on it."""
 
-import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
@@ -98,16 +97,6 @@ def taken() -> int:
     import psutil
 
     return psutil.Process().memory_info().rss
-
-
-def age() -> float:
-    import psutil
-
-    return time.time() - psutil.Process().create_time()
-
-
-GIB = 2**30
-MANY = 20_000_000  # points; placing more takes seconds
 
 
 def in_words(count: float) -> str:
