@@ -99,6 +99,10 @@ def taken() -> int:
     return psutil.Process().memory_info().rss
 
 
+GIB = 2**30
+MANY = 20_000_000  # points; placing more takes seconds
+
+
 def in_words(count: float) -> str:
     size = count / GIB
     return f"{size:.0f} GiB" if size >= 100 else f"{size:.3g} GiB"
