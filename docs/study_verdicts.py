@@ -61,7 +61,7 @@ KNOWN = {
         (1e-3, 1e-4), "heat that is driven in"),
     "lame": Scene(
         "inputs/in.lame", f"-var refine=0.25,0.5,1 {TWO}", "off=abs(pressure/exact - 1)",
-        (0.01, 2e-3), "a pressure that is driven up and swings"),
+        (0.01, 2e-3), "a pressure that is driven up and oscillates"),
     "incline": Scene(
         "inputs/in.incline", f"-var angle=45 -var mu=0.1 -var refine=0.25,0.5,1 {TWO}",
         "off=abs(v_x/exact - 1)", (1e-3,), "weight against friction"),

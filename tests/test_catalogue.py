@@ -124,6 +124,8 @@ def test_help_finds_styles_by_a_word(capsys, word, listed):
         (["time", "step"], "command set_dt"),
         (["retaining", "wall", "force"], "fix velocity_nodes"),
         (["strength", "reduction"], "command modify"),
+        (["random", "variables"], "karamelo-py sensitivity"),
+        (["parameter", "study"], "karamelo-py sweep"),
     ],
 )
 def test_several_words_need_no_quotes(capsys, words, listed):

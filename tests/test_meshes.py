@@ -15,7 +15,7 @@ from test_scene_script import message
 
 from karamelo_py.app.cli import main
 from karamelo_py.points.kinematics import Axisymmetric
-from karamelo_py.run.lower.memory import known
+from karamelo_py.run.lower.memory import common
 from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
@@ -79,7 +79,7 @@ def test_what_each_process_knows_of_a_mesh(cell, size, tmp_path):
     nodes, cells = grid_mesh(cell, (8, 9, 7)[:dimension])
     hub, solid = solid_of(write(tmp_path / "m.vtu", nodes, {cell: cells}), dimension, lo=-3, hi=3)
     hub.solids.add("s", solid)
-    assert solid.count * (size + 1) <= known(hub) < solid.count * (size + 1) + 200
+    assert solid.count * (size + 1) <= common(hub) < solid.count * (size + 1) + 200
     page = (ROOT / "docs" / "many-processes.md").read_text(encoding="utf-8")
     assert re.search(rf"{cell[:5]}\w* (\w+ )?{size}", page)
 

@@ -357,7 +357,7 @@ def test_what_two_pass_on(monkeypatch):
     )  # fmt: skip
     first, second = plan(hub.simulation, 2)
     assert (first.points, first.tiles, first.others) == (16, 2, 1)
-    assert first.given == second.given == 3 * bytes_of_node(hub.simulation)
+    assert first.sent == second.sent == 3 * bytes_of_node(hub.simulation)
 
 
 def test_tiles_are_cut_by_work(monkeypatch):

@@ -103,7 +103,10 @@ def _page(family: str, name: str, own: dict[str, list[str]]) -> str:
     for parameter in help_.parameters:
         lines = [describe_parameter(parameter), parameter.description]
         said = [escaped(" ".join(line.split())) for line in lines if line]
-        parts.append(f"`{parameter.name}`\n: " + "\n\n  ".join(said or ["as said above"]))
+        parts.append(
+            f"`{parameter.name}{'=' * parameter.keyword}`\n: "
+            + "\n\n  ".join(said or ["as said above"])
+        )
     for title, content in help_.sections.items():
         parts.append(f"## {title}")
         if title == "Example":

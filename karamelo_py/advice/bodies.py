@@ -42,7 +42,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """A body of this law vibrates, unlike fluids and flowing materials."""
+    """Return True if a body of this law vibrates, unlike fluids and flowing materials."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -51,7 +51,7 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    """Plastic flow dissipates an impact."""
+    """Return True if plastic flow dissipates an impact."""
     return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
@@ -115,7 +115,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Lag of a free rotation in the total frame.
 
-    The grid lacks sum m tr D, the part within stencils, of the angular momentum sum m r^2.
+    The grid lacks sum m tr D, the contribution within stencils, of the angular momentum sum m r^2.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
@@ -139,7 +139,7 @@ def sides(body: Body) -> np.ndarray:
 
 
 def fixed_directions(facts: BasicFacts, body: Body) -> np.ndarray:
-    """Directions (d,) in which fixes hold nodes at a body."""
+    """Mask (d,) of the directions in which fixes hold nodes at a body."""
     fixes = [fix for fix, x in fixes_at(facts, body) if len(x)]
     return np.array([any(fix.formulas[k] is not None for fix in fixes) for k in range(facts.d)])
 
@@ -164,7 +164,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Smooth plates hold all sides of a box but one.
+    """Return True if smooth plates hold all sides of a box but one.
 
     A plate is a fix that holds all nodes of one side in its normal direction.
     """
@@ -204,7 +204,7 @@ def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
 
 
 def _meeting(motion: BodyMotion, other: BodyMotion) -> float:
-    """Time when two bodies' bounding boxes meet, or inf."""
+    """Time until two bodies' bounding boxes meet, or inf."""
     begin, end = 0.0, inf
     v = motion.velocity - other.velocity
     for speed, gap, over in zip(v, other.low - motion.high, other.high - motion.low, strict=True):

@@ -19,7 +19,7 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
 
-STRESSED = 0.1  # of the initial energy: below, there is no initial stress
+STRESSED = 0.1  # of the initial energy; below, there is no initial stress
 OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
 LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
 
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """True if stress is lost; gases and liquids have separate rules."""
+    """Return True if stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -46,7 +46,7 @@ def loses(facts: BasicFacts) -> bool:
 
 
 def expected(facts: BasicFacts) -> Crossing:
-    """Remaining path under impact or initial stress."""
+    """Predict the path of material under impact or initial stress."""
     most = Crossing(0.0, 0.0)
     if not (facts.waves > 0 and loses(facts)):
         return most
@@ -123,7 +123,7 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Path, as a mean over stressed material; 0 if loads maintain the stress."""
+    """Measure the mean path of stressed material; 0 if loads maintain the stress."""
     energy = facts.simulation.control.energy[0]
     matters = energy.watch_energy and energy.lost > OF_ENERGY and loses(facts)
     loaded = energy.supplied > LOADED * energy.largest_energy
@@ -131,7 +131,7 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Warns once."""
+    """Describe the loss for the closing table, with a warning once."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}

@@ -122,7 +122,6 @@ def taken_by(hub: Hub) -> list[str]:
 
 
 def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
-    """Describe a loss, unless chosen damping explains it."""
     if taken_by(hub):
         return None
     lost, (cause, fix) = simulation.energy_watch.share_lost(), cause_of_loss(hub)
@@ -159,7 +158,7 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Cause and fix of inelastic collisions, if contact is possible."""
+    """Name cause and fix of inelastic collisions, if contact is possible."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that removes penetrations within one step: the grid carries only the part of "

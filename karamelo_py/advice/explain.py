@@ -23,10 +23,8 @@ APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain a failed step.
-
-    `smaller` is the step to suggest if it was too large from the start.
-    """
+    """Explain a failed step; `smaller` is the step to suggest if it was too large from the
+    start."""
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
     if status == SHRUNK:
@@ -126,7 +124,8 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """With the smallest id: id, old and new position, velocity, grid."""
+    """Return id, old and new position, velocity and grid of the failed point with the smallest
+    id."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -225,7 +224,7 @@ def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
-    """`instead`, if given, after a check of doubtful units."""
+    """Suggest a smaller step (`instead`, if given), after a check of doubtful units."""
     if doubted := [name for name in hub.update.warned_of if code_of(name) in DOUBTED_UNITS]:
         units = f"check the {doubted[0]} (see the warning)"
         return f"{units}, then {instead}" if instead else units

@@ -32,7 +32,7 @@ class Vibration(NamedTuple):
 
 class SceneFacts(BasicFacts):
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Each part once, with its material if it is part of a law."""
+        """Yield each part once, with its material if it belongs to a law."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [
@@ -84,13 +84,13 @@ class SceneFacts(BasicFacts):
 
     @property
     def locks(self) -> bool:
-        """Linear cells hold several points, so that isochoric flow locks."""
+        """Return True if linear cells contain several points, so that isochoric flow locks."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
     @property
     def grid_viscosity(self) -> float:
-        """Kinematic viscosity of grid velocities, `PIC` (1 - alpha) h^2/dt."""
+        """Kinematic viscosity of velocities taken from the grid, `PIC` (1 - alpha) h^2/dt."""
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
@@ -100,7 +100,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def moving_walls(self) -> bool:
-        """A rigid solid moves or a fix leads its points."""
+        """Return True if a rigid solid moves or a fix leads its points."""
         rigid = [solid.rigid for solid in self.hub.solids.values()]
         led = (fix for fix in self.hub.fixes.values() if fix.leads_points)
         led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
@@ -109,12 +109,12 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def faces_in_cells(self) -> bool:
-        """True if cells hold points of a rigid solid and of another."""
-        found: tuple[list, list] = ([], [])
+        """Return True if cells contain points of a rigid solid and of another."""
+        cells: tuple[list, list] = ([], [])
         for solid in self.hub.solids.values():
             at = np.floor((solid.x0 - self.hub.domain.lo[: self.d]) / self.hub.domain.h)
-            found[solid.rigid].extend(np.unique(at, axis=0).tolist())
-        return not set(map(tuple, found[True])).isdisjoint(map(tuple, found[False]))
+            cells[solid.rigid].extend(np.unique(at, axis=0).tolist())
+        return not set(map(tuple, cells[True])).isdisjoint(map(tuple, cells[False]))
 
     @cached_property
     def free_turns(self) -> float:
@@ -142,14 +142,14 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def sag(self) -> float:
-        """Under its own weight: strain g L/c^2."""
+        """Strain of bodies under their weight, g L/c^2."""
         sizes = [motion.high - motion.low for motion in self.motions]
         strains = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
         return max((float(strain.max()) for strain in strains), default=0.0)
 
     @cached_property
     def bending(self) -> float:
-        """Of the slenderest solid, by weight or motion.
+        """Bending strain of the slenderest solid, by weight or motion.
 
         Cantilever of length L and height H: 3 g L^2/(H c^2). Beam whose kinetic energy becomes
         strain energy: sqrt(3) v/c.
@@ -173,7 +173,8 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Of points past each other at present velocities, over twice the longest side."""
+        """Distance that points pass each other at present velocities, over twice the longest
+        side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

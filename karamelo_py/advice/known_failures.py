@@ -1,6 +1,6 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-Rules that involve several parts (see `karamelo_py.language.rules`). Each is reported once, by
+These rules involve several parts (see `karamelo_py.language.rules`). Each is reported once, by
 `check` or before the first step.
 """
 
@@ -30,7 +30,7 @@ from karamelo_py.script.errors import Mark, ScriptError
 
 PEEK = 100  # steps: shorter runs only inspect a scene
 ENDLESS = 1e8
-MIXED = 300  # step over the stable one; above, units are likelier wrong
+MIXED = 300  # step over the stable one; above, wrong units are likelier
 DENSITIES = 10.0, 1e5  # kg/m^3: foams to beyond osmium; gases excluded
 IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
 SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to beyond diamond
@@ -51,7 +51,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Nothing can move; plug-ins may do anything."""
+    """Return True if nothing can move; plug-ins may do anything."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -97,7 +97,7 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """Requested for run number `run`, and the scene on which its limit depends.
+    """The step requested for run number `run`, and the scene on which its limit depends.
 
     `span` is the run's length in time and in steps, infinite if a condition ends it.
     """
@@ -112,7 +112,7 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """The step requested now; `halves`: a run in trouble halves it."""
+    """Return the step requested now; with `halves`, a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -130,7 +130,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Once (or `again`) of a step above the limit, in this or a later run."""
+    """Warn once (or `again`) of a step above the limit, in this or a later run."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -220,7 +220,6 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
 
 def warn_about_factor(hub: Hub) -> None:
     update = hub.update
-    # With set_dt, dt_factor has already given a warning.
     idle = update.dt_factor is not None and update.fixed_dt is None
     if idle and update.first_time("dt_factor"):
         hub.warn(
@@ -232,7 +231,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Once if constant loads act in the first of several load steps only."""
+    """Warn once if constant loads act in the first of several load steps only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(
@@ -286,7 +285,7 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """If single precision cannot resolve the motion in a step.
+    """Warn if single precision cannot resolve the motion in a step.
 
     The cell size matters too: a block that falls at 50 000 cells from the origin errs by 3.5 % of
     its path, and at 200 000 it does not move. ScriptError if positions have a spacing of 1/500 cell

@@ -18,7 +18,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """A slender elastic body, one row of points, that its weight bends."""
+    """Describe a slender elastic body, one row of points, that its weight bends; else None."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
@@ -34,7 +34,8 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Bodies on one grid that start within a cell of each other and separate."""
+    """Describe bodies on one grid that start within a cell of each other and separate; else
+    None."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None

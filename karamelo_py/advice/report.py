@@ -22,7 +22,7 @@ from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
 from karamelo_py.run.energy import unknown_work
 from karamelo_py.run.lower.card import memory_there, refusals
-from karamelo_py.run.lower.memory import known, memory_of, node_fields, nodes_in_use, point_fields
+from karamelo_py.run.lower.memory import common, memory_of, node_fields, nodes_in_use, point_fields
 from karamelo_py.run.mpi.plan import report_lines
 from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.simulation import Simulation
@@ -35,7 +35,7 @@ LOADED = 24 << 20  # bytes: compiled loops, imported modules
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
-    program = machine_memory.taken() - known(hub)
+    program = machine_memory.taken() - common(hub)
     simulation = hub.simulation
     simulation.begin(end_time)
     if not isfinite(simulation.fastest()):
@@ -148,9 +148,9 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Unknowns of an implicit step, and the memory of its matrix.
+    """Print the unknowns of an implicit step, and the memory of its matrix.
 
-    Nodes couple if a point sees both.
+    Nodes couple if they are in the stencil of one point.
     """
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1

@@ -27,7 +27,7 @@ class Settling(NamedTuple):
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Displacement of bodies that settle by their weight.
+    """Predict the displacement of bodies that settle by their weight.
 
     The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
     + m_1/m), with the speed c of longitudinal waves.
@@ -54,14 +54,14 @@ def expected(facts: BasicFacts) -> Settling:
 
 
 def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: bool) -> bool:
-    """`other` lies within a cell of a body along k, on its pressed side."""
+    """Return True if `other` lies within a cell of a body along k, on its pressed side."""
     gap = other.low - motion.high if down else motion.low - other.high
     apart = np.maximum(other.low - motion.high, motion.low - other.high)
     return -h < gap[k] < h and bool((np.delete(apart, k) < 0).all())
 
 
 def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
-    """Fixes hold a body along k at one end only."""
+    """Return True if fixes hold a body along k at one end only."""
     h = lattice_at(facts, body).h
     ends = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
     x = np.concatenate(ends) if ends else np.zeros(0)
@@ -71,12 +71,12 @@ def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
 
 
 def driven(facts: BasicFacts) -> Settling:
-    """Cells by which fixes on nodes stretch, compress or shear an elastic body."""
+    """Count the cells by which fixes on nodes stretch, compress or shear an elastic body."""
     most = Settling()
     for body in facts.bodies if facts.moves and facts.scheme.traits.inertia else ():
-        held = [(f, x) for f, x in fixes_at(facts, body) if len(x) and body.solid in facts.elastic]
+        fixes = [(f, x) for f, x in fixes_at(facts, body) if len(x) and body.solid in facts.elastic]
         for k in range(facts.d):
-            ways = [_way(facts, fix.formulas[k], x) for fix, x in held if fix.formulas[k]]
+            ways = [_way(facts, fix.formulas[k], x) for fix, x in fixes if fix.formulas[k]]
             cells = np.ptp(ways, axis=0).max() / body.solid.h if ways else 0.0
             most = max(most, Settling(body.solid.id, 0.0, cells), key=lambda each: each.cells)
     return most if most.cells > CELLS else Settling()

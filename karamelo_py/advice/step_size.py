@@ -12,7 +12,7 @@ EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (point
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """The default step now: at rest, or as if points had moved."""
+    """Return the default step now: at rest (`still`), or as if points had moved."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
     courant, fraction = own_step_of_waves(simulation.hub, still=still)
@@ -47,7 +47,7 @@ def what_follows(simulation: Simulation, step: float) -> str:
 
 
 def own_step_instead_of(simulation: Simulation) -> float | None:
-    """The default step, if the script overrides it."""
+    """Return the default step if the script overrides it, else None."""
     update = simulation.hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return None
@@ -68,7 +68,6 @@ def step_after_motion(simulation: Simulation) -> float:
 
 
 def stable_step(simulation: Simulation, limit: float) -> float:
-    """The larger of `limit` and the default's stable step."""
     return max(limit, own_step(simulation) / DEFAULT_SHARE)
 
 

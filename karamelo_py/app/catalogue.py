@@ -3,8 +3,9 @@
 import inspect
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 
 from karamelo_py.language import registry, rules
@@ -36,16 +37,15 @@ def help_of(family: str, name: str) -> Help:
 
 def describe_parameter(parameter: Parameter) -> str:
     """Describe kind and default: ``a number above 0, 0.9 when left out``."""
-    if parameter.kind.text == "anything":  # interpreted by the command or style
+    family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
+    if parameter.keyword and parameter.optional and default is None:
+        text = text.removesuffix(" or NULL")
+    if text == "anything":  # interpreted by the command or style
         return ""
-    family = parameter.kind.family
-    parts = ["one of " + ", ".join(registry.names(family)) if family else parameter.kind.text]
+    parts = ["one of " + ", ".join(registry.names(family)) if family else text]
     if parameter.variadic:
         parts.append("any number of them")
-    if parameter.keyword:
-        parts.append(f"written {parameter.name}=...")
     if parameter.optional:
-        default = parameter.default
         if isinstance(default, bool):
             default = str(default).lower()
         elif isinstance(default, float):
@@ -66,7 +66,12 @@ def print_styles(words: Sequence[str]) -> int:
     return 0
 
 
-def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
+def print_help(
+    words: list[str],
+    commands: Iterable[str] = (),
+    manuals: Callable[[], Mapping[str, tuple[str, str]]] = dict,
+) -> int:
+    """Explain a command, style, argument or topic; `manuals`: summary and help by subcommand."""
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path()):
@@ -95,13 +100,14 @@ def print_help(words: list[str], commands: Iterable[str] = ()) -> int:
         _explain_code(name, f"known failure: {about}", f"{reason}.\n\nFix: {cure}")
     if arguments:
         _explain_argument(name, arguments)
-    if related:
+    programs = _subcommands(said, manuals())
+    if related or programs:
         page = _Page()
-        page.say(
-            "\nSee also" if arguments or failures else f"Commands and styles about {said}", "bold"
-        )
+        page.say("\nSee also" if arguments or failures else f"Commands about {said}", "bold")
         page.rows([(f"{family} {style}", family, style) for family, style in related])
-    if arguments or related or failures:
+        for program, summary in programs.items():
+            page.say(f"  karamelo-py {program}  {summary}")
+    if arguments or related or programs or failures:
         return 0
     if absent := next((text for word, text in table()["missing"].items() if word in name), None):
         _Page().paragraph(f"{name}: {absent}. The page 'What it cannot do' has more.")
@@ -127,7 +133,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """fixes, Fix and fix are the same."""
+    """Accept fixes, Fix and fix alike."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -171,12 +177,16 @@ def _explain(family: str, name: str) -> int:
         page.paragraph(text)
     if help_.parameters:
         page.heading("Parameters")
-        for parameter in help_.parameters:
-            page.say(f"  {parameter.name}")
-            page.paragraph(describe_parameter(parameter), indent=6)
-            page.paragraph(parameter.description, indent=6)
-            if parameter.kind.family:
-                page.say(f"      karamelo-py help {parameter.kind.family} NAME explains one.")
+        for (kind, description), alike in groupby(
+            help_.parameters, key=lambda each: (describe_parameter(each), each.description)
+        ):
+            group = list(alike)
+            names = (f"{each.name}=" if each.keyword else each.name for each in group)
+            page.say(f"  {', '.join(names)}")
+            page.paragraph(kind, indent=6)
+            page.paragraph(description, indent=6)
+            if group[0].kind.family:
+                page.say(f"      karamelo-py help {group[0].kind.family} NAME explains one.")
     for title, content in help_.sections.items():
         page.heading(title)
         if title == "Example":
@@ -188,12 +198,8 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """By a part of the name, then by summary, else by text."""
-    topics = {synonym: topic for topic, alike in table()["topics"].items() for synonym in alike}
-    word = topics.get(word.lower(), word)
-    words = [term for term in word.split() if len(term) > 2] or [word]
-    sought = [re.escape(topics.get(term.lower(), term)) for term in words]
-    begins = [re.compile(rf"(?<![^\W_]){term}", re.IGNORECASE) for term in sought]
+    """Find styles by a fragment of the name, then by summary, else by text."""
+    begins = _patterns(word)
     matches: list[list[tuple[str, str]]] = [[], [], [], []]
     for family in families():
         for name in registry.names(family):
@@ -203,6 +209,23 @@ def _about(word: str) -> list[tuple[str, str]]:
             levels = (k for k in range(3) if all(each.search(texts[k]) for each in begins))
             matches[next(levels, 3)].append((family, name))
     return matches[0] + matches[1] or matches[2]
+
+
+def _patterns(word: str) -> list[re.Pattern]:
+    topics = {synonym: topic for topic, alike in table()["topics"].items() for synonym in alike}
+    word = topics.get(word.lower(), word)
+    words = [term for term in word.split() if len(term) > 2] or [word]
+    sought = [re.escape(topics.get(term.lower(), term)) for term in words]
+    return [re.compile(rf"(?<![^\W_]){term}", re.IGNORECASE) for term in sought]
+
+
+def _subcommands(word: str, manuals: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+    begins = _patterns(word)
+    return {
+        name: summary
+        for name, (summary, text) in manuals.items()
+        if all(each.search(f"{name} {text}") for each in begins)
+    }
 
 
 def _arguments(word: str) -> dict[str, Parameter]:
@@ -242,7 +265,6 @@ class _Page(Console):
         self.say(text, "bold")
 
     def paragraph(self, text: str, indent: int = 0) -> None:
-        """Write wrapped text; empty lines separate paragraphs."""
         width = min(self._rich.width if self.terminal else _WIDEST, _WIDEST) - indent
         for index, block in enumerate(text.replace("``", "").split("\n\n") if text else ()):
             if index:

@@ -57,7 +57,7 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     launch.keep_to_oneself()
-    # Signals of batch systems; mpiexec handles them for several processes.
+    # Batch systems send these signals; mpiexec handles them for several processes.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = launch.outcome_of(
@@ -162,14 +162,13 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def begun() -> None:
-    """Turn the garbage collector on, for new objects only."""
     if not gc.isenabled():
         gc.freeze()
         gc.enable()
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """The last of the files that a shell has put after -restart."""
+    """Use the last of the files that a shell has put after -restart."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -327,7 +326,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
     styles = add("styles", lambda options: _catalogue().print_styles(options.family), summary)
     styles.add_argument("family", metavar="FAMILY", nargs="*", help="fix, compute, region, ...")
     summary = "Explain a command or a style."
-    explain = add("help", lambda o: _catalogue().print_help(o.words, COMMANDS), summary, HELP)
+    explain = add("help", _explain, summary, HELP)
     explain.add_argument("words", metavar="WORD", nargs="*")
     for name, (module, summary) in ELSEWHERE.items():
         command_module = import_module(module) if name == command else None
@@ -336,6 +335,16 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
             added.description = command_module.DESCRIPTION
             command_module.add_options(added)
     return parser, commands
+
+
+def _explain(options: argparse.Namespace) -> int:
+    def manuals() -> dict[str, tuple[str, str]]:
+        # bench would import the compiler.
+        names = [name for name in ELSEWHERE if name != "bench"]
+        texts = {name: _parser(name)[1].choices[name].format_help() for name in names}
+        return {name: (ELSEWHERE[name][1], text) for name, text in texts.items()}
+
+    return _catalogue().print_help(options.words, COMMANDS, manuals)
 
 
 def _catalogue() -> Any:

@@ -62,7 +62,7 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Exit status of a function, and a message to print."""
+    """Return the exit status of a function, and a message to print."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -81,7 +81,7 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Without a traceback."""
+    """Render an error without a traceback."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -259,7 +259,7 @@ def keep_to_oneself() -> None:
 
 
 def _report_to_launcher(rank: int) -> None:
-    """Rank 0 gets streams and signals."""
+    """Report to the launcher, and take streams and signals as rank 0."""
     global _link
     name = os.environ.pop(SOCKET, None)
     if name is None:
@@ -303,14 +303,14 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """False if mpiexec pretends that output is one."""
+    """Return False if mpiexec pretends that output is one."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
 def together(
     asked: int | None, run: Callable[[mpi.MpiComm], int], *, debugging: bool = False
 ) -> int:
-    """Call `run` as one of `asked` processes; the exit status."""
+    """Call `run` as one of `asked` processes; return the exit status."""
     size, rank = mpi.launched()
     comm: mpi.MpiComm | None = None
 

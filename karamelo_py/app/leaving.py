@@ -26,7 +26,6 @@ _DEATH_SIGNAL = 1  # of prctl: signal at the parent's end
 
 
 def end_with(study: int) -> None:
-    """End this run when its study ends (Linux)."""
     import ctypes
     import sys
 

@@ -21,7 +21,7 @@ is explained by karamelo-py help command plot."""
 
 
 def read_text(path: Path, expected: str | None = None) -> str:
-    """Empty if the file is not text."""
+    """Read a file; "" if it is not text."""
     try:
         return reading.read_text(path, largest=None)
     except OSError as error:
@@ -32,7 +32,7 @@ def read_text(path: Path, expected: str | None = None) -> str:
 
 
 def read_rows(path: str | Path) -> list[dict[str, float]]:
-    """Rows of a log by column; words are NaN.
+    """Read the rows of a log by column; words are NaN.
 
     A line # renames the columns; a cut line is skipped.
     """
@@ -56,7 +56,7 @@ def read_rows(path: str | Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Columns of a log; empty if it cannot be read.
+    """Read the columns of a log; {} if it cannot be read.
 
     Columns that change between runs have all their rows.
     """

@@ -203,7 +203,7 @@ class ShownPicture:
         return self.png
 
     def save(self, file: str | PathLike) -> None:
-        """Write it to a PNG file."""
+        """Write a PNG file."""
         Path(file).write_bytes(self.png)
 
 
@@ -563,7 +563,6 @@ def _as_simulation_error() -> Iterator[None]:
 
 
 def _refuse_copies() -> None:
-    """Refuse unconnected processes of mpiexec; the first one reports."""
     size, rank = launched()
     if size == 1:
         return

@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Names missing in dumps come from logs or the script."""
+    """Add hints to errors: names missing in dumps come from logs or the script."""
     try:
         yield
     except ScriptError as error:
@@ -150,7 +150,7 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _scene(options: argparse.Namespace) -> Hub:
-    """Without a script the scene is empty."""
+    """Build the scene of a script; without one it is empty."""
     if options.script is None and options.var:
         raise ScriptError(
             f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
@@ -273,9 +273,9 @@ class Drawing:
         self.picture = self._picture(first)
 
     def chosen(self, snapshot: Snapshot) -> Snapshot:
-        """Points to draw, with the column of a colouring formula.
+        """Return the points to draw, with the column of a colouring formula.
 
-        Sets the scene to the snapshot's time and log.
+        The scene gets the snapshot's time and log.
         """
         columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
         values, row = self.scene.values, self.log.get(snapshot.step, {})

@@ -108,7 +108,7 @@ temperature = _part(
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
-    """Refuses an ID in use first."""
+    """Define a part of a material; an ID in use is refused first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
     values: dict = {}

@@ -81,8 +81,8 @@ def method(
         )
     chosen = hub.update.method = parts["method"]
     hub.update.transfer, chosen.basis = parts["transfer"], parts["basis"]
-    for family, part in parts.items():
-        check_part(hub, f"{family} {call.names[family]}", part)
+    for family, item in parts.items():
+        check_part(hub, f"{family} {call.names[family]}", item)
     chosen.basis_name = f"{basis} {call.variant}".strip()
     chosen.mark, chosen.corrected = hub.mark, mass == "corrected"
     hub.update.thermal = chosen.thermal
@@ -309,7 +309,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """By the variant that a word selects; the other options."""
+        """Choose the variant of a style that a word selects, and return the other options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
@@ -329,7 +329,7 @@ class _Call:
         basis: str | None = None,
         by_name: bool = False,
     ) -> str:
-        """With another kind or basis, completed, and with `option` at the end."""
+        """Write the command with another kind or basis, completed, and with `option` at the end."""
         styles = [self.styles[family] for family in FAMILIES if family in self.styles]
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
@@ -370,7 +370,7 @@ class _Call:
             )
         for family in FAMILIES:
             for name in registry.names(family):
-                with suppress(ScriptError):  # not the place to report a broken plug-in
+                with suppress(ScriptError):  # broken plug-ins are reported elsewhere
                     if word in variants_of(registry.find(family, name)):
                         return ScriptError(
                             f"{word} goes with {name}, not with {self.names[family]}",
@@ -387,7 +387,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """Variables of these names are ignored."""
+    """Return the option, if it is one of `words`; variables of these names are ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

@@ -59,10 +59,10 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
         raise ScriptError("no number changes", argument="ID", expected="name=value, ...")
     if kind == "material":
         entry = _owner(entry, numbers)
-    changed = {entry: _changed(hub, entry, entry.given, numbers)}
+    changed = {entry: _changed(hub, entry, entry.arguments, numbers)}
     for material in hub.materials.values():
         if entry in _parts(material):
-            values = {name: _now(value, changed) for name, value in material.given.items()}
+            values = {name: _now(value, changed) for name, value in material.arguments.items()}
             changed[material] = _changed(hub, material, values, ())
     for before, after in changed.items():
         if isinstance(after, Material):
@@ -77,19 +77,19 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
 def _parts(material: Material) -> list[MaterialPart]:
     values: list[Any] = []
-    for value in material.given.values():
+    for value in material.arguments.values():
         values += value if isinstance(value, tuple) else [value]
-    return [part for part in values if isinstance(part, MaterialPart)]
+    return [entry for entry in values if isinstance(entry, MaterialPart)]
 
 
 def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
-    """The material, or its only part, that has all the constants."""
+    """Return the material, or its only part, that has all the constants."""
     names = {(argument.keyword() or ("",))[0] for argument in numbers}
-    if names <= set(material.given):
+    if names <= set(material.arguments):
         return material
-    owners = [part for part in _parts(material) if names <= _names(part)]
+    owners = [entry for entry in _parts(material) if names <= _names(entry)]
     if len(owners) > 1:
-        lines = " or ".join(f"modify({part.kind}, {part.id}, ...)" for part in owners)
+        lines = " or ".join(f"modify({entry.kind}, {entry.id}, ...)" for entry in owners)
         raise ScriptError(
             f"several parts of material '{material.id}' have "
             + " and ".join(f"'{name}'" for name in sorted(names)),
@@ -99,8 +99,8 @@ def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
     return owners[0] if owners else material
 
 
-def _names(part: MaterialPart) -> set[str]:
-    return {p.name for p in parameters(registry.find(part.kind, part.style))}
+def _names(entry: MaterialPart) -> set[str]:
+    return {p.name for p in parameters(registry.find(entry.kind, entry.style))}
 
 
 def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> MaterialPart:

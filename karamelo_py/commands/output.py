@@ -270,8 +270,8 @@ def units(
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
 
     No number is converted. A scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ. Warns before the first step of densities outside 10 to 100000 kg/m^3 (gases: below 0.001),
-    and wave speeds outside 1 m/s to 50 km/s.
+    mJ. Before the first step, densities outside 10 to 100000 kg/m^3 (gases: below 0.001) and wave
+    speeds outside 1 m/s to 50 km/s give a warning.
 
     Parameters
     ----------

@@ -278,7 +278,7 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _polar(values: dict, places: dict) -> Placement:
-    """Slices outermost, then rings, then angles."""
+    """Place slices outermost, then rings, then angles."""
     check_radius(values["R"], mark=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1

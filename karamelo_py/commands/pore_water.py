@@ -10,7 +10,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9  # porosities
-HEAVIEST = 3.2  # density of grains over that of water: soils have 2.6 to 2.8, saturated 3.5
+HEAVIEST = 3.2  # density of grains over the density of water: soils have 2.6 to 2.8, saturated 3.5
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -37,12 +37,16 @@ def pore_water(
     permeability
         Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water is k
         times the gradient of the head.
-    intrinsic, viscosity
-        Instead of it: permeability in m^2, viscosity of the water in Pa s.
-    K, rho
-        Bulk modulus and density of the water.
+    intrinsic
+        Permeability in m^2, instead of the conductivity.
+    viscosity
+        Viscosity of the water in Pa s, with ``intrinsic``.
+    K
+        Bulk modulus of the water.
+    rho
+        Density of the water.
     gravity
-        Gravity of the conductivity; no load: see fix body_force.
+        Gravity in the definition of the conductivity; it is no load (see fix body_force).
     kozeny
         true: the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
 
@@ -57,21 +61,21 @@ def pore_water(
     Points carry the water in their pores; nodes have velocities of soil and water (Jassim, Stolle &
     Vermeer 2013; Bandara & Soga 2015). Columns of dumps and computes: ``pore_pressure``,
     ``porosity``, ``water_content`` (mass of the water per volume before deformation), and ``wx``,
-    ``wy``, ``wz``, its velocity relative to the soil; times the porosity, Darcy's.
+    ``wy``, ``wz``, its velocity relative to the soil (times the porosity, Darcy's).
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
     acts on both. Computes of mass, momentum and energy (linear_momentum, kinetic_energy, ...) count
-    the soil alone, without its water.
+    the soil alone.
 
     The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
     and never shortens it. With N cells over a drainage path of length L, consolidation to Tv = 1
     takes about 2 N L c/c_v steps, too many at 1e-9 m/s: multiply the densities by a factor, as
     inputs/in.terzaghi does.
 
-    Before the solid of the material. Needs method ulmpm or tlmpm with FLIP or PIC and linear,
-    quadratic-spline or cubic-spline, scheme musl, and bodies of 1D, plane strain or 3D on one
-    process without a GPU. With ulmpm and linear, strains above 10 % are less accurate.
+    Use the command before the solid of the material. It needs method ulmpm or tlmpm with FLIP or
+    PIC and linear, quadratic-spline or cubic-spline, scheme musl, and bodies of 1D, plane strain or
+    3D on one process without a GPU. With ulmpm and linear, strains above 10 % are less accurate.
 
     See Also
     --------
@@ -108,14 +112,14 @@ def pore_water(
     drag = rho * gravity / permeability if permeability else viscosity / (intrinsic or 1.0)
     conductivity = rho * gravity / drag
     if not SLOWEST <= conductivity <= FASTEST:
-        given = "permeability" if permeability else "intrinsic"
+        name = "permeability" if permeability else "intrinsic"
         other = (
             "intrinsic=..., the permeability in m^2" if permeability else "permeability=... in m/s"
         )
         hub.warn(
             f"the hydraulic conductivity is {conductivity:.3g} m/s, outside of all soils, from "
             f"{SLOWEST:g} to {FASTEST:g}",
-            hint=f"{other}, if {given} is in the wrong unit",
+            hint=f"{other}, if {name} is in the wrong unit",
         )
     dry = 1 / float(specific_volume(material.whole))
     grains = dry / (1 - n) / rho

@@ -27,7 +27,7 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def carry_out(hub: Hub, **length: Any) -> None:
-    """`length`: see `RunLoop`; or what replaces the run.
+    """Run for `length` (see `RunLoop`), or do what replaces the run.
 
     A rehearsal notes the run, a `Pause` stops before it, and ``check`` reports instead. A run that
     was over in the restart file of a resumed script is skipped.

@@ -92,7 +92,6 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
 
 
 def refuse_uneven(hub: Hub, material: Material, argument: str) -> None:
-    """Refuse a material that is not the same in y and z for a sphere."""
     if hub.domain is None or hub.domain.kin.hoops < 2 or is_round(material.whole):
         return
     raise ScriptError(

@@ -48,7 +48,7 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """Bare, quoted, or in a text variable; None for arithmetic.
+        """Return a word, bare, quoted, or in a text variable; None for arithmetic.
 
         ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain the name of a value.
         """
@@ -65,7 +65,7 @@ class Argument:
         return None if meaningful else self.text
 
     def words(self, literals: Sequence[str] = ()) -> str:
-        """Its text, even if it looks like arithmetic."""
+        """Return the text, even if it looks like arithmetic."""
         if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -115,7 +115,7 @@ class Argument:
         return Argument(Raw(self._raw.source, start, end), self._interpreter)
 
     def listed(self) -> list[Argument]:
-        """The parts of ``(a, b, ...)``, or the argument itself."""
+        """Split ``(a, b, ...)``, or return the argument itself."""
         code, parts = self._raw.code, []
         begin, depth = 1, 0
         for k, letter in enumerate(code):
@@ -134,12 +134,12 @@ class Argument:
     def knows(self, name: str) -> bool:
         return self._interpreter.knows(name)
 
-    def part(self, text: str) -> Argument:
+    def piece(self, text: str) -> Argument:
         start = self._raw.source.text.rindex(text, self._raw.start, self._raw.end)
         return self._from(start, start + len(text))
 
     def keyword(self) -> tuple[str, Argument] | None:
-        """Name and value of ``name = value``."""
+        """Split ``name = value``."""
         match = _KEYWORD.match(self.text)
         if not match:
             return None
@@ -147,12 +147,12 @@ class Argument:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """The first argument that may lack a comma."""
+    """Return the first argument that may lack a comma."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 
 class Named:
-    """Base of parts of a scene that scripts name by an ID; also an annotation."""
+    """Base of parts of a scene that scripts name by an ID; also a script argument."""
 
     id: str = ""
     mark: Mark | None = None

@@ -1,5 +1,4 @@
-"""Argument lists that depend on the dimension, as in dimension() and block: their names, for
-errors."""
+"""Argument lists that depend on the dimension, as in dimension() and block."""
 
 import math
 import re
@@ -119,7 +118,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """A finite constant; in a rehearsal, NaN is a result of a run."""
+    """Return a finite constant; in a rehearsal, NaN is the result of a run."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

@@ -53,7 +53,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
 
 
 def cause_of(error: BaseException) -> str:
-    """An exception in one line, with the user's line if it does not compile."""
+    """Describe an exception in one line, with the user's line if it does not compile."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -69,7 +69,7 @@ def _others() -> tuple[str, ...]:
 
 
 def steps_to(error: BaseException) -> list[str]:
-    """The user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
+    """List the user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
     others = _others()
     return [
         f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")
@@ -84,7 +84,7 @@ def place_of(function: Callable) -> str:
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Last line in the file of `code` in the traceback: `` (spring.py:28)``."""
+    """Return the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
     try:
         source = inspect.getsourcefile(code)
     except TypeError:

@@ -65,7 +65,7 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Else record what it may have defined."""
+        """Return the likely command; else record what the line may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -78,7 +78,8 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """It uses a missing name: F, F_x of a fix, ContactForce_S_x of a solid."""
+        """Return True if a statement uses a missing name: F, F_x of a fix, ContactForce_S_x of a
+        solid."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -87,7 +88,7 @@ class Dependents:
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Mistakes after the statement that failed with the error `first`, in order.
+    """Return the mistakes after the statement that failed with the error `first`, in order.
 
     The interpreter's hub is used for trials; do not use it afterwards.
     """
@@ -142,7 +143,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Mistakes in syntax and names; if too many, the last one counts the rest."""
+    """Return mistakes in syntax and names; if too many, the last one counts the rest."""
     errors = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(errors) - MOST_OF_TEXT
     besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []
@@ -152,7 +153,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 def misnamed(
     interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
 ) -> list[ScriptError]:
-    """Wrong names of commands and styles.
+    """Return errors about wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
     are valid even if the definition of a `wanting` name failed.

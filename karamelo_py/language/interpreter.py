@@ -1,4 +1,4 @@
-"""Executes statements: variables, commands, and places of errors."""
+"""Executes statements: variables, commands, and locations of errors."""
 
 import inspect
 import re
@@ -68,11 +68,10 @@ class Interpreter:
 
     @property
     def has_more(self) -> bool:
-        """True if statements follow the present one."""
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
-        """`name` is relative to the present script."""
+        """Execute the script `name`, relative to the present one."""
         path = self.included(name, self.folder)
         exists = path.exists()
         if any(exists and frame.path and frame.path.samefile(path) for frame in self.frames):
@@ -101,10 +100,8 @@ class Interpreter:
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def rehearse(self, hub: Any) -> None:
-        """Execute the rest on another hub, with copied variables.
-
-        This finds mistakes late in a script before a long run.
-        """
+        """Execute the rest on another hub, with copied variables, to find mistakes before a long
+        run."""
         other = self._copy(hub)
         try:
             other._finish()
@@ -182,7 +179,7 @@ class Interpreter:
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """The next statement, from any file; it counts as executed."""
+        """Return the next statement, from any file; it counts as executed."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -318,7 +315,7 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark_of(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """As a call or in later lines."""
+        """Return True if a name has a meaning as a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful

@@ -42,7 +42,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """A number from `lo` to `hi`, without the ends named by `open` (True: both)."""
+    """Constrain a number to `lo` to `hi`, without the ends named by `open` (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -58,7 +58,7 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """Annotation: a file to read, in the current folder or the script's folder."""
+    """Script argument: a file to read, in the current folder or the script's folder."""
 
     script_kind = "the name of a file"
     # Lower-case endings; None: any.
@@ -89,7 +89,7 @@ class TableFile(InputFile):
 
 
 class OutputFile:
-    """Annotation: a file to write; its folder must exist."""
+    """Script argument: a file to write; its folder must exist."""
 
     script_kind = "the name of a file"
 
@@ -214,7 +214,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Annotation of a style name; takes precedence over a variable of that name."""
+    """Script argument: the name of a style, which takes precedence over a variable of that name."""
 
     family: str
     script_kind = "a word"
@@ -278,7 +278,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """The kind for an annotation; TypeError if it is not supported."""
+    """Return the kind for an annotation; TypeError if it is not supported."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:

@@ -22,7 +22,7 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
         self._script = script
-        # Those that may have to be numbers, and mistakes blamed on them.
+        # Texts that may have to be numbers, and mistakes blamed on them.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
         # Presets on which each variable depends.
@@ -108,7 +108,7 @@ class Presets(dict[str, str]):
     def _scripts(
         self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()
     ) -> Iterator[list[Statement] | None]:
-        """Statements of a script and its includes; None for an unknown include."""
+        """Yield the statements of a script and its includes; None for an unknown include."""
         yield statements
         for statement in statements:
             if not (isinstance(statement, CommandCall) and statement.name == "include"):

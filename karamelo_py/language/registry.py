@@ -1,8 +1,9 @@
 """Families of commands and styles: built-in ones in styles.toml, others from packages.
 
-A package offers a style with a line in its pyproject.toml, for example::
+A package offers a style with two lines in its pyproject.toml, for example::
 
-    [project.entry-points."karamelo_py.fix"] gravity = "my_package:Gravity"
+    [project.entry-points."karamelo_py.fix"]
+    gravity = "my_package:Gravity"
 
 A script names a class of a module, next to it or installed, as ``module.Class``. Nothing is
 imported before use.
@@ -33,7 +34,7 @@ _differences: dict[Any, bool | tuple[str, ...]] = {}
 
 @cache
 def _families() -> dict[str, dict[str, list[EntryPoint]]]:
-    """Family -> name -> entry points (several if packages clash)."""
+    """Map family and name to entry points (several if packages clash)."""
     table = {
         family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
         for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()
@@ -94,10 +95,8 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget a module imported by a script in another folder.
-
-    True if there is a module of this name.
-    """
+    """Forget a module imported by a script in another folder; return True if such a module
+    exists."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -106,7 +105,7 @@ def forget_other(module: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """The style name of a class (attribute ``style`` if it has several)."""
+    """Return the style name of a class (attribute ``style`` if it has several)."""
     target = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
         if any(entry.value == target for entry in entries):
@@ -119,7 +118,7 @@ def origin(family: str, name: str) -> str:
 
 
 def find(family: str, name: str) -> Any:
-    """The class or function of a style, imported on first use.
+    """Return the class or function of a style, imported on first use.
 
     ScriptError if there is no such style, it cannot be imported, or two packages offer it.
     """

@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """Statements executed so far, except those of :func:`registry.may_differ` (output, step).
+    """Statements executed so far, except by :func:`registry.may_differ` (output, step).
 
     `values` has the results of value(...) by statement number.
     """

@@ -4,8 +4,11 @@ A fix, a scheme (in its traits) or a fluid has `Restrictions`: what it does not 
 declared next to a basis, transfer, scheme, method, field, law or part of a law, or fix::
 
     known_failure(
-        PIC, "angular momentum", when=lambda pic, scene: scene.turns, reason="PIC removes 1 % or
-        more of the angular momentum of a rotating body", cure="APIC or FLIP instead of PIC",
+        PIC,
+        "angular momentum",
+        when=lambda pic, scene: scene.turns,
+        reason="PIC removes 1 % or more of the angular momentum of a rotating body",
+        cure="APIC or FLIP instead of PIC",
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
@@ -68,10 +71,10 @@ class Restrictions(NamedTuple):
         return feature.kind in self.without or feature.kind in self.but
 
     def error(self, subject: Feature, feature: Feature) -> ScriptError:
-        """Return the error of a capability, with its words and place, about a feature."""
+        """Return the error of a capability, with its words and mark, about a feature."""
         kind = feature.kind
-        known = [AS_WRITTEN.get(kind, "{}").format(name) for name in self.only.get(kind, ())]
-        instead = ", ".join(known[:-1]) + " or " * (len(known) > 1) + "".join(known[-1:])
+        names = [AS_WRITTEN.get(kind, "{}").format(name) for name in self.only.get(kind, ())]
+        instead = ", ".join(names[:-1]) + " or " * (len(names) > 1) + "".join(names[-1:])
         return ScriptError(
             f"{subject.words} does not support {feature.words}",
             mark=feature.mark or subject.mark,
@@ -101,12 +104,11 @@ class Advice(NamedTuple):
 
     @property
     def code(self) -> str:
-        """The name in kebab case, without names of the script."""
         return code_of(self.name)
 
 
 def code_of(name: str) -> str:
-    """``shocks of material 'm'`` is shocks-of-material."""
+    """Convert a name to kebab case: ``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 
@@ -144,7 +146,7 @@ def gain(part: type, *, when: When, cause: str, cure: str) -> None:
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """About a part (or a field, which is a class)."""
+    """Yield the advice about a part (or a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

@@ -47,7 +47,7 @@ __all__ = [
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Of a command or style, without the hub.
+    """Return the parameters of a command or style, without the hub.
 
     TypeError for an unsupported signature, a fault of its author.
     """
@@ -67,7 +67,7 @@ def parameters(target: Any) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """A NamedTuple, a tag that needs no hub.
+    """Return True for a NamedTuple, a tag that needs no hub.
 
     Its arguments are its fields, or the parameters of its classmethod ``given``. A method
     ``checked`` returns a replacement.
@@ -197,7 +197,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """As `call`, with values; faults are reported as its author's."""
+    """Make a style from values, as `call` does; faults are reported as its author's."""
     is_class = inspect.isclass(target)
     try:
         if not is_record(target):
@@ -261,7 +261,7 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """``a, b[, c[, d]][, e=...]``."""
+    """Write the syntax ``a, b[, c[, d]][, e=...]``."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""
@@ -310,7 +310,7 @@ def default_variant(style: Any) -> str | None:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """For help, with the word that selects a variant."""
+    """Return the parameters for help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)

@@ -60,7 +60,7 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
 
 
 def no_value(name: str, mark: Any) -> ScriptError:
-    message, hint = f"{name}(...) gives no value", f"{name}(...) goes on a separate line"
+    message, hint = f"{name}(...) gives no value", f"{name}(...) belongs on a separate line"
     expected = "a function, or a command that gives a value, such as value(...)"
     return ScriptError(message, mark=mark, expected=expected, hint=hint)
 
@@ -147,9 +147,9 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Later statements: definitions ("" for a variable), ID and line.
+    """Yield later statements: definitions ("" for a variable), ID and line.
 
-    Starts with the innermost script, `back` statements before its next one.
+    The innermost script comes first, from `back` statements before its next one.
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
@@ -261,7 +261,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
+    """Rewrite ``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None
@@ -288,7 +288,7 @@ def longer(name: str, arguments: Sequence[Any]) -> str | None:
 
 
 def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
-    """Also without arguments."""
+    """Give the current form of a renamed style, also without arguments."""
     form = table()["renamed"].get(f"{family} {style}")
     try:
         return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"

@@ -112,15 +112,15 @@ class Fields(PointTable):
         parts, ids = [Part(block, rows, slice(None))], block.points.id[rows]
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
-    def added_up(self, part: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
+    def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
         """Sum terms exactly over the points of a part's group.
 
         The method `name` of `part`, called with tables of some points and `arguments`, returns rows
         of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
-        for some in self.some(part.group):
-            terms, rows = getattr(part, name)(some, *arguments), None
+        for some in self.some(owner.group):
+            terms, rows = getattr(owner, name)(some, *arguments), None
             if isinstance(terms, tuple):
                 count, rows, terms = terms
             else:
@@ -145,8 +145,8 @@ class Fields(PointTable):
         of_all = sum(self.comm.everyone("a total", limbs))
         return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
 
-    def each(self, part: Grouped, name: str, *arguments: object) -> list:
-        results = (getattr(part, name)(some, *arguments) for some in self.some(part.group))
+    def each(self, owner: Grouped, name: str, *arguments: object) -> list:
+        results = (getattr(owner, name)(some, *arguments) for some in self.some(owner.group))
         local = [one for one in results if one is not None]
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
@@ -313,7 +313,7 @@ class ColumnFormula:
             if name in hub.interpreter.variables:
                 hub.warn(
                     f"'{name}' is the column here, not the variable of the script",
-                    mark=argument.part(name).mark,
+                    mark=argument.piece(name).mark,
                     hint=f"another name for the variable, such as {name}_0, if it is meant",
                 )
         if not self.columns or len(self.columns) > self.MOST:

@@ -65,7 +65,7 @@ class Rows(NamedTuple):
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
         """Gather a field; zero for deleted points."""
-        local = [(part.places, part.taken(of(part.block.points))) for part in self.parts]
+        local = [(piece.places, piece.taken(of(piece.block.points))) for piece in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
 
@@ -81,23 +81,23 @@ class Rows(NamedTuple):
     def declared(self, kind: type) -> np.ndarray | None:
         """A declared field (n, components), initial where laws lack it; None if no block stores
         it."""
-        arrays = [(part, fields.field(part.block.points.fields, kind)) for part in self.parts]
+        arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
             return None
         field = fields.at_points(kind, self.s.kin, len(self.ids), float).array
-        local = [(part.places, part.taken(array)) for part, array in arrays if array is not None]
+        local = [(piece.places, piece.taken(array)) for piece, array in arrays if array is not None]
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
         """Values (n, *columns) of ``of(laws)(matter, rows)``; 0 if it is None."""
         local, s = [], self.s
-        for part in self.parts:
-            points = known_to_laws(part.points)
+        for piece in self.parts:
+            points = known_to_laws(piece.points)
             # Empty arrays have another type, which would be compiled again.
-            if len(points.id) and (fill := of(part.block.laws)):
+            if len(points.id) and (fill := of(piece.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
-                fill(Matter(s.kin, points, part.block.laws), rows)
-                local.append((part.places, rows.T))
+                fill(Matter(s.kin, points, piece.block.laws), rows)
+                local.append((piece.places, rows.T))
         return self._filled(np.zeros((*columns, len(self.ids))), local)
 
 
@@ -174,11 +174,11 @@ class PointTable:
         if (kept := rows.declared(Moment)) is None:
             return None
         have = [
-            part
-            for part in rows.parts
-            if fields.field(part.block.points.fields, Moment) is not None
+            piece
+            for piece in rows.parts
+            if fields.field(piece.block.points.fields, Moment) is not None
         ]
-        local = [(part.places, _velocity_moment(rows.s, part)) for part in have]
+        local = [(piece.places, _velocity_moment(rows.s, piece)) for piece in have]
         return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
@@ -268,8 +268,8 @@ def shown_velocity(s: Setup, points: Points) -> np.ndarray:
     return np.where(np.isnan(before), points.v, points.v + ahead * (points.v - before))
 
 
-def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
-    points = part.points
+def _velocity_moment(s: Setup, piece: Part) -> np.ndarray:
+    points = piece.points
     kept = fields.field(points.fields, Moment)
     moment = kept.copy()
     if s.transfer.traits.keeps_gradient:
@@ -277,7 +277,7 @@ def _velocity_moment(s: Setup, part: Part) -> np.ndarray:
         at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)
         export.export_velocity_moment(at, kept, moment)
     if not s.frame.moves:
-        export.move_moments(s.frame, s.kin, points, part.block.laws, moment)
+        export.move_moments(s.frame, s.kin, points, piece.block.laws, moment)
     return moment
 
 

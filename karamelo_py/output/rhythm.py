@@ -63,7 +63,7 @@ class Every:
         match = _BY_TIME.fullmatch(argument.text)
         if not match:
             return _STEPS.convert(hub, argument)
-        span = argument.part(match[1].strip())
+        span = argument.piece(match[1].strip())
         try:
             return ByTime(_SPAN.convert(hub, span))
         except Unfit as unfit:

@@ -76,9 +76,9 @@ class Units(NamedTuple):
         return self.name(next(powers, Powers()))
 
     def of_value(self, name: str, parts: Mapping[str, Any]) -> str:
-        for ID, part in parts.items():
-            if name in (ID, *(f"{ID}_{end}" for end in part.published)):
-                return self.name(part.unit)
+        for ID, publisher in parts.items():
+            if name in (ID, *(f"{ID}_{end}" for end in publisher.published)):
+                return self.name(publisher.unit)
         return self.of_column(name) if name in ("time", "dt") else ""
 
 

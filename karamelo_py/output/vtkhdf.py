@@ -33,9 +33,9 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
             """Map columns to a virtual array; missing ones are 0."""
             layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
             layout.dcpl.set_obj_track_times(False)  # equal runs write equal files
-            for k, part in enumerate(parts):
-                if part in columns:
-                    source = h5py.VirtualSource(path.name, part, (steps, count), float)
+            for k, component in enumerate(parts):
+                if component in columns:
+                    source = h5py.VirtualSource(path.name, component, (steps, count), float)
                     layout[(slice(None), k) if len(parts) > 1 else slice(None)] = source
             group.create_virtual_dataset(name, layout, fillvalue=0)
 

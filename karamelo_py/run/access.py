@@ -19,7 +19,6 @@ class NodesByNumber:
         self.points, self.simulation = points, points.simulation
 
     def pieces(self, names: Iterable[str], *, to_first: bool = False) -> Iterator[NodeTable]:
-        """Yield all nodes in pieces, with `names` summed over points."""
         simulation, hub, comm = self.simulation, self.points.hub, self.points.comm
         simulation.show_on_nodes()
         s = simulation.setup
@@ -45,9 +44,9 @@ class NodesByNumber:
         nodes = numbers(self.simulation.setup.spans)
         used = nodes[slice(*np.searchsorted(nodes, (first, end)))]
         totals = {name: np.zeros((end - first, 2)) for name in sums}
-        for there, parts in gather((used, [of[used] for of in sums.values()])) or ():
+        for used_there, parts in gather((used, [of[used] for of in sums.values()])) or ():
             for total, of in zip(totals.values(), parts, strict=True):
-                total[there - first] += of
+                total[used_there - first] += of
         return totals
 
     def with_mass(self) -> np.ndarray:

@@ -15,7 +15,7 @@ class BodyMotion(NamedTuple):
     number: int  # of the solid in the scene
     mass: float
     centre: np.ndarray  # (d,) of mass
-    velocity: np.ndarray  # (d,) of the centre
+    velocity: np.ndarray  # of the centre
     spread: np.ndarray  # (d, d) sum m X X, with X from the centre
     shear: np.ndarray  # (d, d) sum m X V, relative to the centre
     low: np.ndarray  # (d,) bounding box of the points
@@ -28,7 +28,7 @@ class BodyMotion(NamedTuple):
         return float((self.high - self.low).max()) / 2
 
     def drift(self, free: int) -> np.ndarray:
-        """Return the rigid velocity (d,) along the directions from `free` on."""
+        """Rigid velocity (d,) along the directions from `free` on."""
         return np.where(np.arange(len(self.velocity)) < free, 0.0, self.velocity)
 
     @property
@@ -61,7 +61,6 @@ class BodyMotion(NamedTuple):
 
 
 def motions(simulation: SceneState) -> list[BodyMotion]:
-    """Measure all solids with points, over all processes; sums are exact."""
     d, count = simulation.kin.dimension, len(simulation.hub.solids)
     limbs = np.zeros((count, 1 + 2 * d + 2 * d * d, LIMBS), np.int64)
     ends = np.full((count, 4 * d), -np.inf)

@@ -35,7 +35,6 @@ class Reached(NamedTuple):
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first nodes and ends of the rows of boxes (see `Buffers`)."""
     row, left = ragged(boxes[:, 2] * boxes[:, 3])
     rows = boxes[row]
     begin = rows[:, 0] + left // rows[:, 3] * rows[:, 5] + left % rows[:, 3] * rows[:, 6]
@@ -43,7 +42,6 @@ def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def joined_spans(boxes: np.ndarray) -> np.ndarray:
-    """Merge adjoining rows (k, 2) of boxes (see `Buffers`) into spans."""
     begin, end = rows_of(boxes)
     order = np.argsort(begin, kind="stable")
     begin, end = begin[order], np.maximum.accumulate(end[order])
@@ -67,7 +65,6 @@ def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndar
 
 
 def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return minima and maxima of the rows from each start to the next."""
     if not len(starts):
         return begin, end
     return np.minimum.reduceat(begin, starts), np.maximum.reduceat(end, starts)
@@ -98,13 +95,12 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return list number and index in the list of each item of k lists."""
+    """List number and index in the list of each item of k lists."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
 
 def numbered(shapes: np.ndarray) -> np.ndarray:
-    """Return the first item numbers of boxes of shapes (k, d), and the end: (k + 1,)."""
     return np.concatenate([[0], np.cumsum(np.prod(shapes, axis=1))])
 
 
@@ -127,7 +123,6 @@ def buffers_of(s: Setup) -> list[Buffers]:
 
 
 def chosen_of(nodes: Nodes, kinds: int) -> list[np.ndarray]:
-    """Return the arrays that `kinds` of sums scatter to (`sums.arrays_given`)."""
     sums, velocity, *rest = summed(nodes)
     return [sums] * (kinds & 1) + [velocity] * (kinds >> 1 & 1) + rest * (kinds >> 2 & 1)
 
@@ -144,7 +139,6 @@ def beyond(s: Setup) -> int:
 
 
 def room_of(rows: int, array: np.ndarray) -> np.ndarray:
-    """Return zeros (rows, ...) as wide as `array`; with no rows it can grow."""
     width, kind = array.shape[1], array.dtype
     return records(rows, width, kind) if rows else np.zeros((0, width), kind)
 

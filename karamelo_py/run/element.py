@@ -197,10 +197,8 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """Return the tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains).
-
-        Shears are engineering shear strains.
-        """
+        """Tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains), engineering
+        shear."""
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
         return self._slopes(*self.last, ways)[: len(self.kin.symmetric_names)]
@@ -208,7 +206,7 @@ class Point:
     def _slopes(
         self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Return derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
+        """Derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
         places = self.kin.Tensor.places
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         stress = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
@@ -255,7 +253,7 @@ class Point:
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
-        """Return dt grad v (3, 3) of a strain increment: pure shear, or simple in `shear`."""
+        """dt grad v (3, 3) of a strain increment: pure shear, or simple in `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
             simple = k in shear
@@ -264,10 +262,10 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """Return dt grad v (3, 3) of a rotation about z that the law sees as rigid.
+        """dt grad v (3, 3) of a rotation about z that the law sees as rigid.
 
-        First order: skew. To second order laws differ: strain from the symmetric part, volume from
-        det F, or all from F.
+        To first order it is skew. To second order laws differ: strain from the symmetric part,
+        volume from det F, or all from F.
         """
         if angle == 0:
             return np.zeros((3, 3))
@@ -305,7 +303,7 @@ WIDTH = 17  # ten digits, sign, exponent, blank
 
 
 def shown(point: Point) -> dict[str, float]:
-    """Return the output columns; q is the von Mises stress, sqrt(3/2 s:s)."""
+    """Output columns; q is the von Mises stress, sqrt(3/2 s:s)."""
     law, kin, state, stress = point.law, point.kin, point.state, point.stress
     names = COMPONENTS[: len(kin.symmetric_names)]
     xx, yy, zz, *shear = stress

@@ -30,9 +30,9 @@ GROWING = 2  # consecutive windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name the source of work that is not tracked; empty if there is none.
+    """Name the source of work that is not tracked, or "".
 
-    Loops sum the work of compiled hooks. Python fixes declare by `Fix.conserves` that they do no
+    Loops sum the work of compiled hooks; Python fixes declare by `Fix.conserves` that they do no
     other work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
@@ -61,10 +61,8 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 class EnergyWatch:
-    """Monitors the energy balance and the range of temperatures.
-
-    Besides the kernels, only this class writes them to the clock.
-    """
+    """Monitors the energy balance and the range of temperatures, which only it and kernels
+    write."""
 
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
@@ -85,8 +83,8 @@ class EnergyWatch:
         if watch.watch_energy:
             # Velocities are half a step old, stresses by the fraction strained before.
             self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
-        known = simulation.notes_temperatures and not unknown_heat(simulation.hub)
-        heat.watch_heat = int(update.thermal and known)
+        counted = simulation.notes_temperatures and not unknown_heat(simulation.hub)
+        heat.watch_heat = int(update.thermal and counted)
         if heat.watch_heat and anew:
             measure_heat(simulation.setup)
             agree_on_heat(simulation.control.ranks, simulation.control)
@@ -120,7 +118,7 @@ class EnergyWatch:
         return float((ends[:d] + ends[d:]).max())
 
     def energy(self) -> float:
-        """Sum kinetic, stored and dissipated energy minus work; NaN if not tracked."""
+        """Kinetic, stored and dissipated energy minus work; NaN if not tracked."""
         simulation, watch = self.simulation, self.watch
         if not simulation.in_tiles() or not watch.watch_energy:
             return np.nan
@@ -157,7 +155,7 @@ class EnergyWatch:
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
     def growth_since(self, before: float) -> float:
-        """Return energy growth relative to `before`; NaN if not tracked."""
+        """Energy growth relative to `before`; NaN if not tracked."""
         unit = max(abs(before), float(self.watch.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 

@@ -52,7 +52,6 @@ class LastGood(NamedTuple):
         return f"karamelo-py {script} -restart {file}{out}" + (remark and f"  # {remark}")
 
     def keep(self, status: int, code: str) -> str:
-        """Write the last good state, and end the outputs."""
         simulation, good = self.simulation, self.good
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         watch = simulation.energy_watch

@@ -52,7 +52,7 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
 
 
 def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
-    """Return 2 / w (c/h) of one solid's light nodes."""
+    """Value 2 / w (c/h) of one solid's light nodes."""
     method, volume = hub.update.method, solid.volume0
     kin = method.kinematics(hub)
     places = method.places(kin, solid, float)
@@ -136,7 +136,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Return shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
+    """Shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -144,7 +144,7 @@ def _shear_share(law: Tag, kin: Tag) -> float:
 
 
 def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
-    """Return the largest eigenvalue of a symmetric operator by Lanczos iteration (1950)."""
+    """Largest eigenvalue of a symmetric operator by Lanczos iteration (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

@@ -55,7 +55,6 @@ def _places(
 
 
 def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
-    """Describe a NaN, naming the first fix whose formula is not finite."""
     hub = simulation.hub
     candidates = [one for one in simulation.points.seen(_first_bad) if one is not None]
     if not candidates:
@@ -75,7 +74,6 @@ def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
 
 
 def endless_speed(simulation: SceneState) -> ScriptError:
-    """Make the error for initial velocities that are not finite, naming the formula."""
     message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
     hint = "look for a formula that gives NaN or infinity, such as a division by zero"
     trouble = no_number(simulation, message, hint)

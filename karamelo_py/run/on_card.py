@@ -28,9 +28,9 @@ def alike(hooks: Tag, others: Tag) -> bool:
 class SimulationOnCard(Simulation):
     """Takes the steps on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so arrays
-    are sent again. Fetched points are in GPU order and tiles out of date: users of tiles sort
-    first.
+    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so that
+    arrays are sent again. Fetched points are in GPU order and tiles out of date: users of tiles
+    sort first.
     """
 
     states_every = 1000  # states must be fetched

@@ -69,7 +69,6 @@ class Simulation(SceneArrays):
 
     @property
     def flags(self) -> tuple[bool, ...]:
-        """State besides the arrays, for restart files."""
         watch = self.energy_watch
         reported = watch.told_of_growth, watch.told_of_loss
         return self.steps.measured, self.mapped, watch.followed, *reported
@@ -82,7 +81,6 @@ class Simulation(SceneArrays):
 
     @property
     def moves(self) -> bool:
-        """True with inertia; without it, energy is not tracked."""
         return self.hub.update.scheme.traits.inertia
 
     def begin(self, end_time: float) -> None:
@@ -119,7 +117,7 @@ class Simulation(SceneArrays):
         )
         self.setup = self.setup._replace(blocks=tuple(blocks))
         self.tiles.unsort(self.control)
-        # Balance and rate stay those of the last step: the same whether or not a run begins here.
+        # Balance and rate remain from the last step: the same whether or not a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
@@ -194,7 +192,7 @@ class Simulation(SceneArrays):
         return self.fixes.first is not None
 
     def refuse(self) -> None:
-        """Refuse a scene that cannot run here: none."""
+        """Refuse no scene: the CPU runs all."""
 
     def compile(self) -> None:
         hooks = self._acting

@@ -42,7 +42,6 @@ DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 
 
 def one_a_cell(solid: Solid) -> bool:
-    """Return True if a solid has one point per cell and direction."""
     return 2 * np.max(solid.half_size) > 0.75 * solid.h
 
 
@@ -86,7 +85,6 @@ def _deforming(hub: Hub) -> list[Tag]:
 
 
 def _flows(law: Tag) -> bool:
-    """Return True for liquids and soils, which have no stable shape."""
     strength = parameter(law, "strength", None)
     return strength is not None and (law_traits(strength).flows or not shear_modulus(strength) > 0)
 

@@ -246,7 +246,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """As `_parts_to_sum`, for few points: one set, one part per span."""
+        """Divide as `_parts_to_sum`, for few points: one set, one part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -395,7 +395,7 @@ class HasSetup(Protocol):
 
 
 class WholeDomain:
-    """All tiles on a single process; several share them (`mpi.subdomain`)."""
+    """All tiles on a single process; several divide them (`mpi.subdomain`)."""
 
     parted = False
 
@@ -413,7 +413,6 @@ class WholeDomain:
         """Send the kept fields of the own nodes to all processes."""
 
     def counted(self) -> np.ndarray:
-        """Return the used nodes that no other process counts."""
         return grid_boxes.numbers(self.simulation.setup.spans)
 
     def act(self, function: Callable[[Setup], None], s: Setup) -> None:

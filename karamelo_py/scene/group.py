@@ -172,7 +172,9 @@ class NodeGroup(AnyGroup):
     def chosen(self) -> np.ndarray:
         lattices = self.hub.lattices
         if self._found is None or self._found[0] is not lattices:
-            pieces = [numbers for part in self.parts if len(numbers := self._find(*part))]
+            pieces = [
+                numbers for definition in self.parts if len(numbers := self._find(*definition))
+            ]
             # Each is ascending: no sort of millions.
             members = [np.unique(np.concatenate(pieces))] if len(pieces) > 1 else pieces
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
@@ -214,9 +216,9 @@ class NodeGroup(AnyGroup):
         for lattice in lattices:
             for number, x in lattice.between(region.box_lo, region.box_hi):
                 pieces.append(number[region.inside(x)])
-        found = np.concatenate(pieces)
+        nodes = np.concatenate(pieces)
         domain = self.hub.domain
-        return with_images(lattices[0], domain, found) if domain.periodic else found
+        return with_images(lattices[0], domain, nodes) if domain.periodic else nodes
 
 
 def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:

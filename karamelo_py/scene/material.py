@@ -18,11 +18,11 @@ class MaterialPart(Named):
         kind: str,
         style: str,
         made: "NamedTuple | dict[str, NamedTuple]",
-        given: dict | None = None,
+        arguments: dict | None = None,
     ):
         self.kind = kind
         self.style = style
-        self.given = given or {}
+        self.arguments = arguments or {}
         self.laws = made if isinstance(made, dict) else {kind: made}
 
     @property

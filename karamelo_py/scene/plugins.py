@@ -182,9 +182,9 @@ def misfit(function: Callable, count: int) -> str:
     return ""
 
 
-def check_part(hub: Scene, name: str, part: Any) -> None:
+def check_part(hub: Scene, name: str, plugin: Any) -> None:
     """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
-    family, kind = name.partition(" ")[0], type(part)
+    family, kind = name.partition(" ")[0], type(plugin)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
     error = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""
     if family in TRAITS and not error:
@@ -199,7 +199,7 @@ def check_part(hub: Scene, name: str, part: Any) -> None:
             error = "none of its rows is a Scatter: nothing reaches the grid"
     if error:
         raise faults.fault(name, error, hub.mark)
-    check_fields(hub, name, part, hub.mark)
+    check_fields(hub, name, plugin, hub.mark)
 
 
 def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
@@ -306,7 +306,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
         for family, tag, mark in tags
         if registry.is_foreign(type(tag))
     ]
-    return [part for part in parts if registry.is_foreign(part.kind)]
+    return [plugin for plugin in parts if registry.is_foreign(plugin.kind)]
 
 
 @contextmanager
@@ -319,29 +319,29 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
     except FAILURES as error:
         foreign = foreign_parts(hub)
         if isinstance(error, Undefined):
-            suspects = [(part, "") for part in foreign if part.kind in error.classes]
+            suspects = [(plugin, "") for plugin in foreign if plugin.kind in error.classes]
         else:
             places = [(_owner(foreign, f), f" ({Path(f).name}:{k})") for f, k in places_of(error)]
-            suspects = [(part, mark) for part, mark in places if part is not None]
+            suspects = [(plugin, mark) for plugin, mark in places if plugin is not None]
         suspects += [(usual, "")] if usual else []
         if not suspects:
             raise
-        part, mark = suspects[0]
+        plugin, mark = suspects[0]
         if not (mark or isinstance(error, Undefined)):  # report the line that called it
             mark = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
         cause = f"{faults.cause_of(error)}{mark}"
-        raise faults.fault(part.name, cause, part.mark, faults.TRACEBACK) from error
+        raise faults.fault(plugin.name, cause, plugin.mark, faults.TRACEBACK) from error
 
 
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
     path = Path(file).resolve()
-    for part in parts:
+    for plugin in parts:
         with suppress(TypeError, OSError):  # of a built-in module
-            if Path(inspect.getfile(part.kind)).resolve() == path:
-                return part
-    for part in parts:
-        package = sys.modules.get(part.kind.__module__.partition(".")[0])
+            if Path(inspect.getfile(plugin.kind)).resolve() == path:
+                return plugin
+    for plugin in parts:
+        package = sys.modules.get(plugin.kind.__module__.partition(".")[0])
         folders = getattr(package, "__path__", ())
         if any(path.is_relative_to(Path(folder).resolve()) for folder in folders):
-            return part
+            return plugin
     return None

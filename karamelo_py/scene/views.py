@@ -469,7 +469,9 @@ class PointsView(View):
         elif kind is not None:
             self[kind][:, column] = values
         elif name[0] == "s" and name[1:] in self._simulation.kin.symmetric_names:
-            if not all(can(elastic_law(part.block.laws), with_stress) for part in self._rows.parts):
+            if not all(
+                can(elastic_law(piece.block.laws), with_stress) for piece in self._rows.parts
+            ):
                 raise ScriptError(
                     f"'{name}' follows from the deformation of a material of this scene",
                     name=name,
@@ -477,7 +479,7 @@ class PointsView(View):
                 )
             self.set_stress({name[1:]: values})
         elif name == "T":
-            if not all(can(part.block.laws, with_temperature) for part in self._rows.parts):
+            if not all(can(piece.block.laws, with_temperature) for piece in self._rows.parts):
                 raise ScriptError(
                     "a material of this scene has no temperature T",
                     expected="material(ID, linear, rho, E, nu, cp, kappa), or temperature(...) "

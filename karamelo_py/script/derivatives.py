@@ -16,14 +16,14 @@ def plus(a: Term, b: Term) -> Term:
 
 
 def times(a: Term, b: Term) -> Term:
-    """Omits 0 and 1."""
+    """Multiply; 0 and 1 are omitted."""
     if is_number(a, 0) or is_number(b, 0):
         return ZERO
     return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
 
 
 def to_power(base: Term, exponent: float) -> Term:
-    """Omits 0 and 1."""
+    """Raise to a power; 0 and 1 are omitted."""
     if exponent in (0, 1):
         return base if exponent else ONE
     return applied("^", base, constant(exponent))

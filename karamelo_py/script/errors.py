@@ -39,7 +39,7 @@ FAILURES = (Exception, SystemExit)
 
 
 class Pause(Exception):
-    """Before a run."""
+    """The script pauses before a run."""
 
 
 @dataclass(eq=False, repr=False)
@@ -110,7 +110,7 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """An error or a warning for the user.
+    """Format an error or a warning for the user.
 
     With the `code` of a run: likely cause, fix, and the command that resumes.
     """
@@ -155,14 +155,14 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """``did you mean '...'?`` with the most similar names, if any."""
+    """Suggest ``did you mean '...'?`` with the most similar names, if any."""
     ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
     close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """``one of a, b, c``; of many, the nearest and where to find all."""
+    """Format ``one of a, b, c``; of many, the nearest and where to find all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -192,7 +192,7 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Up to three, most similar first."""
+    """Return up to three names, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
@@ -234,7 +234,7 @@ def codes() -> dict[str, dict[str, Any]]:
 
 
 def of_karamelo(name: str) -> bool:
-    """A Karamelo command, whose name no variable can have."""
+    """Return True for a Karamelo command, whose name no variable can have."""
     return name in table()["karamelo"].split()
 
 

@@ -62,14 +62,13 @@ class Expression:
 
     @property
     def constant(self) -> float:
-        """The number; ValueError if not constant."""
         if not self.is_constant:
             raise ValueError(f"{self.text} is not constant")
         return self._term.value
 
     @property
     def text(self) -> str:
-        """In script syntax down to its seeds, unless too long."""
+        """Write the formula in script syntax down to its seeds, unless too long."""
         if not terms.is_short(self._term):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return terms.text_of(self._term)
@@ -78,11 +77,11 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Visibly the same number everywhere."""
+        """Return True if both are visibly the same number everywhere."""
         return terms.alike(self._term, other._term)
 
     def evaluate(self, values: Values) -> float:
-        """Present number; ScriptError for a formula of positions."""
+        """Return the present number; ScriptError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
@@ -91,7 +90,7 @@ class Expression:
         return terms.evaluated(self._term, lambda name: values.get(_published(name, values)))
 
     def program(self, values: Values) -> formula.Program:
-        """Program for present values."""
+        """Compile the formula for present values."""
 
         def push(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
@@ -109,7 +108,7 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """(n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
+        """Evaluate (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 
@@ -139,7 +138,7 @@ class Expression:
         for k, name in enumerate(names):
             rows[:, k] = columns[name]
         out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
-        now, before = (np.ascontiguousarray(part) for part in (rows[:, :3], rows[:, 3:]))
+        now, before = (np.ascontiguousarray(block) for block in (rows[:, :3], rows[:, 3:]))
         formula.evaluate_all(
             terms.program(self._term, push), values.array, now, before, out, scratch
         )

@@ -80,10 +80,8 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Powers of the first `n` numbers of `a`, branch-free if all exponents agree.
-
-    Each equals `_power`.
-    """
+    """Raise the first `n` numbers of `a`, branch-free if all exponents agree; each equals
+    `_power`."""
     power = b[0]
     same = True
     for i in range(n):
@@ -101,7 +99,7 @@ def _powers(n, a, b):
 
 @kernel
 def evaluate(program, globals_, points, count, out, stack):
-    """At `count` points, the rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
+    """Evaluate a program at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
     `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
     the results, `stack` (ROWS, BLOCK) is scratch.
@@ -148,8 +146,8 @@ def evaluate(program, globals_, points, count, out, stack):
         _copy(count, out, stack[0])
 
 
-# Hook kernels call the evaluator by address, to not contain it, and with whole tables: slices in a
-# kernel are slow to compile.
+# Hook kernels call the evaluator by address, so as not to contain it, with whole tables: slices in
+# a kernel are slow to compile.
 _TABLE = types.float64[:, ::1]
 _ROW = types.float64[::1]
 EVALUATE = types.void(
@@ -160,7 +158,7 @@ STACK = 8  # rows of the scratch table: x y z x0 y0 z0, two results, stack
 
 
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
-    """`evaluate` the program code[begin:end] with constants[first:last].
+    """Call `evaluate` for the program code[begin:end] with constants[first:last].
 
     The first rows of `scratch` are the points, the last the stack; results go to row `result`.
     """
@@ -170,7 +168,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """At any number of present and initial positions (n, 3).
+    """Evaluate at any number of present and initial positions (n, 3).
 
     `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """

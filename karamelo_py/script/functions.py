@@ -57,7 +57,7 @@ FUNCTIONS: dict[str, Signature] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """NaN propagates, errors as in `math`."""
+    """Compute a function; NaN propagates, errors are as in `math`."""
     if any(map(math.isnan, numbers)):
         return math.nan
     result = _COMPUTED[name](*numbers)
@@ -67,7 +67,7 @@ def compute(name: str, *numbers: float) -> float:
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """As floating-point hardware does: inf or NaN for invalid operands."""
+    """Compute as floating-point hardware does: inf or NaN for invalid operands."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
     return math.nan if any(map(math.isnan, numbers)) else quietly(name, *numbers)

@@ -90,10 +90,10 @@ _STARTS = ("NUMBER", "NAME", "STRING", "LPAR")
 _ENDS = ("NUMBER", "NAME", "STRING", "RPAR")
 
 
-def _type(part: Any) -> str:
+def _type(symbol: Any) -> str:
     from lark import Token
 
-    return part.type if isinstance(part, Token) else ""
+    return symbol.type if isinstance(symbol, Token) else ""
 
 
 class _Stop(NamedTuple):
@@ -126,7 +126,7 @@ class _Stop(NamedTuple):
 
     @property
     def after_call(self) -> bool:
-        types = [_type(part) for part in self.stack]
+        types = [_type(symbol) for symbol in self.stack]
         return types[:2] == ["NAME", "LPAR"] and types[-1] == "RPAR" and types.count("LPAR") == 1
 
     def mistake(self, message: str, expected: str = _VALUE, hint: str | None = None) -> Mistake:
@@ -152,7 +152,7 @@ def _stop(parser: Any, code: str) -> _Stop:
 
 
 def in_expression(parser: Any, code: str) -> Mistake:
-    """The mistake in `code`, which Lark's `parser` refuses."""
+    """Explain the mistake in `code`, which Lark's `parser` refuses."""
     at = _stop(parser, code)
     if at.here is None:
         return _at_end(at)

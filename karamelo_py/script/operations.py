@@ -154,7 +154,7 @@ def of_one(op, a):
 @implements(of_one)
 @noinline
 def _function_of(op, a):
-    """One chain of branches, to save code."""
+    """Apply a function by one chain of branches, to save code."""
     for number, do in _NUMBERED_UNARY:
         if op == number:
             return do(a)

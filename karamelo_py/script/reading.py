@@ -25,7 +25,7 @@ _WRITTEN = (
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
     """Read at most `largest` bytes (None: any size).
 
-    OSError if it is not regular or cannot be read.
+    OSError if the file is not regular or cannot be read.
     """
     piped = _PIPED.fullmatch(str(path)) is not None
     # Opening a pipe without a writer would block; Windows has no such flag.
@@ -43,7 +43,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """OSError as in `read_bytes`, ValueError if it is not text."""
+    """Read a text; OSError as in `read_bytes`, ValueError if it is not text."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):

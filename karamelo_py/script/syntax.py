@@ -14,7 +14,7 @@ _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
 class Source:
-    """The text of a script file; converts offsets to places."""
+    """The text of a script file; converts offsets to marks."""
 
     def __init__(self, text: str, file: str):
         self.text = text
@@ -34,7 +34,8 @@ class Source:
         return Mark(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """The characters `start` to before `end`, with comments and line ends blanked."""
+        """Return the characters from `start` to before `end`, with comments and line ends
+        blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -104,15 +105,12 @@ class FunctionCall(Node):
 
 @dataclass(frozen=True, slots=True)
 class Raw:
-    """An argument or right-hand side as written; offsets into `source`."""
-
     source: Source
     start: int
     end: int
 
     @property
     def code(self) -> str:
-        """The text to parse, with comments and line ends blanked."""
         return self.source.code(self.start, self.end)
 
     @property
@@ -128,7 +126,7 @@ class Statement:
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """Return it without blanks, comments, line ends and the keywords `without`."""
+        """Return the statement without blanks, comments, line ends and the keywords `without`."""
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

@@ -91,7 +91,7 @@ class Term:
 
 
 def in_order(root: Term) -> list[Term]:
-    """`root` and the terms below it once each, operands first."""
+    """List `root` and the terms below it once each, operands first."""
     ordered: dict[int, Term] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -150,7 +150,7 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Equal terms, up to the operand order of + and *."""
+    """Return True for equal terms, up to the operand order of + and *."""
     numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):
@@ -173,7 +173,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """A term can be written out with its common parts repeated."""
+    """Return True if a term can be written out with its common subterms repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -218,7 +218,7 @@ _MOST_LEVELS = 60
 def program(
     root: Term, push: Callable[[str], tuple[int, int]], *, depth: int | None = None
 ) -> formula.Program:
-    """Stack program of a term.
+    """Compile a term to a stack program.
 
     `push` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
     the program stores no rows.
@@ -266,7 +266,7 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """With several users, or too deep for the stack."""
+        """Choose terms with several users, or too deep for the stack."""
         kept = set()
         if not self.bare:
             kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}

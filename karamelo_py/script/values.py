@@ -12,7 +12,7 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Their slots are consecutive."""
+    """Return True if the slots of `suffixes` are consecutive."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
@@ -34,7 +34,7 @@ class Values:
             self.publish(name)
 
     def publish(self, name: str, value: float = 0.0) -> int:
-        """A known name retains its slot."""
+        """Publish a number; a known name retains its slot."""
         if name not in self._slots:
             self._slots[name] = self._reserve(1)
         slot = self._slots[name]

@@ -108,7 +108,7 @@ class MeshRegion(Enclosed):
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
     pyramids in 3D, by their corners, faces included. Non-planar faces with four corners are two
-    triangles. In 2D the mesh lies in the plane z = 0.
+    triangles. In 2D the mesh has z = 0.
 
     See Also
     --------
@@ -128,7 +128,7 @@ class MeshRegion(Enclosed):
         dimension = domain.dimension
         mesh = read(file, dimension, hub.settings.trusts, domain.h and domain.h / 2)
         parts = elements_of(mesh, dimension, group, lower=group is not None)
-        _tell_of_curved_edges(hub, file, max(part.bulge for part in parts))
+        _tell_of_curved_edges(hub, file, max(elements.bulge for elements in parts))
         flat = parts[0].shape.dimension < dimension
         self.has_faces = parts[0].shape.dimension == dimension - 1
         faces = flat_faces(parts) if flat else outer_faces(parts)
@@ -245,7 +245,7 @@ class MeshSolid(Solid):
     -----
     Elements are as in region mesh; lower dimensions are ignored, and, with a warning, centroids
     outside the domain. Elements of higher order have the volume within their curved edges. The cpdi
-    methods take elements of one shape, by their corners. In 2D the mesh lies in the plane z = 0.
+    methods take elements of one shape, by their corners. In 2D the mesh has z = 0.
 
     See Also
     --------
@@ -272,14 +272,16 @@ class MeshSolid(Solid):
         mesh = read(file, domain.dimension, hub.settings.trusts, h / 2)
         parts = elements_of(mesh, domain.dimension, group)
         self._tell_of_left_out(hub, mesh)
-        measures = [measured(part) for part in parts]
+        measures = [measured(elements) for elements in parts]
         inside = [domain.contains(centroid) for _, _, centroid in measures]
-        corners = [part.corners[kept] for (part, _, _), kept in zip(measures, inside, strict=True)]
+        corners = [
+            elements.corners[kept] for (elements, _, _), kept in zip(measures, inside, strict=True)
+        ]
         volume, centroid = (np.concatenate(of) for of in list(zip(*measures, strict=True))[1:])
         kept = np.concatenate(inside)
         reach = np.concatenate(
             [x.reshape(-1, domain.dimension) for x in corners if len(x)]
-            or [part.corners[:, 0] for part, _, _ in measures]
+            or [elements.corners[:, 0] for elements, _, _ in measures]
         )
         _tell_of_units(hub, file, reach.min(axis=0), reach.max(axis=0))
         self.volumes = float(volume[kept].sum()), float(volume.sum())
@@ -287,8 +289,8 @@ class MeshSolid(Solid):
         for cells in map(in_order, mesh.cells):
             in_file[cells.family] += len(cells.nodes)
         counts = ", ".join(
-            f"{np.count_nonzero(taken)} of {in_file[part.shape.name]} {part.shape.words}"
-            for part, taken in zip(parts, inside, strict=True)
+            f"{np.count_nonzero(taken)} of {in_file[elements.shape.name]} {elements.shape.words}"
+            for elements, taken in zip(parts, inside, strict=True)
         )
         self.elements = f" ({counts})"
         mixed = len(measures) > 1

@@ -279,16 +279,16 @@ class Union(region.Region):
         used = slice(0, hub.require_domain().dimension)
         super().__init__(
             hub,
-            self.low.reduce([part.box_lo[used] for part in parts]),
-            self.high.reduce([part.box_hi[used] for part in parts]),
+            self.low.reduce([operand.box_lo[used] for operand in parts]),
+            self.high.reduce([operand.box_hi[used] for operand in parts]),
             parts=parts,
         )
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        return self.joined.reduce([part.inside(x) for part in self.parts])
+        return self.joined.reduce([operand.inside(x) for operand in self.parts])
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        return self.high.reduce([part.depth(x, reach) for part in self.parts])
+        return self.high.reduce([operand.depth(x, reach) for operand in self.parts])
 
     def shape(self) -> Joined | Common | None:
         parts = outlines(self.parts)
@@ -340,10 +340,10 @@ class Difference(region.Region):
 
     def contains(self, x: np.ndarray) -> np.ndarray:
         first, *others = self.parts
-        return first.inside(x) & ~np.logical_or.reduce([part.inside(x) for part in others])
+        return first.inside(x) & ~np.logical_or.reduce([operand.inside(x) for operand in others])
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        first, *others = (part.depth(x, reach) for part in self.parts)
+        first, *others = (operand.depth(x, reach) for operand in self.parts)
         return np.minimum(first, -np.maximum.reduce(others))
 
     def shape(self) -> Common | None:
@@ -352,5 +352,5 @@ class Difference(region.Region):
 
 
 def outlines(parts: Sequence[region.Region]) -> tuple | None:
-    shapes = [part.outline() for part in parts]
+    shapes = [operand.outline() for operand in parts]
     return None if any(one is None for one in shapes) else tuple(shapes)

@@ -28,7 +28,7 @@ from karamelo_py.script.errors import ScriptError
 _SIGNALS = {one.value: one.name for one in signal.Signals}
 MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
-# with --ranks
+# Workloads with --ranks.
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
 HEADING = (
     f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
@@ -90,7 +90,7 @@ class Scaled(NamedTuple):
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Then weak scaling."""
+    """Measure strong, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(job._replace(ranks=n))

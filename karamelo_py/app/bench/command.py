@@ -189,7 +189,7 @@ def _print_solved(one: measure.Solved) -> None:
 
 
 def commit() -> str | None:
-    """None outside a repository."""
+    """Return the commit of the package, None outside a repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:

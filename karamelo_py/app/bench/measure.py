@@ -65,7 +65,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Times each sweep of `mode`, and the same call without points, to be subtracted."""
+    """Times each sweep, and the same call without points, to be subtracted."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -101,24 +101,24 @@ class Measured(NamedTuple):
 
     @property
     def told_apart(self) -> bool:
-        """Sweeps are long enough to be timed."""
+        """Return True if sweeps are long enough to be timed."""
         return self.swept <= APART
 
     @property
     def rest(self) -> float:
-        """Fraction of the step: control and waiting threads."""
+        """Fraction of the step spent in control and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
     def nodes(self) -> float:
-        """Fraction of sweeps spent on nodes."""
+        """Fraction of the sweeps spent on nodes."""
         nodes = sum(self.sweeps_of_nodes.values())
         swept = nodes + sum(self.sweeps_of_points.values())
         return nodes / swept if swept else 0.0
 
     @property
     def limit(self) -> str:
-        """The part that takes at least half of a step: ``overhead``, ``nodes``, ``memory``.
+        """The component with at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
         Memory is relative to arrays as large as the scene. Else ``arithmetic`` (instructions or
         latency), or ``unknown`` if not `told_apart`.
@@ -240,7 +240,7 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Steps per repetition, and the seconds taken and waited by each process.
+    Return the steps per repetition, and the seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -262,7 +262,7 @@ def _waits(simulation: Simulation) -> np.ndarray:
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Seconds until `count` steps are done, also on a GPU."""
+    """Take steps and return the seconds, also on a GPU."""
     card = simulation.hub.settings.card
     wait = card.wait if card else lambda: None
     wait()

@@ -38,7 +38,7 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """About `POINTS`, the same in each state; small solids stay complete."""
+    """Mask about `POINTS` points, the same in each state; small solids stay complete."""
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)
@@ -81,7 +81,7 @@ class KeptFrames:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 
     def answer(self, words: Mapping[str, str]) -> bytes | None:
-        """Positions of a frame, one coordinate after another, then its column."""
+        """Return the positions of a frame, one coordinate after another, then its column."""
         with self._lock:
             frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
@@ -93,7 +93,7 @@ def number_in(words: Mapping[str, str]) -> int:
 
 
 def plain(value: object) -> object:
-    """None for numbers that JSON lacks."""
+    """Replace numbers that JSON lacks by None."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

@@ -62,7 +62,7 @@ class RunPage(Rhythmic, Listener):
         self._paused = False
 
     def write(self) -> None:
-        """Waits while the page pauses the run."""
+        """Send the state, and wait while the page pauses the run."""
         hub, simulation = self.hub, self.hub.simulation
         self.every = hub.output.log.every  # a run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
@@ -177,6 +177,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Like Ctrl-C: the last state is written."""
+        """Stop like Ctrl-C: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

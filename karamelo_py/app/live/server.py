@@ -85,7 +85,7 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Wait until pages are closed, or give no sign: a page that takes nothing has buffers."""
+        """Wait until pages are closed or give no sign: a page that takes nothing has buffers."""
         self.heard = time.monotonic()
         with self._changed:
             while not self.opened or (self._shown and time.monotonic() < self.heard + AWAY):
@@ -143,7 +143,7 @@ class _Quiet(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, *_: object) -> None:
-        """Nothing on the terminal of the run."""
+        """Print nothing on the terminal of the run."""
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:
@@ -163,7 +163,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
         server_version, sys_version = "karamelo-py", ""
 
         def log_message(self, *_: object) -> None:
-            """Nothing on the terminal of the study."""
+            """Print nothing on the terminal of the study."""
 
         def do_GET(self) -> None:
             name, words = self._asked()
@@ -204,7 +204,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self._give(b"{}", "application/json")
 
         def _is_from_here(self) -> bool:
-            """Host and Origin, if sent, are this server."""
+            """Return True if Host and Origin, if sent, are this server."""
             host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
             try:
                 here = urlsplit(f"//{host}").hostname in HERE
@@ -213,7 +213,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
-            """The requested name (None without the secret word) and the query."""
+            """Return the requested name (None without the secret word) and the query."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())

@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """`stopped` is set when a viewer ends it.
+    """The page of a study; `stopped` is set when a viewer ends it.
 
     `recorded` are recorded values, `axes` initial axes of the chart; row folders are relative to
     `base`.
@@ -56,7 +56,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """``judged(row)`` adds class and reason, `colours` maps classes."""
+        """Colour runs: ``judged(row)`` adds class and reason, `colours` maps classes."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(
@@ -79,7 +79,7 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Cases that neither run nor have a row are waiting."""
+        """Return the news since `seen`; cases that neither run nor have a row are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         news = {

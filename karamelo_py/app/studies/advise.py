@@ -73,7 +73,7 @@ def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Row], accuracy: str, cost: str, *,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """A run at `x` from the runs at `xs`, coarse ones first.
+    """Forecast a run at `x` from the runs at `xs`, coarse ones first.
 
     The error continues with the last order. Its bounds follow from the least and largest order, at
     least 33 % of it above and half below; a falling order may fall as much again, and one below 2
@@ -106,7 +106,7 @@ def _cost(x: float, xs: np.ndarray, rows: Sequence[Row], cost: str) -> float:
     values = column(rows, cost)
     if cost == "seconds" and all(usable(a) for a in values):
         steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
-        # Relative errors count alike; both parts of the time are at least 0.
+        # Relative errors count alike; both terms of the time are at least 0.
         matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
         parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
         if (parts < 0).any():
@@ -185,7 +185,7 @@ class Adviser:
         return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Up to the target, with earlier runs."""
+        """Run all choices up to the target or `count` runs, with earlier runs."""
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
                 if not self._met(choice):
@@ -213,7 +213,7 @@ class Adviser:
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """Gradients jump, and points may cross cells at a step."""
+        """Return True if gradients jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
         stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
@@ -221,9 +221,9 @@ class Adviser:
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """A choice's cheapest variant that meets the target, known or expected.
+        """Return a choice's cheapest variant that meets the target, known or expected.
 
-        With `hope`, by the lower bound of the error; with `lucky`, perhaps by chance.
+        With `hope`, use the lower bound of the error; with `lucky`, accept errors small by chance.
         """
         met = [run for run in self._met(choice) if lucky or not run.chance]
         if met or lucky:
@@ -248,7 +248,7 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """After runs that may change it.
+        """Return the best candidate, after runs that may change it.
 
         Choices that could become the cheapest are followed until their candidate is the next finer
         variant.
@@ -377,7 +377,7 @@ def run(options: Namespace) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """By the work that they cause, as `check` measures."""
+    """Order values by the work that they cause, as `check` measures."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -478,7 +478,7 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Until the target is met."""
+    """Run finer variants until the target is met."""
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)

@@ -149,14 +149,13 @@ def run(options: Namespace) -> int:
 
 
 def ended(folder: Path) -> tuple[list[str], int]:
-    """Runs that did not end well, and the count of all."""
+    """Return the runs that did not end well, and the count of all."""
     tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)
 
 
 def make(entry: Entry, folder: Path, inputs: Path, *, small: bool, again: bool) -> str:
-    """Run an entry's commands in its folder; return ``done``, ``known`` or ``failed``."""
     lines = entry.lines(str(inputs), small=small)
     key = key_of(lines)
     record = folder / RECORD
@@ -222,7 +221,7 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
 
 
 def part_of_page(entry: Entry, folder: Path, shown: Path, inputs: Path) -> str:
-    """Write an entry's part of the page; copy its pictures to `shown`."""
+    """Write an entry's section of the page; copy its pictures to `shown`."""
     parts = [entry.name, entry.text]
     title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
     for path in sorted(path for path in folder.iterdir() if path.suffix in PICTURES):

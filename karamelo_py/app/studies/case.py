@@ -30,8 +30,8 @@ Record = Mapping[str, Any]
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Errors before the first step that are no mistake of the script, and of the program or another run
-# in the folder.
+# Errors before the first step that are not the script's, and errors of the program or of another
+# run in the folder.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
 _NOT_OF_RUN = ("internal", "busy")
 
@@ -115,7 +115,7 @@ class Launch:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """None to run the case again."""
+        """Return the stored outcome; None starts the case again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -187,7 +187,7 @@ class Launch:
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        """The peak memory (MiB), and whether time was up."""
+        """Return the peak memory (MiB), and whether time was up."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
@@ -211,7 +211,6 @@ class Launch:
 
 
 def kind_of(values: Iterable[str]) -> tuple[str, ...]:
-    """Words of a case, which decide what is compiled."""
     return tuple(value for value in values if number_of(value) is None)
 
 
@@ -227,7 +226,7 @@ OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of a pool o
 
 
 def environment() -> dict[str, str]:
-    """Runs import this very program."""
+    """Return the environment in which runs import this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     inherited = {name: text for name, text in os.environ.items() if not name.startswith(OF_MPI)}
@@ -239,7 +238,7 @@ def record_of(folder: Path) -> Record:
 
 
 def facts_of(record: Record) -> dict[str, float]:
-    """Of all runs of a script, or of the first: `COLUMNS`."""
+    """Collect `COLUMNS` from all runs of a script, or from the first."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")

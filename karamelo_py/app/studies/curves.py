@@ -31,7 +31,6 @@ class Order(NamedTuple):
         return Order(-self.exponent, -self.highest, -self.lowest)
 
     def towards(self, x: Sequence[float]) -> "Order":
-        """Order by which errors fall from the first to the last x."""
         return self.of_fall if x[-1] > x[0] else self
 
     def __str__(self) -> str:
@@ -73,10 +72,10 @@ def reached(words: Iterable[str]) -> float:
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """The reason, for runs from coarse to fine; "" where not.
+    """Explain errors that are small by chance, for runs from coarse to fine; else "".
 
-    An error is chance if a finer run is worse. If no finer run is as good, also if the sign
-    changes, the error falls faster than by `highest`, the order of the basis, or it grows.
+    An error is chance if a finer run is worse. If no finer run is as good, it is also chance if the
+    sign changes, the error falls faster than by `highest`, the order of the basis, or it grows.
     """
     reasons, size = [], np.abs(np.asarray(values, float))
     for k, error in enumerate(size):
@@ -98,8 +97,8 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
     """Sizes of errors for a forecast, without reductions by chance.
 
-    At least the change since the run before over the reduction by the order `highest`, and the
-    error of each finer run.
+    They are at least the change since the previous run over the reduction by the order `highest`,
+    and the error of each finer run.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -149,7 +148,7 @@ class GroupedRuns:
 
     @property
     def rises(self) -> bool:
-        """The variable grows with refinement, measured in particle-steps if known."""
+        """Return True if the variable grows with refinement, by particle-steps if known."""
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
@@ -164,14 +163,14 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Values that mean nothing alone have their name."""
+    """Label a choice; values that mean nothing alone have their name."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
 
 
 class Family:
-    """Lines told apart by the variables `by` and others that differ.
+    """Lines distinguished by the variables `by` and others that differ.
 
     `along` differs along a line, by default the number with the most values.
     """
@@ -219,7 +218,7 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Only in a line whose points increase or decrease throughout."""
+        """Explain errors in a line whose points increase or decrease throughout; else ""."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):
@@ -259,13 +258,12 @@ class Family:
 
 
 def errors(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Signed where possible; NaN where missing."""
+    """Errors of rows, signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 
 
 def sizes(rows: Sequence[Row], name: str) -> np.ndarray:
-    """NaN where missing."""
     return np.abs(column(rows, name))
 
 

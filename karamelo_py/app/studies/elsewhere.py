@@ -1,7 +1,7 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
 A case travels as data: the script, its files and the variables. Its log, its record and the files
-named by -keep come back: no disk is shared.
+named by `-keep` come back: no disk is shared.
 """
 
 import re
@@ -32,8 +32,6 @@ RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
 class Package(NamedTuple):
-    """Everything that the cases of a study have in common."""
-
     script: str  # path below a common folder
     files: tuple[tuple[str, bytes], ...]  # paths below it, and contents
     launch: tuple[int, int, float | None]  # threads, repetitions, limit (s)
@@ -49,9 +47,9 @@ class Returned(NamedTuple):
 
 
 def versions() -> tuple[tuple[str, str], ...]:
-    found = surroundings()["versions"]
-    found["python"] = ".".join(found["python"].split(".")[:2])
-    return tuple(found.items())
+    packages = surroundings()["versions"]
+    packages["python"] = ".".join(packages["python"].split(".")[:2])
+    return tuple(packages.items())
 
 
 def packed(
@@ -87,12 +85,11 @@ def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
 
 
 def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
-    """Run a case on the machine of a worker."""
     machine = socket.gethostname()
     differ = [
-        f"{name} {here} for {there}"
-        for (name, there), (_, here) in zip(package.versions, versions(), strict=True)
-        if here != there
+        f"{name} {local} for {remote}"
+        for (name, remote), (_, local) in zip(package.versions, versions(), strict=True)
+        if local != remote
     ]
     if differ:
         outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
@@ -111,8 +108,6 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
 
 
 class Elsewhere:
-    """Runs cases by an executor, and tries a lost case again."""
-
     def __init__(self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack):
         """`send` makes the package known to the machines; its result goes with each case."""
         self.send, self.executor, self.size, self.ends = send, executor, size, ends
@@ -166,7 +161,6 @@ class Elsewhere:
 
 
 def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
-    """Connect to the machines that -on names."""
     ends = ExitStack()
     if options.on == "mpi":
         return _mpi(package, ends)

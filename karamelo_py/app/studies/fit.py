@@ -113,7 +113,7 @@ class Search:
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *fractions: np.ndarray) -> list[np.ndarray]:
-        """The differences at these positions; inf for a failed run."""
+        """Return the differences at these positions; inf for a failed run."""
         cases, results = [self.case(fraction) for fraction in fractions], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:
@@ -166,7 +166,7 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """The lowest point around it, along variables and the weakest direction.
+        """Search around `end` along variables and the weakest direction for the lowest point.
 
         `end` gets slopes over both sides.
         """

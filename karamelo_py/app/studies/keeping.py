@@ -1,4 +1,4 @@
-"""Runs judged by a log column that should stay, such as an energy."""
+"""Runs judged by a log column that should stay constant, such as an energy."""
 
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
@@ -20,7 +20,7 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict: ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step) ...
 
-    ``unknown``: given up or killed; a part of the energy ``falls`` or ``grows``.
+    ``unknown``: given up or killed; a component of the energy ``falls`` or ``grows``.
     """
 
     word: str
@@ -34,7 +34,7 @@ class Kept(NamedTuple):
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Verdict, and the mean of the last part over the first."""
+    """Return the verdict, and the mean of the last part over the first."""
     span = ENDS * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:
@@ -49,7 +49,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Values of the computes `parts` are no totals."""
+    """Judge a run; values of the computes `parts` are no totals."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -77,7 +77,7 @@ def _general(note: Mapping[str, str]) -> str:
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """A Markdown table with rows by the variables `by`, and silent failures.
+    """Make a Markdown table with rows by the variables `by`, and list silent failures.
 
     Messages follow, by numbers. Variables in step with row variables are omitted.
     """

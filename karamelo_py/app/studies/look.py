@@ -39,7 +39,7 @@ FAMILIES = (
 )
 
 
-def known(word: str) -> bool:
+def has_number(word: str) -> bool:
     return any(word in family for family in FAMILIES)
 
 
@@ -54,7 +54,7 @@ def number(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Colour, marker and dashes (by number).
+    """Choose colour, marker and dashes (by number).
 
     The first variable sets colour and marker, the others the dashes: fixed for known words, else
     the next unused.
@@ -88,7 +88,6 @@ def _in_order(value: str, values: Sequence[str]) -> str:
 
 
 def readable(colour: str) -> str:
-    """Darken a colour to a contrast of 4.5 to 1 on white (WCAG 2)."""
     from matplotlib.colors import to_hex, to_rgb
 
     rgb = np.array(to_rgb(colour))
@@ -109,7 +108,7 @@ def label(name: str) -> str:
 
 
 def log_ticks(low: float, high: float) -> list[float]:
-    """Round ticks whose labels do not touch."""
+    """Choose round ticks whose labels do not touch."""
     decades = log10(high / low)
     every = 1 if decades < 9 else ceil(decades / 8)
     exponents = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
@@ -134,7 +133,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def log_axis(axis: "Axis", low: float, high: float, values: Sequence[float] | None = None) -> None:
-    """Ticks are at `values` if they are few."""
+    """Make an axis logarithmic, with ticks at `values` if they are few."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes

@@ -215,7 +215,7 @@ class History(NamedTuple):
 def histories(
     table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Labels are `names` or variables `by`."""
+    """Collect curves labelled by `names` or the variables `by`."""
     curves = []
     for k, row in enumerate(table.rows):
         columns = read_log(table.path.parent / row["folder"], log)
@@ -234,7 +234,7 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Rows (n,) with increasing time.
+    """Mask rows (n,) with increasing time.
 
     A stopped run ends with an earlier good state; one that went back has discarded rows.
     """
@@ -259,7 +259,7 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
     if exact is not None:
         axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
         ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
-    fixed = [look.number(each.label) for each in curves if look.known(each.label)]
+    fixed = [look.number(each.label) for each in curves if look.has_number(each.label)]
     places = fixed if len(fixed) == len(curves) else range(1 + (len(curves) > 1), len(curves) + 2)
     for k, each in enumerate(curves):
         colour = look.PALETTE[places[k] % len(look.PALETTE)]

@@ -100,7 +100,6 @@ class Recorded:
             self.parts[name] = Reduction("last", name, None, word)
 
     def columns(self, variables: Container[str] = ()) -> list[str]:
-        """Without `variables`."""
         return [reduction.column for name, reduction in self.parts.items() if name not in variables]
 
     def of(self, log: Mapping[str, np.ndarray], case: Row) -> float:
@@ -153,7 +152,7 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
 ) -> Row:
-    """Unknown cells are None.
+    """Make a table row; unknown cells are None.
 
     A failed run has no recorded values. A finished run's reason is why a value is missing.
     """

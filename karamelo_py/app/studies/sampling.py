@@ -36,7 +36,6 @@ def needs_scipy(word: str) -> None:
 
 
 def require_power_of_2(option: str, count: int) -> None:
-    """Refuse other sizes of a sample by Sobol', which lose its balance."""
     if count & (count - 1):
         expected = f"a power of 2 with sobol, such as {2 ** round(np.log2(count))}"
         raise ScriptError(f"{option} {count}", expected=expected)
@@ -44,17 +43,17 @@ def require_power_of_2(option: str, count: int) -> None:
 
 def random_variables(words: Sequence[str]) -> tuple[list[Random], list[str]]:
     """Separate ``NAME=normal(1, 0.1)`` from other words of -var."""
-    found, others = [], []
+    variables, others = [], []
     for word in words:
-        name, _, text = (part.strip() for part in word.partition("="))
+        name, _, text = (piece.strip() for piece in word.partition("="))
         call = CALL.fullmatch(text)
         if call and name.isidentifier():
-            found.append(Random(name, text, _law(name, *call.groups())))
+            variables.append(Random(name, text, _law(name, *call.groups())))
         else:
             others.append(word)
-    if len({one.name for one in found}) < len(found):
+    if len({one.name for one in variables}) < len(variables):
         raise ScriptError("a random variable is given twice")
-    return found, others
+    return variables, others
 
 
 def _law(name: str, kind: str, text: str) -> Any:
@@ -62,8 +61,8 @@ def _law(name: str, kind: str, text: str) -> Any:
 
     if kind not in KINDS:
         raise unknown(f"-var {name}: unknown distribution '{kind}'", kind, KINDS)
-    parts = [number_of(part.strip()) for part in text.split(",")]
-    numbers = [part for part in parts if part is not None]
+    parts = [number_of(piece.strip()) for piece in text.split(",")]
+    numbers = [piece for piece in parts if piece is not None]
     expected = f"{KINDS[kind]} with numbers"
     if len(numbers) != len(parts) or len(numbers) != KINDS[kind].count(",") + 1:
         raise ScriptError(f"-var {name}: {kind}({text})", expected=expected)
@@ -103,7 +102,7 @@ def samples(
     parts = engines[sequence](len(laws), rng=np.random.default_rng(seed)).random(count)
     if factor is not None:
         parts = norm.cdf(norm.ppf(parts) @ factor.T)
-    return np.column_stack([law.ppf(part) for law, part in zip(laws, parts.T, strict=True)])
+    return np.column_stack([law.ppf(column) for law, column in zip(laws, parts.T, strict=True)])
 
 
 def correlation(path: Path, names: Sequence[str]) -> np.ndarray:
@@ -156,21 +155,21 @@ def prepare(options: Namespace) -> dict[str, Any]:
             raise ScriptError("-correlation and -fails", expected="-sample N with them")
         return {}
     needs_scipy("sweep -sample")
-    found, others = random_variables(options.var)
-    if not found:
+    variables, others = random_variables(options.var)
+    if not variables:
         expected = "at least one of " + ", ".join(KINDS.values())
         raise ScriptError("-sample: no variable is random", expected=expected)
-    names = [one.name for one in found]
+    names = [one.name for one in variables]
     factor = correlation(options.correlation, names) if options.correlation else None
-    laws = [one.law for one in found]
+    laws = [one.law for one in variables]
     drawn = samples(laws, options.sample, options.sequence, options.seed, factor)
     lists = [
         f"{n}={','.join(f'{x:.10g}' for x in xs)}" for n, xs in zip(names, drawn.T, strict=True)
     ]
     options.var = [*lists, *others]
     options.zip = [*options.zip, ",".join(names)]
-    return {"random": described(found), "sequence": options.sequence, "seed": options.seed}
+    return {"random": described(variables), "sequence": options.sequence, "seed": options.seed}
 
 
-def described(found: Sequence[Random]) -> Mapping[str, str]:
-    return {one.name: one.text for one in found}
+def described(variables: Sequence[Random]) -> Mapping[str, str]:
+    return {one.name: one.text for one in variables}

@@ -52,9 +52,9 @@ def sobol(
 
     require_power_of_2("-n", n)
     rng = np.random.default_rng(seed)
-    found = sobol_indices(func=results, n=n, dists=list(laws), rng=rng)
-    sure = found.bootstrap(confidence_level=SURE, n_resamples=RESAMPLED // 4)
-    firsts, totals = np.atleast_2d(found.first_order), np.atleast_2d(found.total_order)
+    indices = sobol_indices(func=results, n=n, dists=list(laws), rng=rng)
+    sure = indices.bootstrap(confidence_level=SURE, n_resamples=RESAMPLED // 4)
+    firsts, totals = np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
     ends = [
         [np.atleast_2d(end) for end in one.confidence_interval]
         for one in (sure.first_order, sure.total_order)
@@ -85,22 +85,22 @@ def morris(
     numbers = results((low + parts * (high - low)).T)
     made = []
     for one in numbers:
-        found = analyzer.analyze(
+        analysis = analyzer.analyze(
             problem, parts, one, num_levels=LEVELS, conf_level=SURE, seed=seed,
             print_to_console=False,
         )  # fmt: skip
-        half = np.asarray(found["mu_star_conf"], float)
-        mu, sigma = (np.asarray(found[word], float) for word in ("mu_star", "sigma"))
+        half = np.asarray(analysis["mu_star_conf"], float)
+        mu, sigma = (np.asarray(analysis[word], float) for word in ("mu_star", "sigma"))
         made.append(
             [(Interval(m, m - h, m + h), float(s)) for m, h, s in zip(mu, half, sigma, strict=True)]
         )
     return made
 
 
-def results_of(study: Study, found: Sequence[Random], fixed: dict[str, str]) -> Results:
+def results_of(study: Study, randoms: Sequence[Random], fixed: dict[str, str]) -> Results:
     def results(numbers: np.ndarray) -> np.ndarray:
         cases = [
-            {one.name: f"{x:.10g}" for one, x in zip(found, column, strict=True)} | fixed
+            {one.name: f"{x:.10g}" for one, x in zip(randoms, column, strict=True)} | fixed
             for column in np.atleast_2d(numbers).T
         ]
         rows = study.run(cases)
@@ -138,23 +138,26 @@ def run(options: Namespace) -> int:
         hint = "pip install '.[studies]' in the folder of karamelo-py"
         raise ScriptError("karamelo-py sensitivity -method morris needs SALib", hint=hint)
     out = variables.out_file(options.o, ".csv")
-    found, options.var = random_variables(options.var)
-    if len(found) < 2:
+    randoms, options.var = random_variables(options.var)
+    if len(randoms) < 2:
         expected = "two of " + ", ".join(KINDS.values())
         raise ScriptError("sensitivity compares random variables", expected=expected)
     fixed = variables.choices(options.var)
     if several := next((name for name, words in fixed.items() if words[1:]), None):
         raise ScriptError(f"-var {several} has several values", expected="one, or a distribution")
-    # Two values stand for a distribution in the plan of the study.
-    options.var = [f"{one.name}={one.law.ppf(0.3):.10g},{one.law.ppf(0.7):.10g}" for one in found]
+    # Two values represent a distribution in the plan of the study.
+    options.var = [f"{one.name}={one.law.ppf(0.3):.10g},{one.law.ppf(0.7):.10g}" for one in randoms]
     options.var += [f"{name}={word}" for name, (word,) in fixed.items()]
     plan = variables.family(options)
     items = recorded(",".join(options.record), plan.script, plan.values)
-    runs = options.n * {"sobol": len(found) + 2, "morris": len(found) + 1, "fit": 1}[options.method]
-    facts = {"random": described(found), "method": options.method, "n": options.n}
+    runs = (
+        options.n
+        * {"sobol": len(randoms) + 2, "morris": len(randoms) + 1, "fit": 1}[options.method]
+    )
+    facts = {"random": described(randoms), "method": options.method, "n": options.n}
     study = open_study(options, plan, out, items, strict=True, most=runs, facts=facts)
-    results = results_of(study, found, {name: word for name, (word,) in fixed.items()})
-    laws = [one.law for one in found]
+    results = results_of(study, randoms, {name: word for name, (word,) in fixed.items()})
+    laws = [one.law for one in randoms]
     method: Callable = {"sobol": sobol, "morris": morris, "fit": surrogate.indices}[options.method]
     indices, fits = method(laws, results, options.n, options.seed), []
     if options.method == "fit":
@@ -163,7 +166,7 @@ def run(options: Namespace) -> int:
     heads = ["mu*", "sigma"] if options.method == "morris" else ["first", "total"]
     for item, rows in zip(items, indices, strict=True):
         table = plain_table(["variable"], heads, f"\n{item.word}")
-        for one, pair in zip(found, rows, strict=True):
+        for one, pair in zip(randoms, rows, strict=True):
             table.add_row(
                 one.name, *[str(x) if isinstance(x, Interval) else shown(x) for x in pair]
             )

@@ -162,7 +162,6 @@ def growth(energy: np.ndarray) -> float:
 
 
 def remains(energy: np.ndarray) -> float:
-    """Mean over the last tenth of the rows over the first tenth's."""
     rows = max(1, ceil(FIRST * len(energy)))
     first, last = (float(np.abs(end).mean()) if len(end) else 0.0
                    for end in (energy[:rows], energy[-rows:]))  # fmt: skip
@@ -283,8 +282,8 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Each row's x where the first step equals the column `step`, or None: by extrapolated
-        powers of x."""
+        """Each row's x where the first step equals the column `step` (extrapolated powers of x), or
+        None."""
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
@@ -300,7 +299,6 @@ class Map:
         return crossings
 
     def _crossing(self, points: Sequence[tuple[float, float]]) -> float | None:
-        """Position where a ratio is 1, at or beyond its known values."""
         for (xa, a), (xb, b) in pairwise(points):
             if (a - 1) * (b - 1) <= 0 and not isclose(a, b, rel_tol=1e-6):
                 return xa + (1 - a) / (b - a) * (xb - xa)
@@ -476,7 +474,6 @@ def explore(
 
 
 def unseen(shape: Sequence[int], stride: int) -> int:
-    """Largest width of unseen islands and strips, in cells."""
     return max((b - a - 1 for n in shape for a, b in pairwise(_cuts(n, stride))), default=0)
 
 
@@ -490,7 +487,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Cells between equal ones, unless row and column disagree."""
+    """Fill cells between equal ones, unless row and column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -520,7 +517,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Length and middle of stretches along an edge without a run."""
+    """Yield length and middle of stretches along an edge without a run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
@@ -541,7 +538,7 @@ def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) 
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Cells of the longest gaps, at least half a gap apart."""
+    """Choose cells of the longest gaps, at least half a gap apart."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

@@ -1,4 +1,4 @@
-"""Cases of a study, some run at once, known ones not again."""
+"""Cases of a study: some run at once; known ones do not run again."""
 
 from __future__ import annotations
 
@@ -37,8 +37,6 @@ _STATUS = 24  # least width of the status while facts are shown
 
 
 class Here:
-    """Runs cases on this machine, each in a process."""
-
     def __init__(self, launch: Launch, jobs: int):
         self.launch, self.size, self.pool = launch, jobs, ThreadPoolExecutor(jobs)
 
@@ -100,7 +98,7 @@ class Study:
             write(self.out, list(self.rows.values()))
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
-        """An interrupt ends runs in progress; finished ones are stored."""
+        """Run cases; an interrupt ends runs in progress, and finished ones are stored."""
         waiting = []
         for case in cases:
             if tuple(case.values()) in self.rows:
@@ -134,7 +132,7 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """The first of a kind goes ahead, because it compiles."""
+            """Return the next case; the first of a kind goes ahead, because it compiles."""
             kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
@@ -165,7 +163,7 @@ class Study:
                 pool.close()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
-        """KeyboardInterrupt if the study was stopped on the page."""
+        """Show the state; KeyboardInterrupt if the study was stopped on the page."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left([case for case, _ in queue], running)
         places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
@@ -225,7 +223,6 @@ class _Display:
         return time.perf_counter() - self.started[tuple(case.values())]
 
     def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
-        """Estimate the remaining seconds from finished runs."""
         done = [result for result in self.study.rows.values() if result.get("wall_s")]
         if not self.finished or not done:
             return None
@@ -243,9 +240,9 @@ def _said(case: Mapping[str, str]) -> str:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """Time by ridge regression of logarithms.
+    """Predict the time by ridge regression of logarithms.
 
-    A product of powers of its numbers and factors of its words.
+    It is a product of powers of a case's numbers and factors of its words.
     """
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
@@ -274,7 +271,6 @@ def guessed_time(
 
 
 def shown(value: Any) -> str:
-    """Format a table cell; a dash for NaN, None and ""."""
     if value is None or value == "" or value != value:
         return "–"
     if isinstance(value, float):
@@ -327,7 +323,7 @@ def open_study(
     options: Namespace, plan: variables.StudyPlan, out: Path, items: Sequence[Recorded], *,
     axes: Sequence[str] = (), facts: Row, **settings: Any,
 ) -> Study:  # fmt: skip
-    """Lock its folder, write `facts` of it, open its page with `axes`.
+    """Lock the folder, write `facts` of the study, open its page with `axes`.
 
     `settings` are further fields of `Study`.
     """

@@ -18,7 +18,6 @@ Fit = Callable[[np.ndarray, np.ndarray], Function]  # points (n, d) and values (
 
 
 def powers(x: np.ndarray, degree: int) -> np.ndarray:
-    """Return the products (n, m) of up to `degree` coordinates of points (n, d)."""
     columns = [np.ones(len(x))]
     for number in range(1, degree + 1):
         for axes in combinations_with_replacement(range(x.shape[1]), number):
@@ -47,7 +46,6 @@ FITS: dict[str, Fit] = {
 
 
 def error(fit: Fit, x: np.ndarray, y: np.ndarray) -> float:
-    """Return the error of predicting each run from the others, over the deviation of the runs."""
     others = ~np.eye(len(x), dtype=bool)
     wrong = [fit(x[one], y[one])(x[[k]])[0] - y[k] for k, one in enumerate(others)]
     return float(np.sqrt(np.mean(np.square(wrong))) / (y.std() or 1.0))

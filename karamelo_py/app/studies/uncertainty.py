@@ -54,17 +54,16 @@ def probability(count: int, of: int) -> Interval:
 
 
 def samples_in(rows: Sequence[Row], others: Sequence[str]) -> dict[str, list[Row]]:
-    """Rows by the values of variables that are not random."""
-    found: dict[str, list[Row]] = {}
+    """Group rows by the values of variables that are not random."""
+    cases: dict[str, list[Row]] = {}
     for row in rows:
-        found.setdefault(", ".join(f"{name} = {row[name]}" for name in others), []).append(row)
-    return found
+        cases.setdefault(", ".join(f"{name} = {row[name]}" for name in others), []).append(row)
+    return cases
 
 
 def tell(
     rows: Sequence[Row], results: Sequence[str], fails: str | None, others: Sequence[str] = ()
 ) -> None:
-    """Print statistics for each sample, one for each combination of the variables `others`."""
     print("\nin brackets: with a probability of 95 %, by resampling")
     for words, sample in samples_in(rows, others).items():
         if words:
@@ -90,7 +89,6 @@ def _tell_of(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> 
 
 
 def check(condition: str, names: Sequence[str]) -> None:
-    """Refuse a condition that is none, or of other names."""
     variables.holds(condition, dict.fromkeys(names, "1"), option="-fails")
 
 
@@ -104,7 +102,6 @@ def shown_exactly(cell: Any) -> str:
 
 
 def draw(options: Namespace, table: Table) -> int:
-    """Draw the distribution of a result, and the result over each random variable."""
     name = options.distribution
     require("-distribution", [name], table.rows[0])
     if options.o is None:

@@ -1,8 +1,8 @@
 """Start runs as forks of warm processes, which have imported the program.
 
 A run leaves a copy of itself, with its kernels, for later runs of its kind. Runs are children of
-the study. On Linux only, where it can adopt orphans; otherwise, or if anything fails, a run starts
-a new interpreter.
+the study. This works on Linux only, where the study can adopt orphans; otherwise, or if anything
+fails, a run starts a new interpreter.
 """
 
 import ctypes
@@ -41,7 +41,7 @@ class WarmProcess:
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """True if it can be copied; ConnectionError if it has gone."""
+        """Return True if it can be copied; ConnectionError if it has gone."""
         if self.pid is None:
             with suppress(BlockingIOError):
                 answer = self.link.recv(32, socket.MSG_DONTWAIT)
@@ -72,7 +72,7 @@ class WarmProcesses:
     def start(
         self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Start a run whose output and error go to `files`; the child's pid, or None."""
+        """Start a run whose output and error go to `files`; return the child's pid, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()
@@ -177,7 +177,7 @@ def keep(link: socket.socket) -> NoReturn:
 
 
 def _run(request: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
-    """Leaves a copy if it went well."""
+    """Run a case; leave a copy if it went well."""
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = request

@@ -50,9 +50,8 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Copy the state and the published values, reusing the arrays of `before`."""
     copies = {}
-    # One by one: if the number of points changed, no two arrays exist twice.
+    # One by one: no two arrays exist twice if the number of points changes.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -64,9 +63,9 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Return the nodes where contact acted lately, and its memory of them.
+    """Nodes where contact acted lately, and its memory of them; processes list the nodes in use.
 
-    Liquids may return to nodes not in use now. Processes list the nodes in use.
+    Liquids may return to nodes not in use now.
     """
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
@@ -75,12 +74,12 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
     if steps > 1 and not simulation.domain.parted:
         begin = np.arange(0, simulation.hub.fields.node_count, PIECE)
         spans = np.stack([begin, begin + PIECE], axis=1)
-    found = []
+    changed = []
     for first, rows in zip(spans[:, 0], remembered_at(simulation, spans), strict=True):
         recent = (rows != 0) & (np.abs(rows) > simulation.step - steps)
         indices = np.flatnonzero(recent.any(axis=1))
-        found.append((first + indices, np.where(recent[indices], rows[indices], 0)))
-    nodes, rows = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        changed.append((first + indices, np.where(recent[indices], rows[indices], 0)))
+    nodes, rows = (np.concatenate(parts) for parts in zip(*changed, strict=True))
     if simulation.domain.parted:
         counted = np.isin(nodes, simulation.domain.counted())
         nodes, rows = nodes[counted], rows[counted]
@@ -88,9 +87,9 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield a restart file's content for the present state, or the `kept` one.
+    """Yield the content of a restart file for the present state, or the `kept` one.
 
-    Collective; the first process gets the arrays, with the bits and in the order of a serial run.
+    Collective: rank 0 gets the arrays, in the order and with the bits of a serial run.
     """
     if not kept:
         simulation.bring()
@@ -99,7 +98,7 @@ def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) ->
     yield from in_file(state) if simulation.comm.size == 1 else _joined(simulation, state)
     if kept:
         return
-    yield from wholes(known(simulation))
+    yield from wholes(identical(simulation))
     yield from _shown_by_nodes(simulation)
 
 
@@ -123,7 +122,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as files hold it, with the digits of exact sums normalised."""
+    """Yield a state as stored in files, with the digits of exact sums normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -134,7 +133,7 @@ def wholes(arrays: Mapping[str, np.ndarray]) -> Iterator[Stored]:
         yield name, array.shape, ..., array
 
 
-def known(simulation: SceneState) -> dict[str, np.ndarray]:
+def identical(simulation: SceneState) -> dict[str, np.ndarray]:
     return {"present": simulation.present, "shown": np.array(simulation.flags)}
 
 
@@ -181,7 +180,7 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Turn HDF5 errors within the block into errors about a damaged file."""
+    """Convert HDF5 errors within the block to errors about a damaged file."""
     try:
         yield
     except OSError as error:
@@ -200,8 +199,8 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
         stem = f"points/{k}/"
         points, tiling = block.points, take_tiling(block.tiling, state, f"tiling/{k}/")
         if points.mass.size != state[stem + "mass"].size:
-            own = {name: np.array(state[name]) for name in state if name.startswith(stem)}
-            points = take_points(points, own, stem)
+            columns = {name: np.array(state[name]) for name in state if name.startswith(stem)}
+            points = take_points(points, columns, stem)
         blocks.append(block._replace(points=points, tiling=tiling))
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
@@ -234,7 +233,7 @@ def take_snapshot(simulation: SceneState, path: Path) -> dict[str, np.ndarray]:
 
 def take_stored(simulation: SceneState, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
-        # Check first: arrays must not change if the file belongs to another scene.
+        # Check first: a file of another scene must not change the arrays.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
@@ -370,9 +369,9 @@ def _checked(arrays: ArraysByName, name: str, expected: np.ndarray, *, read: boo
     return array[()] if read else None
 
 
-def _misfit(what: str) -> ScriptError:
+def _misfit(reason: str) -> ScriptError:
     return ScriptError(
-        f"its state is not one of this scene: {what}",
+        f"its state is not one of this scene: {reason}",
         expected="a file that the same scene has written: the same solids, materials and method",
     )
 
@@ -457,7 +456,6 @@ def _cuts(ends: np.ndarray) -> Iterator[tuple[int, int]]:
 def own_share(
     simulation: SceneState, state: ArraysByName, costs: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Divide a file's tiles among the processes, and read the own part of the state."""
     blocks, comm, tiles = simulation.setup.blocks, simulation.comm, simulation.tiles
     tilings = [take_tiling(tiles.empty_tiling(), state, f"tiling/{k}/") for k in range(len(blocks))]
     whole = [b._replace(tiling=of) for b, of in zip(blocks, tilings, strict=True)]

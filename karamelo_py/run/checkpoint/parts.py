@@ -5,11 +5,11 @@ A part names the attributes that store what it has seen or summed::
     class Dose(Compute):
         remembers = ("total",)
 
-Numbers, texts, bytes, arrays, NumPy's random generators, and lists, tuples, sets and dictionaries
-of these can be stored; so can objects whose class declares what they remember in the same way.
-Classes add to the names of their bases. The optional method ``resumed()`` is called after a part is
-restored, ``filed()`` before a file stores it. Writers of files, such as a dump, start afresh in
-another script (read_restart): there, only the names in ``carries`` are restored.
+They may be numbers, texts, bytes, arrays, NumPy's random generators, lists, tuples, sets and
+dictionaries of these, and objects whose class has ``remembers``. Classes add to the names of their
+bases. The optional method ``resumed()`` is called after a part is restored, ``filed()`` before a
+file stores it. In another script (read_restart), writers of files start afresh: only the names in
+``carries`` are restored.
 """
 
 from __future__ import annotations
@@ -39,8 +39,6 @@ Memory = dict[str, Any]  # of a part, in JSON types
 
 
 class PartStates(NamedTuple):
-    """The memories of parts and the published values of a state, in JSON types."""
-
     parts: dict[Key, Memory]
     arrays: list[np.ndarray]  # indexed by the numbers in `parts`
     values: dict[str, float]
@@ -49,8 +47,8 @@ class PartStates(NamedTuple):
     def of(cls, hub: Hub, families: tuple[str, ...] = ()) -> PartStates:
         arrays: list[np.ndarray] = []
         parts = {
-            key: state_of(part, arrays, grows=key[0] in OUTPUTS)
-            for key, part in parts_of(hub)
+            key: state_of(item, arrays, grows=key[0] in OUTPUTS)
+            for key, item in parts_of(hub)
             if not families or key[0] in families
         }
         names = (name for name in hub.values.names() if not families and name not in CLOCK_VALUES)
@@ -61,20 +59,20 @@ class PartStates(NamedTuple):
         for name, value in self.values.items():
             if name in hub.values:
                 hub.values.set(name, value)
-        for key, part in parts_of(hub):
+        for key, item in parts_of(hub):
             if key not in self.parts:
                 continue
             state, begins = self.parts[key], anew and key[0] in OUTPUTS
             if begins:
-                state = {name: state[name] for name in named(part, "carries") if name in state}
-            give_state(part, state, self.arrays)
+                state = {name: state[name] for name in named(item, "carries") if name in state}
+            give_state(item, state, self.arrays)
             has_file = hub.settings.comm.leads or key[0] not in OUTPUTS
-            if (cut or anew) and not begins and has_file and hasattr(part, "resumed"):
-                part.resumed()
+            if (cut or anew) and not begins and has_file and hasattr(item, "resumed"):
+                item.resumed()
 
 
-def named(part: object, where: str = "remembers") -> tuple[str, ...]:
-    return _named_by(type(part), where)
+def named(item: object, where: str = "remembers") -> tuple[str, ...]:
+    return _named_by(type(item), where)
 
 
 @functools.cache
@@ -84,16 +82,16 @@ def _named_by(kind: type, where: str) -> tuple[str, ...]:
 
 
 def parts_of(hub: Hub) -> Iterator[tuple[Key, object]]:
-    return ((key, part) for key, part in _all_parts(hub) if named(part))
+    return ((key, item) for key, item in _all_parts(hub) if named(item))
 
 
 def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
     yield ("update", "", ""), hub.update
     yield ("method", "", ""), hub.update.method
     for catalogue in hub.catalogues:
-        for ID, part in catalogue.items():
-            style = part.style if isinstance(part, WITH_STYLE) else ""
-            yield (catalogue.kind, ID, style or type(part).__name__), part
+        for ID, item in catalogue.items():
+            style = item.style if isinstance(item, WITH_STYLE) else ""
+            yield (catalogue.kind, ID, style or type(item).__name__), item
     for curve in hub.output.plots.values():
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
@@ -102,10 +100,10 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
     yield ("log", "", ""), hub.output.log
 
 
-def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> Memory:
+def state_of(item: object, arrays: list[np.ndarray], *, grows: bool = False) -> Memory:
     memory: Memory = {}
-    for name in named(part):
-        value = getattr(part, name)
+    for name in named(item):
+        value = getattr(item, name)
         if named(value):
             memory[name] = {"part": state_of(value, arrays, grows=grows)}
         elif grows and type(value) is list:
@@ -114,20 +112,20 @@ def state_of(part: object, arrays: list[np.ndarray], *, grows: bool = False) -> 
             try:
                 memory[name] = plain(value, arrays)
             except TypeError as error:
-                mark = part.mark if isinstance(part, WITH_STYLE) else None
-                why = fault(type(part).__name__, f"remembers: {name} is {error}", mark)
+                mark = item.mark if isinstance(item, WITH_STYLE) else None
+                why = fault(type(item).__name__, f"remembers: {name} is {error}", mark)
                 memory[name] = Unwritable(_copied(value), why)
     return memory
 
 
-def give_state(part: object, state: Memory, arrays: list[np.ndarray]) -> None:
-    for name in named(part):
-        kept, present = state.get(name, part), getattr(part, name)
+def give_state(item: object, state: Memory, arrays: list[np.ndarray]) -> None:
+    for name in named(item):
+        kept, present = state.get(name, item), getattr(item, name)
         if isinstance(kept, dict) and "part" in kept:
             if named(present):
                 give_state(present, kept["part"], arrays)
-        elif kept is not part and not named(present):
-            setattr(part, name, value_of(kept, arrays))
+        elif kept is not item and not named(present):
+            setattr(item, name, value_of(kept, arrays))
 
 
 @dataclass
@@ -145,7 +143,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """Copies a Python value that no file can store; holds the warning for it."""
+    """A copy of a value that no file can store, with the warning for it."""
 
     kept: object
     fault: ScriptError
@@ -233,7 +231,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Make the present state the last good one; `forget` the parts at other states."""
+        """Make the present state the last good one; `forget` the states of parts at other steps."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -243,8 +241,8 @@ class RollbackPoint:
 
     def note(self, *, always: bool) -> None:
         step = self.hub.update.step
-        outputs = (part for key, part in parts_of(self.hub) if key[0] in OUTPUTS)
-        if always or any(part.last_step == step for part in outputs):
+        outputs = (item for key, item in parts_of(self.hub) if key[0] in OUTPUTS)
+        if always or any(item.last_step == step for item in outputs):
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
@@ -255,7 +253,7 @@ class RollbackPoint:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps up to `end` with the memory of parts; return the status."""
+        """Repeat the steps up to `end` with the states of parts; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

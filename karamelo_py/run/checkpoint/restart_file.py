@@ -1,8 +1,8 @@
 """Restart files: the whole scene at one time, in HDF5.
 
-Content: arrays as fields declare them, and what parts remember
-(:mod:`karamelo_py.run.checkpoint.parts`). The set-up is not stored: the script repeats it, and a
-file lists the statements executed before.
+They contain arrays as fields declare them, and what parts remember
+(:mod:`karamelo_py.run.checkpoint.parts`). The script repeats the set-up; a file lists the
+statements executed before.
 """
 
 import json
@@ -68,7 +68,6 @@ def path_of(hub: Hub, file: Path) -> Path:
 
 
 def write(hub: Hub, file: Path, *, within: bool) -> Path:
-    """Write the present state, `within` a run or between two; return the path."""
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
     if point and point.halve and point.arrays:
@@ -87,9 +86,9 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
 def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, groups: dict) -> None:
     import h5py
 
-    for _, part in parts_of(hub):
-        if hasattr(part, "filed"):
-            part.filed()
+    for _, item in parts_of(hub):
+        if hasattr(item, "filed"):
+            item.filed()
     interpreter, states = hub.interpreter, {"parts": PartStates.of(hub)}
     if "good" in groups:
         states["good parts"] = point.parts
@@ -115,8 +114,8 @@ def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, grou
         for name, one in states.items():
             if one.arrays:
                 _put(root.create_group(name), wholes({str(k): a for k, a in enumerate(one.arrays)}))
-        for name, found in groups.items():
-            _put(root.create_group(name), found)
+        for name, members in groups.items():
+            _put(root.create_group(name), members)
         root.flush()
         for data in _arrays_in(root):
             data.attrs[CHECKSUM] = _checksum(data, out)
@@ -131,7 +130,7 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
     """Compare checksums of the arrays of points and nodes (`large`), or of the others.
 
-    Several processes divide the arrays.
+    Processes divide the arrays.
     """
     import h5py
 
@@ -181,7 +180,7 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """A file's content; a name with ``*`` means the largest number."""
+    """A file's content; ``*`` in the name means the largest number."""
 
     def __init__(self, path: Path, out: Path | None = None):
         import h5py
@@ -226,7 +225,7 @@ class Restart:
         return before
 
     def replay(self) -> Replay:
-        values = {int(k): found for k, found in self.content["values of statements"]}
+        values = {int(k): value for k, value in self.content["values of statements"]}
         record = Record(self.content["statements"], values)
         return Replay(record, self.content["within"], str(self.path))
 
@@ -305,8 +304,8 @@ def described(hub: Hub) -> dict[str, str]:
         for _, x in solid.pieces():
             where = zlib.crc32(np.ascontiguousarray(x).tobytes(), where)
         law = solid.material.law
-        parts = [part for part in law if isinstance(part, tuple) and hasattr(part, "_fields")]
-        kind = "-".join(type(part).__name__ for part in (law, *parts))
+        parts = [item for item in law if isinstance(item, tuple) and hasattr(item, "_fields")]
+        kind = "-".join(type(item).__name__ for item in (law, *parts))
         words[f"solid '{solid.id}'"] = f"{solid.count} points of {kind}, {where:08x}"
     return words
 

@@ -39,7 +39,6 @@ class AveragedVolumes:
         self.volume[self.volume == 0] = 1.0
 
     def respond(self, dt: float) -> None:
-        """Compute the stresses after the points' increments, and their derivatives."""
         self._grow()
         ratios = self._sums("grown") / self.volume
         for matter, seen, response, averages in self._parts():

@@ -15,7 +15,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
-# Fix hooks in implicit steps; plug-in hooks may run more than once per step.
+# Fix hooks in implicit steps; plug-in hooks may run several times per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_PLUGINS = _MOMENTS[1:]

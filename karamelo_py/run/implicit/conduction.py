@@ -31,9 +31,9 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     flow = sums[nodes, of_force(Line())].astype(float)
     K = equations.conduction()
     holding = [fix for fix in fixes if "post_update_grid_heat" in fix.hooks()]
-    held, temperatures = (of[:, 0] for of in equations.prescribed(holding, 1))
-    free = some & ~held
-    change = np.where(held, temperatures - mapped, 0.0)
+    fixed, temperatures = (of[:, 0] for of in equations.prescribed(holding, 1))
+    free = some & ~fixed
+    change = np.where(fixed, temperatures - mapped, 0.0)
     stored = capacity / dt
     balance = flow + stored * (T - mapped)
     A = (K + sp.diags(stored)).tocsr()
@@ -41,7 +41,7 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
     # Fixes get the temperature without them, and publish the heat they supply.
-    without = new - np.where(held, np.divide(
+    without = new - np.where(fixed, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - T
     take_rows((HOLD,), s, mode, hooks)

@@ -84,7 +84,8 @@ class Contact:
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Return pairs (c,) in contact at the end of the last step; with -1, that stuck."""
+        """Mask (c,) of pairs in contact at the end of the last step; with -1, of those that
+        stuck."""
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
@@ -93,7 +94,7 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and their derivatives.
 
-        `supposed`: contact and sticking are taken from the last step: no displacements are known.
+        If `supposed`, contact and sticking come from the last step: no displacements are known.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -142,11 +143,11 @@ class Contact:
         C = sp.csr_matrix((self.tangent.ravel(), (i, j)), (c * d, c * d))
         return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
-    def held(self, motions: np.ndarray, own: np.ndarray) -> np.ndarray:
-        """Return the constraints (r, k) of closed pairs on rigid `motions` (m, d, k) of nodes."""
+    def constraints(self, motions: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """Constraints (r, k) of closed pairs on rigid `motions` (m, d, k) of nodes."""
         rows = []
         for nodes in (self.first, self.second):
-            chosen = self.close & own[nodes]
+            chosen = self.close & mask[nodes]
             moved = motions[nodes[chosen]]
             rows.append(np.einsum("ci,cik->ck", self.normal[chosen], moved))
             rows.append(moved[self.mu[chosen] > 0].reshape(-1, motions.shape[2]))
@@ -226,5 +227,5 @@ class Contact:
         heat[nodes] = 0
         work = (self.drag * self.slip).sum(1) * ~self.sticks
         share = self.tag.warmth[self.a, self.b]
-        for at, part in ((self.first, share), (self.second, 1 - share)):
-            np.add.at(heat[:, 0], nodes[at], part * work / mass[at])
+        for at, fraction in ((self.first, share), (self.second, 1 - share)):
+            np.add.at(heat[:, 0], nodes[at], fraction * work / mass[at])

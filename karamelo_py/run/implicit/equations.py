@@ -23,7 +23,7 @@ from karamelo_py.scene.modify import Fix
 
 BATCH = 8192  # points per batch of assembly
 MOST_MOVED = 0.5  # cells that nodes may move at once towards others, per cell of distance
-# The second are reused from the step before if the first are the same.
+# The second ones are reused from the previous step if the first are the same.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
@@ -58,10 +58,10 @@ class Equations:
     `nodes` (m,) are in stencils of points: `mass` (m,) is 0 where there are gradients only,
     `places` (m, d) are grid indices, `deforming` (m,) masks nodes of points that deform (`blocks`,
     with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
-    d). `known` is from the step before, or empty.
+    d). `cached` is from the previous step, or empty.
     """
 
-    def __init__(self, s: Setup, mode: Tag, known: dict[str, np.ndarray], stabilised: bool):
+    def __init__(self, s: Setup, mode: Tag, cached: dict[str, np.ndarray], stabilised: bool):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
         self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
@@ -79,13 +79,12 @@ class Equations:
         tools = [(block, self._numbered(seen)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
         self.led, self.velocity_of_rigid = self._led(tools)
-        if all(np.array_equal(vars(self)[name], known.get(name)) for name in FOLLOWED):
-            vars(self).update(known)
+        if all(np.array_equal(vars(self)[name], cached.get(name)) for name in FOLLOWED):
+            vars(self).update(cached)
         self._find_pairs(stabilised)
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
 
-    def known(self) -> dict[str, np.ndarray]:
-        """Return what depends on the nodes alone, for later steps with the same nodes."""
+    def cached(self) -> dict[str, np.ndarray]:
         return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
 
     def _places(self) -> np.ndarray:
@@ -197,11 +196,11 @@ class Equations:
     def furthest(self) -> float:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
-    def furthest_into(self, u: np.ndarray, held: np.ndarray) -> float:
-        """Return the largest move in cells of a node towards others that move differently.
+    def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
+        """Largest move in cells of a node towards others that move differently.
 
         Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
-        held (nodes, d) without points.
+        `fixed` (nodes, d) without points.
         """
         cells = u / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -215,7 +214,7 @@ class Equations:
             number = self.number_of(node)
             other = np.where(number >= 0, cells[number, k], 0.0)
             meets = np.abs(way - other) > MOST_MOVED * (1 + np.abs(shift).max(1))
-            meets &= (number >= 0) | held[node, k]
+            meets &= (number >= 0) | fixed[node, k]
             most = max(most, float(np.abs(way[meets]).max(initial=0.0)))
         return most
 
@@ -228,7 +227,6 @@ class Equations:
         return self._forces()
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return a mask (m, count) of prescribed components, and their values."""
         mask, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
         for fix in fixes:  # the last one decides
             mask_of_fix, value = fix.prescribed(self.nodes, self.positions)
@@ -282,7 +280,6 @@ class Equations:
             self.whole = (self.K.tocsr() + self.averaged.stiffness()).tobsr((d, d))
 
     def conduction(self) -> sp.csr_matrix:
-        """Assemble the conductances (m, m) of the nodes."""
         data = np.zeros(len(self.pairs[1]))
         for block, (seen, _) in zip(self.blocks, self.parts, strict=True):
             conductance = field(block.points.fields, Conductance)
@@ -369,10 +366,10 @@ class Equations:
         return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-        """Return the nodes next to corners along an axis (rows, 3); -1 if not in use."""
+        """Nodes next to corners along an axis (rows, 3); -1 if not in use."""
         shifts = np.array([-1, 0, 1])
         steps = self._steps(g)
         first = self.s.grids.first[g] + (corner * steps).sum(1)
         along = corner[:, axis, None] + shifts
-        found = self.number_of(first[:, None] + shifts * steps[:, axis, None])
-        return np.where(along >= 0, found, -1)
+        numbers = self.number_of(first[:, None] + shifts * steps[:, axis, None])
+        return np.where(along >= 0, numbers, -1)

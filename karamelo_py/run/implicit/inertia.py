@@ -34,10 +34,10 @@ class Rest:
 class Motion:
     """Inertia by the Newmark rules and generalized-alpha.
 
-    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points carry a
-    minus the acceleration of the forces, initially 0: stable with what the transfer to the nodes
-    and back removes. `before` (m, d) are the initial residual forces; `given` and `prescribed` (m,
-    d) mask held components and give their velocities.
+    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points store a
+    minus the acceleration of the forces, initially 0: this is stable with what the transfer to the
+    nodes and back removes. `before` (m, d) are the initial residual forces; `fixed` and
+    `prescribed` (m, d) mask held components and give their velocities.
     """
 
     def __init__(
@@ -46,17 +46,17 @@ class Motion:
         scheme: Tag,
         dt: float,
         before: np.ndarray,
-        given: np.ndarray,
+        fixed: np.ndarray,
         prescribed: np.ndarray,
         contact: Contact | None,
     ):
         self.equations, self.scheme, self.dt = equations, scheme, dt
-        self.before, self.given, self.prescribed = before, given, prescribed
+        self.before, self.fixed, self.prescribed = before, fixed, prescribed
         self.mass = equations.mass[:, None]
         self.inverse = np.divide(1, self.mass, out=np.zeros_like(self.mass), where=self.mass > 0)
         self.v = self._means([block.points.v for block in equations.blocks])
         self.a = self.of_forces = before * self.inverse
-        self.contact, self.movable = contact, np.where(given, 0.0, self.inverse)
+        self.contact, self.movable = contact, np.where(fixed, 0.0, self.inverse)
         if contact is not None:
             self.a = contact.accelerated(self.a, self.v, self.movable)
         if scheme.rule == "euler":
@@ -74,22 +74,22 @@ class Motion:
     def _means(self, values: list[np.ndarray]) -> np.ndarray:
         equations = self.equations
         total = np.zeros((len(equations.nodes), equations.d))
-        for block, (seen, _), own in zip(equations.blocks, equations.parts, values, strict=True):
-            scatter(seen, block.points.mass, own, total)
+        for block, (seen, _), terms in zip(equations.blocks, equations.parts, values, strict=True):
+            scatter(seen, block.points.mass, terms, total)
         return total * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
         free = (u - self.dt * self.v) / (self.beta * self.dt**2) - self.rest * self.a
-        return np.where(self.given, (self.prescribed - self.v) / self.dt, free)
+        return np.where(self.fixed, (self.prescribed - self.v) / self.dt, free)
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         """Add inertia to the residual forces (m, d)."""
         a = self.acceleration(u)
         # Reactions are those at the end of the step.
-        return forces - self.mass * np.where(self.given, a, self._demand(a))
+        return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Return the forces per mass (m, d) that balance accelerations at the end."""
+        """Forces per mass (m, d) that balance accelerations at the end of the step."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 
@@ -97,20 +97,20 @@ class Motion:
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Return the work at held nodes, by the mean of their forces (m, d) in the step.
+        """Work at held nodes, by the mean of their forces (m, d) in the step.
 
-        As the trapezoidal rule adds it to a linear body's energy.
+        The trapezoidal rule adds this work to a linear body's energy.
         """
-        old, new, given = self.v, self.prescribed, self.given
+        old, new, fixed = self.v, self.prescribed, self.fixed
         after = self.mass * self.acceleration(u) - reaction
         moving = 0.5 * self.mass * (new - old) * (new + old)
-        return float(np.sum((moving - 0.5 * u * (self.before + after))[given]))
+        return float(np.sum((moving - 0.5 * u * (self.before + after))[fixed]))
 
     def end(self, u: np.ndarray) -> None:
         dt, gamma = self.dt, self.gamma
         a = self.acceleration(u)
         free = self.v + dt * ((1 - gamma) * self.a + gamma * a)
-        new = np.where(self.given, self.prescribed, free)
+        new = np.where(self.fixed, self.prescribed, free)
         if self.contact is not None:
             new = self.contact.stopped(new, self.movable)
         kept = flip_coefficient(self.equations.s.transfer)
@@ -118,7 +118,7 @@ class Motion:
         for block, (seen, _), old in parts:
             block.points.v[:] = kept * old
             gather(seen, new - kept * self.v, block.points.v)
-        more = np.where(self.given, 0.0, a - self._demand(a))
+        more = np.where(self.fixed, 0.0, a - self._demand(a))
         for (seen, _), surplus in zip(self.equations.parts, self.surplus, strict=False):
             surplus[:] = 0
             gather(seen, more, surplus)

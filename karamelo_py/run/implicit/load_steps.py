@@ -48,7 +48,7 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
-        self.known: dict[str, np.ndarray] = {}  # of the last equations
+        self.cached: dict[str, np.ndarray] = {}  # of the last equations
         self.parts = 0  # substeps done of the present step
         self.failure = ""  # why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; so far
@@ -79,7 +79,7 @@ class LoadSteps:
                 return SORT
         return DONE
 
-    def held(self) -> np.ndarray:
+    def fixed_nodes(self) -> np.ndarray:
         mask = np.zeros(
             (self.simulation.hub.fields.node_count, self.simulation.setup.kin.dimension), bool
         )
@@ -217,7 +217,7 @@ class LoadSteps:
     def _conduct(self, hooks: Tag, dt: float) -> None:
         s, mode = self.simulation.setup, self.simulation.mode
         try:
-            conduct(Equations(s, mode, self.known, False), hooks, self.simulation.fixes.acting, dt)
+            conduct(Equations(s, mode, self.cached, False), hooks, self.simulation.fixes.acting, dt)
         except Singular:
             raise self._error(
                 "temperatures have no solution: something conducts no finite heat",
@@ -249,32 +249,32 @@ class LoadSteps:
         simulation = self.simulation
         s = simulation.setup
         with counted(self.seconds, "layout"):
-            equations = Equations(s, simulation.mode, self.known, self.scheme.stabilisation > 0)
+            equations = Equations(s, simulation.mode, self.cached, self.scheme.stabilisation > 0)
         nodes = equations.nodes
         external = after[nodes] + equations.present_forces()
         self._check_numbers(external, "a node gets a force that is not a number")
         fixed, velocities = self._prescribed(equations)
         led = equations.led[:, None]
-        held = fixed | led
+        bound = fixed | led
         velocities = np.where(led, equations.velocity_of_rigid, velocities)
         if self.moduli is None:
             self.moduli = equations.moduli()
         separate = isinstance(s.contact, SeparateFields)
         contact = Contact(equations, self.moduli.of_grids) if separate else None
         if not self.dynamic:
-            self._check_held(equations, held, contact)
+            self._check_held(equations, bound, contact)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
-            inertia = Motion(equations, self.scheme, dt, before[nodes], held, velocities, contact)
+            inertia = Motion(equations, self.scheme, dt, before[nodes], bound, velocities, contact)
         tools = [fix for fix in simulation.hub.fixes.values() if fix.follows_points]
         pushing = [*([] if contact is None else [contact])]
         pushing += [PushingTool(fix, equations, simulation) for fix in tools]
-        more = self.seconds, self.held
-        newton = Newton(self.scheme, equations, ~held, inertia, pushing, external, dt, *more)
+        more = self.seconds, self.fixed_nodes
+        newton = Newton(self.scheme, equations, ~bound, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
         try:
-            jump = np.where(held, velocities * dt, 0.0)
+            jump = np.where(bound, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
         except Loose as reason:
             where = ", ".join(f"{x:.4g}" for x in equations.positions[int(reason.at)])
@@ -294,8 +294,8 @@ class LoadSteps:
                 hint="a small imperfection, or scheme(newmark), shows where it goes",
             )
         release(newton.kept)
-        self.known = equations.known()
-        self.unknowns = int(np.count_nonzero(~held))
+        self.cached = equations.cached()
+        self.unknowns = int(np.count_nonzero(~bound))
         self.corrections += iterations
         reaction = newton.reaction(u)
         return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
@@ -325,8 +325,8 @@ class LoadSteps:
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
         mass = result.equations.mass[:, None]
         v = result.u / dt
-        held = result.fixed & (mass > 0)
-        without = np.where(held, -result.reaction * dt / np.where(held, mass, 1.0), 0.0)
+        bound = result.fixed & (mass > 0)
+        without = np.where(bound, -result.reaction * dt / np.where(bound, mass, 1.0), 0.0)
         change = of_change(s.kin)
         update[nodes, :d] = v + without
         update[nodes, change : change + d] = without
@@ -366,7 +366,7 @@ class LoadSteps:
             if fixed[nodes].all() or not motions.shape[2]:
                 continue
             if contact is not None:
-                rows = np.concatenate([rows, contact.held(motions, nodes)])
+                rows = np.concatenate([rows, contact.constraints(motions, nodes)])
             if np.linalg.matrix_rank(rows) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
@@ -385,11 +385,11 @@ class LoadSteps:
 
     def refuse_all_loose(self) -> None:
         """Refuse, before any step, a scene in which fixes hold no node near points."""
-        s, held = self.simulation.setup, np.any(self.held(), axis=1)
+        s, bound = self.simulation.setup, np.any(self.fixed_nodes(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         can_move = free_from(s.kin) < s.kin.dimension
         moves = can_move and not (self.dynamic or rigid)
-        if moves and not any(held[a:b].any() for a, b in used(s.spans)[1:]):
+        if moves and not any(bound[a:b].any() for a, b in used(s.spans)[1:]):
             raise self._loose(next(iter(self.simulation.hub.solids)), "is held by nothing")
 
     def _solid_at(self, equations: Equations, chosen: np.ndarray) -> str:
@@ -437,4 +437,4 @@ class ImplicitSimulation(Simulation):
         return self.load_steps.advance(hooks, count)
 
     def compile(self) -> None:
-        """Nothing: Newton's method calls kernels one by one."""
+        """Do nothing: Newton's method calls kernels one by one."""

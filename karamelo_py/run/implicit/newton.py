@@ -56,8 +56,8 @@ class Newton:
     """The balance of forces after displacements, and its solution.
 
     `free` (m, d) masks the unknown components, `external` (m, d) are all forces but internal ones,
-    `pushing` are contact and tools. `seconds` takes the time of the stages stress, assembly and
-    solution; `held` returns the components (nodes, d) that fixes hold.
+    `pushing` are contact and tools. `seconds` collects the time of the stages stress, assembly and
+    solution; `fixed` returns the components (nodes, d) that fixes hold.
     """
 
     def __init__(
@@ -70,11 +70,11 @@ class Newton:
         external: np.ndarray,
         dt: float,
         seconds: dict[str, float],
-        held: Callable[[], np.ndarray],
+        fixed: Callable[[], np.ndarray],
     ):
         self.scheme, self.equations, self.inertia = scheme, equations, inertia
         self.pushing, self.external = pushing, external
-        self.dt, self.seconds, self.held = dt, seconds, held
+        self.dt, self.seconds, self.fixed = dt, seconds, fixed
         self.free = free
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
@@ -123,7 +123,7 @@ class Newton:
 
     @property
     def unstable(self) -> bool:
-        """True if the solver found the last stiffness not positive definite."""
+        """Return True if the solver found the last stiffness not positive definite."""
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
@@ -158,8 +158,8 @@ class Newton:
         accuracy = max(1e-10, min(1e-4, 0.1 * residual))
         try:
             with counted(self.seconds, "solution"):
-                own = rigid.reshape(len(b), -1), accuracy, self.kept
-                x = solvers.solve(self.scheme.solver, A, b, *own).reshape(free.shape)
+                options = rigid.reshape(len(b), -1), accuracy, self.kept
+                x = solvers.solve(self.scheme.solver, A, b, *options).reshape(free.shape)
         except solvers.Singular:
             raise Loose(SINGULAR, self._loosest(A)) from None
         except solvers.Unconverged:
@@ -207,6 +207,6 @@ class Newton:
         if far <= MOST_MOVED or not equations.s.frame.moves:
             return
         if not self.pushing:  # contact only uses the present surfaces
-            far = min(far, equations.furthest_into(u, self.held()))
+            far = min(far, equations.furthest_into(u, self.fixed()))
         if far > MOST_MOVED:
             raise TooFar(f"points would go {far:.3g} cells at once", far / MOST_MOVED)

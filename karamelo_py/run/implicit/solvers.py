@@ -23,14 +23,14 @@ class Unconverged(Exception):
     """Multigrid leaves more than 1 % of the residual."""
 
 
-def hold(A: sp.bsr_matrix, held: np.ndarray, more: np.ndarray) -> None:
-    """Decouple the `held` components (m, d) of a matrix; add `more` (m,) to the others."""
-    rows = np.repeat(np.arange(len(held)), np.diff(A.indptr))
-    some = np.any(held, axis=1)
+def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
+    """Decouple the `fixed` components (m, d) of a matrix; add `more` (m,) to the others."""
+    rows = np.repeat(np.arange(len(fixed)), np.diff(A.indptr))
+    some = np.any(fixed, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
-    A.data[at] *= ~(held[rows[at]][:, :, None] | held[A.indices[at]][:, None, :])
-    diagonal, i = np.flatnonzero(rows == A.indices), np.arange(held.shape[1])
-    A.data[diagonal[:, None], i, i] += np.where(held, 1.0, more[:, None])[rows[diagonal]]
+    A.data[at] *= ~(fixed[rows[at]][:, :, None] | fixed[A.indices[at]][:, None, :])
+    diagonal, i = np.flatnonzero(rows == A.indices), np.arange(fixed.shape[1])
+    A.data[diagonal[:, None], i, i] += np.where(fixed, 1.0, more[:, None])[rows[diagonal]]
 
 
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
@@ -128,7 +128,6 @@ def is_symmetric(A: sp.spmatrix) -> bool:
 
 @contextmanager
 def from_one_seed() -> Iterator[None]:
-    """Seed the random numbers by which pyamg guesses eigenvectors."""
     state = np.random.get_state()
     np.random.seed(0)
     try:

@@ -30,18 +30,18 @@ class PushingTool:
         rows, columns, weights = [], [], []
         pairs = zip(equations.blocks, equations.parts, strict=True)
         seen_by = {id(block): seen for block, (seen, _) in pairs}
-        for part in self.view._rows.parts:
-            if id(part.block) in seen_by:  # others are rigid
-                seen = seen_by[id(part.block)]
-                rows.append(np.repeat(part.places, seen.nodes.shape[1]))
-                columns.append(seen.nodes[part.rows].ravel())
-                weights.append(seen.weights[part.rows].ravel())
+        for piece in self.view._rows.parts:
+            if id(piece.block) in seen_by:  # others are rigid
+                seen = seen_by[id(piece.block)]
+                rows.append(np.repeat(piece.places, seen.nodes.shape[1]))
+                columns.append(seen.nodes[piece.rows].ravel())
+                weights.append(seen.weights[piece.rows].ravel())
         at = np.concatenate(rows), np.concatenate(columns)
         shape = len(self.view.ids), len(equations.nodes)
         self.gather = sp.csr_matrix((np.concatenate(weights), at), shape)
         self.gather_all = equations.for_all_components(self.gather)
         self.way = np.zeros((shape[0], self.d))
-        self.known = self.force = self.at(self.way)  # included in the forces of the step
+        self.included = self.force = self.at(self.way)  # included in the forces of the step
 
     def at(self, way: np.ndarray) -> np.ndarray:
         """Return forces (n, d) on points displaced by `way` (n, d)."""
@@ -52,7 +52,7 @@ class PushingTool:
         self.force = self.at(self.way)
 
     def forces(self) -> np.ndarray:
-        return self.gather.T @ (self.force - self.known)
+        return self.gather.T @ (self.force - self.included)
 
     def matrix(self) -> sp.bsr_matrix:
         """Return the stiffness (m d, m d) of the forces, by central differences."""
@@ -66,6 +66,6 @@ class PushingTool:
     def publish(self) -> None:
         """Publish the force; apply the mean, which has done the work, to the points."""
         self.force = self.at(self.way)
-        self.view.force = self.view.force + (self.force - self.known) / 2
+        self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()
         self.fix.publish_components(self.view.total(self.force))

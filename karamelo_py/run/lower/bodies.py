@@ -30,15 +30,15 @@ APART = 1e-3  # cells between a point and its place in a rigid body: round-off i
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
     moving = bodies_of(hub)
     _refuse(hub, moving)
-    held = np.zeros(
+    fixed = np.zeros(
         (sum(lattice.node_count for lattice in lattices), hub.domain.dimension), np.bool_
     )
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas) if fix.prescribes_velocity else ():
             if formula is not None:
-                held[slice(None) if fix.group.all else fix.nodes, k] = True
+                fixed[slice(None) if fix.group.all else fix.nodes, k] = True
     kind = kernel.FreeBodies if hub.update.method.fields_per_solid else kernel.BodiesAtPoints
-    return kind(tuple(_body(hub, fix, len(held)) for fix in moving), held)
+    return kind(tuple(_body(hub, fix, len(fixed)) for fix in moving), fixed)
 
 
 def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
@@ -96,7 +96,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
     """Refuse bodies whose points are not where the state of the fix has them.
 
-    Warns of rigid solids that rotate without a fix: their points fly straight on.
+    Warn of rigid solids that rotate without a fix: their points fly straight on.
     """
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     x, v = np.full((2, count, d), np.nan)  # of deleted points

@@ -77,8 +77,8 @@ def check_scene(hub: Hub) -> None:
         (hub.solids or None, "there is no solid to move",
          "solid(ID, region, regionID, points per cell, material, h, T0)"),
     )  # fmt: skip
-    for part, message, command in missing:
-        if part is None:
+    for item, message, command in missing:
+        if item is None:
             raise ScriptError(message, hint=f"put {command} before run")
     method = hub.update.method
     try:

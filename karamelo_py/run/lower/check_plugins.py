@@ -39,12 +39,12 @@ def try_parts(hub: Hub, setup: Setup) -> None:
     if registry.is_foreign(type(setup.basis)):
         _try_basis(hub, setup)
     if registry.is_foreign(type(setup.transfer)):
-        part = _part_of(hub, [type(setup.transfer)])
+        plugin = _part_of(hub, [type(setup.transfer)])
         v = vector(setup.kin, (_one(setup),) * setup.kin.dimension)
-        with _trial(hub, part):
+        with _trial(hub, plugin):
             result = updated_velocity(setup.transfer, v, v, v)
-            _expect(part, updated_velocity, result, len(v))
-            _numbers(part, "updated_velocity", result, v[0])
+            _expect(plugin, updated_velocity, result, len(v))
+            _numbers(plugin, "updated_velocity", result, v[0])
     for fix in hub.fixes.values():
         for moment, hook in fix.hooks().items():
             if isinstance(hook, CompiledHook) and hook.tag is not None and not hook.internal:
@@ -58,8 +58,8 @@ def _samples(setup: Setup, fix: Fix, hook: CompiledHook) -> Iterator[tuple]:
         return
     for points, table, _ in setup.blocks:
         for p in np.flatnonzero(fix.group.has(points.id))[:1]:
-            what = WholePoints(tag, points.id, kin, points, table, points.x[0], ())
-            yield what, *state_at(kin, points, table, p), p
+            args = WholePoints(tag, points.id, kin, points, table, points.x[0], ())
+            yield args, *state_at(kin, points, table, p), p
 
 
 def _one_node(setup: Setup) -> Nodes:
@@ -68,12 +68,12 @@ def _one_node(setup: Setup) -> Nodes:
 
 
 def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
-    part = PartInUse(f"fix {fix.style}", type(fix), fix.mark)
+    plugin = PartInUse(f"fix {fix.style}", type(fix), fix.mark)
     says = f"{moment}: {hook.function.__name__} has to return "
     values = (1.0,) * len(fix.formulas)
     for sample, law, state, p in _samples(setup, fix, hook):
         with (
-            as_script_error(part.name, moment, hook.function, fix.mark),
+            as_script_error(plugin.name, moment, hook.function, fix.mark),
             np.errstate(all="ignore"),
         ):
             try:
@@ -83,20 +83,20 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
         expected = len(hook.writes) + hook.publishes
         if not isinstance(result, tuple) or len(result) != expected:
             got = len(result) if isinstance(result, tuple) else repr(result)
-            raise fault(part.name, f"{says}{expected} results, not {got}", part.mark)
+            raise fault(plugin.name, f"{says}{expected} results, not {got}", plugin.mark)
         for item, new in zip(hook.writes, result, strict=False):
             size = item.shape(setup.kin) if isinstance(item, type) else setup.kin.dimension
             if (got := len(flat((new,)))) != size:
                 name = item.__name__ if isinstance(item, type) else item
                 message = f"{says}{plural(size, 'number')} for {name}, not {got}"
-                raise fault(part.name, message, part.mark)
+                raise fault(plugin.name, message, plugin.mark)
         if hook.publishes and len(flat(result[-1:])) > len(fix.published):
             message = f"{says}as many totals as published has names, {len(fix.published)}"
-            raise fault(part.name, message, part.mark)
+            raise fault(plugin.name, message, plugin.mark)
 
 
 def _part_of(hub: Hub, kinds: Iterable[type]) -> PartInUse | None:
-    return next((part for part in foreign_parts(hub) if part.kind in kinds), None)
+    return next((plugin for plugin in foreign_parts(hub) if plugin.kind in kinds), None)
 
 
 def _one(setup: Setup) -> Number:
@@ -104,9 +104,9 @@ def _one(setup: Setup) -> Number:
 
 
 @contextmanager
-def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
+def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
     """Report faults, except numbers that are invalid for the sample point only."""
-    with attributed(hub, part), np.errstate(all="ignore"):
+    with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield
         except ArithmeticError:
@@ -116,25 +116,27 @@ def _trial(hub: Hub, part: PartInUse) -> Iterator[None]:
                 raise
 
 
-def _expect(part: PartInUse, function: Tag, value: object, count: int, kind: type = tuple) -> None:
+def _expect(
+    plugin: PartInUse, function: Tag, value: object, count: int, kind: type = tuple
+) -> None:
     if not (isinstance(value, kind) and len(value) == count):
-        at = place_of(function.find((part.kind,))) if function.defined(part.kind) else ""
+        at = place_of(function.find((plugin.kind,))) if function.defined(plugin.kind) else ""
         expected = "tuple" if kind is tuple else "symmetric tensor"
         got = type(value).__name__ + (f" of {len(value)}" if isinstance(value, tuple) else "")
         message = f"{function.__name__} has to return a {expected} of {count}, not a {got}{at}"
-        raise fault(part.name, message, part.mark)
+        raise fault(plugin.name, message, plugin.mark)
 
 
-def _numbers(part: PartInUse, name: str, values: Iterable, one: Number) -> None:
+def _numbers(plugin: PartInUse, name: str, values: Iterable, one: Number) -> None:
     for number in values:
         if not isinstance(number, (int, float, np.number)):
-            raise fault(part.name, f"{name} is {number!r} for some point, no number", part.mark)
+            raise fault(plugin.name, f"{name} is {number!r} for some point, no number", plugin.mark)
         if not np.isfinite(number):
-            raise fault(part.name, f"{name} is {number} for some point", part.mark)
+            raise fault(plugin.name, f"{name} is {number} for some point", plugin.mark)
         if isinstance(number, np.float64) and type(one) is not np.float64:
             message = f"{name} is a double (float64) in a run of precision(single): its author "
             message += "makes numbers of those that it is given, as in real(0.5, x)"
-            raise fault(part.name, message, part.mark)
+            raise fault(plugin.name, message, plugin.mark)
 
 
 def try_law(
@@ -144,32 +146,36 @@ def try_law(
     kinds = laws.law_kind(material.law)
     if not any(map(registry.is_foreign, kinds)):
         return
-    part = _part_of(hub, kinds) or PartInUse(f"material {material.style}", kinds[0], material.mark)
+    plugin = _part_of(hub, kinds) or PartInUse(
+        f"material {material.style}", kinds[0], material.mark
+    )
     law = law_in(law or law_on(material.law, 1.0, 293.0), type(one))
     kin = kin or KINEMATICS[hub.domain.dimension if hub.domain else 3]()
     for strain in STRAINS:
         dl = (type(one)(strain),) * kin.tensor_size
-        with _trial(hub, part):
+        with _trial(hub, plugin):
             state = laws.initial_state(law, kin, one)
-            _try_flow_stress(part, law, state, one * strain)
+            _try_flow_stress(plugin, law, state, one * strain)
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
                 message = f"what a point remembers is {len(flat(state))} numbers at first and "
                 message += f"{len(flat(after))} after a step: their number must not change"
-                raise fault(part.name, message, part.mark)
-            _numbers(part, f"what a point remembers after a strain of {strain:g}", flat(after), one)
+                raise fault(plugin.name, message, plugin.mark)
+            _numbers(
+                plugin, f"what a point remembers after a strain of {strain:g}", flat(after), one
+            )
             for function in (*TENSORS, *NUMBERS):
                 result = function(law, kin, after)
                 if function in TENSORS:
-                    _expect(part, function, result, len(kin.Symmetric.places), kin.Symmetric)
+                    _expect(plugin, function, result, len(kin.Symmetric.places), kin.Symmetric)
                 name = f"{function.__name__} after a strain of {strain:g}"
-                _numbers(part, name, flat((result,)), one)
+                _numbers(plugin, name, flat((result,)), one)
             laws.specific_volume(law)
             for of in laws.columns_of(law).values():
                 laws.shown(of, law, kin, after)
 
 
-def _try_flow_stress(part: PartInUse, law: Tag, state: tuple, strain: Number) -> None:
+def _try_flow_stress(plugin: PartInUse, law: Tag, state: tuple, strain: Number) -> None:
     strength = parameter(law, "strength")
     kind = type(strength)
     if not (registry.is_foreign(kind) and hardening.flow_stress.defined(kind)):
@@ -177,25 +183,27 @@ def _try_flow_stress(part: PartInUse, law: Tag, state: tuple, strain: Number) ->
     memory, heat, dt = state.m.strength, state.m.heat, strain / strain if strain else 1
     before = hardening.before_flow(strength, memory, heat)
     result = hardening.flow_stress(strength, before, strain, dt)
-    _expect(part, hardening.flow_stress, result, 2)
-    _numbers(part, f"flow_stress, or its slope, at a plastic strain of {strain:g}", result, strain)
+    _expect(plugin, hardening.flow_stress, result, 2)
+    _numbers(
+        plugin, f"flow_stress, or its slope, at a plastic strain of {strain:g}", result, strain
+    )
     if shear_response.find((kind,)) is hardening.radial_return:
         after = hardening.updated_memory(strength, memory, strain, dt)
-        _expect(part, hardening.updated_memory, after, len(memory))
+        _expect(plugin, hardening.updated_memory, after, len(memory))
         if memory[1:] and not hardening.updated_memory.defined(kind):
-            what = f"{', '.join(memory._fields[1:])} would never change: it has no updated_memory"
-            raise fault(part.name, what, part.mark)
+            args = f"{', '.join(memory._fields[1:])} would never change: it has no updated_memory"
+            raise fault(plugin.name, args, plugin.mark)
 
 
 def _try_basis(hub: Hub, setup: Setup) -> None:
     basis, points = setup.basis, setup.blocks[0].points
-    part = _part_of(hub, [type(basis)])
+    plugin = _part_of(hub, [type(basis)])
     for p in range(0, len(points.id), 1 + len(points.id) // TRIED):
-        with _trial(hub, part):
-            _try_functions(part, setup, points, p)
+        with _trial(hub, plugin):
+            _try_functions(plugin, setup, points, p)
 
 
-def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> None:
+def _try_functions(plugin: PartInUse, setup: Setup, points: Points, p: int) -> None:
     """Check at a point that basis functions sum to 1 and their gradients to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
@@ -203,22 +211,22 @@ def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> Non
     line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
     if line is not None:
         if not all(hasattr(line, name) for name in Along._fields):
-            raise fault(part.name, "along has to return an Along", part.mark)
+            raise fault(plugin.name, "along has to return an Along", plugin.mark)
         for name in ("weights", "gradients", "affine"):
             got = len(getattr(line, name))
             if got != basis.line_nodes and (got or name != "affine"):
                 message = (
                     f"along has to return {basis.line_nodes} {name}, not {got}: register says so"
                 )
-                raise fault(part.name, message, part.mark)
+                raise fault(plugin.name, message, plugin.mark)
     stencil = locate(basis, kin, grid, at)
     weights, slopes = [], []
     for k in range(support(basis, kin)):
         _, weight, slope = entry(basis, kin, grid, stencil, k)
         weights.append(weight)
         slopes.append(tuple(slope)[: kin.dimension])
-    _numbers(part, "a weight", weights, one)
-    _numbers(part, "a gradient", flat(slopes), one)
+    _numbers(plugin, "a weight", weights, one)
+    _numbers(plugin, "a gradient", flat(slopes), one)
     rounding = 1e3 * len(weights) * np.finfo(type(one)).eps
     for message, total, wanted in (
         ("weights", sum(weights), 1),
@@ -227,4 +235,4 @@ def _try_functions(part: PartInUse, setup: Setup, points: Points, p: int) -> Non
         if abs(total - wanted) > rounding:
             x = ", ".join(f"{c:g}" for c in at[: kin.dimension])
             message = f"the {message} of a point at {x} add up to {total:.6g}, not to {wanted}"
-            raise fault(part.name, message, part.mark)
+            raise fault(plugin.name, message, plugin.mark)

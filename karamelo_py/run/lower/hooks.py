@@ -133,7 +133,6 @@ class _Builder:
             self.loaded_nodes = self.hub.fields.node_count
 
     def shared_nodes(self) -> int:
-        """Return the number of nodes if several hooks hold the same ones; else 0."""
         fixes = self.holding
         if len(fixes) < 2:
             return 0
@@ -181,11 +180,9 @@ class ActingFixes:
 
     @property
     def tag(self) -> "ActingFixes | arrays.Hooks | arrays.NoHooks":
-        """Tag of a step: the compiled hooks, or all if some are in Python."""
         return self if self.in_python else self.compiled
 
     def called(self) -> called.CalledHooks | None:
-        """Return hooks that compiled steps call; None if one moves a point or acts elsewhere."""
         acting = [fix for fix, _ in self.in_python.get(INITIAL_INTEGRATE, ())]
         elsewhere = len(self.in_python) > 1 or not all(fix.point_by_point for fix in acting)
         if INTERPRETED or not acting or elsewhere or self.simulation.comm.size > 1:
@@ -225,8 +222,8 @@ def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | N
 def _agree(simulation: SceneState, fix: Fix) -> None:
     values = simulation.hub.values
     names = (f"{fix.id}_{name}" if name else fix.id for name in fix.published)
-    own = {name: values.get(name) for name in names if name in values}
-    first, *others = simulation.comm.everyone("its end", own)
+    published = {name: values.get(name) for name in names if name in values}
+    first, *others = simulation.comm.everyone("its end", published)
     for other in others:
         name = next((name for name in first if repr(first[name]) != repr(other[name])), None)
         if name is not None:

@@ -28,11 +28,10 @@ THERE = 1  # bytes per point of the whole scene, in `present`
 class MemoryTaken(NamedTuple):
     touched: int
     copied: int  # of the last good state, present positions only
-    known: int  # of the whole scene, to each process
+    common: int  # of the whole scene, to each process
 
 
 def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTaken:
-    """Return the memory of the points in the tiles of `s`, used nodes, and `boxes` bytes."""
     counts = [int(occupied(block.tiling)[1].sum()) for block in s.blocks]
     of_point = [{name: size for name, _, size in point_fields(block)} for block in s.blocks]
     points = sum(sum(of.values()) * n for of, n in zip(of_point, counts, strict=True))
@@ -40,10 +39,10 @@ def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTake
     nodes = sum(bytes_in(used(s.spans)[1:], array) for _, array in node_fields(simulation.setup))
     of_fixes = simulation.hooks
     hooks = of_fixes.x0.nbytes + of_fixes.members.nbytes if isinstance(of_fixes, Hooks) else 0
-    return MemoryTaken(points + nodes + boxes, points - moved, known(simulation.hub) + hooks)
+    return MemoryTaken(points + nodes + boxes, points - moved, common(simulation.hub) + hooks)
 
 
-def known(hub: Hub) -> int:
+def common(hub: Hub) -> int:
     seen = {id(hub)}
     members = (member for all in (hub.solids, hub.regions, hub.groups) for member in all.values())
     deleted = THERE * sum(solid.count for solid in hub.solids.values())
@@ -64,7 +63,7 @@ def _held(item: object, seen: set[int]) -> int:
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
-    """Return the bytes of array rows in ascending spans (k, 2).
+    """Bytes of array rows in ascending spans (k, 2).
 
     For large arrays Linux uses pages of 2 MiB, which include gaps between used nodes.
     """
@@ -132,12 +131,12 @@ def check_room(hub: Hub, *, copied: bool) -> None:
     raise error
 
 
-def _ways(hub: Hub, need: float, there: float, copied: bool) -> str:
+def _ways(hub: Hub, need: float, free: float, copied: bool) -> str:
     # Bytes scale with that power of the cells per side; two digits, rounded up.
-    larger = ceil(10 * (need / max(there, 1.0)) ** (1 / hub.domain.dimension)) / 10
+    larger = ceil(10 * (need / max(free, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)
-    if hub.settings.precision == "double" and single < there:
+    if hub.settings.precision == "double" and single < free:
         ways.append(f"precision(single), which needs at least {in_words(single)}")
     ways.append("processes on several machines (mpiexec), which divide the points")
     return "; ".join(ways)
@@ -173,12 +172,12 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
     of_grid = nodes > count
-    found = ScriptError(
+    refusal = ScriptError(
         f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
         f"memory: {str(error) or 'the system gives no more'}",
         mark=hub.domain.mark if of_grid else largest(hub).mark,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
         code="memory",
     )
-    found.command = "dimension" if of_grid else "solid"
-    return found
+    refusal.command = "dimension" if of_grid else "solid"
+    return refusal

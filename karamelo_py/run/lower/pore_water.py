@@ -40,7 +40,7 @@ class PoreWater(NamedTuple):
 
     @property
     def stiffness(self) -> float:
-        """Of the water in the pores, per strain."""
+        """Stiffness of the water in the pores, per strain."""
         return self.K / self.n
 
     def heavier(self, dry: float) -> float:
@@ -48,7 +48,7 @@ class PoreWater(NamedTuple):
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
-        """Say whether a solid is drained in a time, across its shortest side."""
+        """Name the drainage of a solid in a time, across its shortest side."""
         law, kin = solid.material.whole, Space()
         M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag
@@ -62,5 +62,5 @@ class PoreWater(NamedTuple):
         return f"Tv = {Tv:.2g} across the shortest side of '{solid.id}', {state}"
 
     def set_pressure(self, points: PointsView, pressure: np.ndarray) -> None:
-        """Set the pressure (n,) of the water of points; the dry ones are unaffected."""
+        """Set the pressure (n,) of the water of points; dry ones are unaffected."""
         points.impose(rows.impose_pore_pressure, pressure, Saturated)

@@ -47,10 +47,10 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]
     corner = places.min(axis=0)
-    held = np.zeros(places.max(axis=0) - corner + 1, np.bool_)
-    held[tuple((places - corner).T)] = True
+    fixed = np.zeros(places.max(axis=0) - corner + 1, np.bool_)
+    fixed[tuple((places - corner).T)] = True
     for k in range(d):
-        face = np.moveaxis(held, k, 0)
+        face = np.moveaxis(fixed, k, 0)
         for axis in range(1, d):
             face = np.moveaxis(face, axis, 0)
             face = np.moveaxis(face[:-1] & face[1:], 0, axis)

@@ -74,8 +74,8 @@ class MpiComm(SerialComm):
             raise Quit
 
     def agree(self, word: int, patience: float = inf) -> np.ndarray | None:
-        own, words = np.array([word], np.int64), np.empty(self.size, np.int64)
-        request = self._aside.Iallgather(own, words)
+        word_sent, words = np.array([word], np.int64), np.empty(self.size, np.int64)
+        request = self._aside.Iallgather(word_sent, words)
         end = time.monotonic() + patience
         while not request.Test():
             if time.monotonic() > end:
@@ -92,18 +92,18 @@ class MpiComm(SerialComm):
     def allgather(self, thing: T) -> list[T]:
         return self.world.allgather(thing)
 
-    def gather_rows(self, own: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        self.world.Gatherv(own, (out, counts) if self.leads else None)
+    def gather_rows(self, rows: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        self.world.Gatherv(rows, (out, counts) if self.leads else None)
 
     def scatter(self, things: Sequence | None) -> Any:
         return self.world.scatter(things)
 
     def exchange(self, things: dict[int, Any]) -> dict[int, Any]:
         sent = [self.world.isend(thing, rank) for rank, thing in things.items()]
-        found = {rank: self.world.recv(source=rank) for rank in things}
+        received = {rank: self.world.recv(source=rank) for rank in things}
         for one in sent:
             one.wait()
-        return found
+        return received
 
     def alltoall(self, numbers: np.ndarray) -> np.ndarray:
         out = np.empty_like(numbers)
@@ -129,9 +129,9 @@ class MpiComm(SerialComm):
         if not self.leads:
             act()
 
-    def connect(self, given: list[RankArray], taken: list[RankArray]) -> Any:
+    def connect(self, sent: list[RankArray], taken: list[RankArray]) -> Any:
         requests = [self._between.Recv_init(array, rank) for rank, array in taken]
-        return requests + [self._between.Send_init(array, rank) for rank, array in given]
+        return requests + [self._between.Send_init(array, rank) for rank, array in sent]
 
     def start(self, link: list) -> None:
         self.mpi.Prequest.Startall(link)

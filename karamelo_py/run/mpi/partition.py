@@ -41,12 +41,12 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
-    part = np.zeros(len(work), np.int64)
+    share = np.zeros(len(work), np.int64)
     left = [(np.arange(len(work)), 0, parts)]
     while left:
         tiles, first, count = left.pop()
         if count == 1:
-            part[tiles] = first
+            share[tiles] = first
             continue
         busy = places[tiles[work[tiles] > 0]]
         lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
@@ -58,7 +58,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
         # A tile goes to the part with its middle.
         cut = np.searchsorted(ends - 0.5 * work[tiles], ends[-1:].sum() * (half / count))
         left += [(tiles[:cut], first, half), (tiles[cut:], first + half, count - half)]
-    return part
+    return share
 
 
 IMBALANCE = 1.1  # repartitioning must lower the largest work by this factor
@@ -111,7 +111,7 @@ class SharedTiles(Tiles):
         self._spare: dict[tuple, np.ndarray] = {}
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
-        self.given: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
+        self.sent: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
         self._from = np.empty(0, np.int64)  # ranks of other processes' boxes
@@ -185,7 +185,7 @@ class SharedTiles(Tiles):
             array = rows_of_points(shape, old.dtype, room)
             for c in np.ndindex(shape[:-1]):
                 np.take(old[c], stay, out=array[c][: len(stay)], mode="clip")
-                array[c][len(stay) :] = np.concatenate([part[c] for part in new])
+                array[c][len(stay) :] = np.concatenate([columns[c] for columns in new])
             if (k, name) in self._rooms:
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
@@ -249,7 +249,7 @@ class SharedTiles(Tiles):
         return tile % int(self._first_of_nodes[1]) if self.one_space else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find what own boxes reach; add the parts of others' boxes at nodes used here."""
+        """Find what own boxes reach; add the overlaps of others' boxes at nodes used here."""
         _, reached = super()._reached(boxes)
         of, tile = self._of[reached.box], self._tile_of_domain(reached.tile)
         me = self.comm.rank
@@ -300,7 +300,7 @@ class SharedTiles(Tiles):
 
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         first, steps = super()._number(s, boxes)
-        self.given = {
+        self.sent = {
             rank: _rows(low, high, first[which], steps[which])
             for rank, (which, low, high) in self._passed.items()
             if len(which)  # hulls may overlap without a common node
@@ -356,7 +356,7 @@ class SharedTiles(Tiles):
     def _link(self, arrays: list[np.ndarray]) -> tuple[list, Any]:
         packed, sent, taken = [], [], []
         for array in arrays:
-            for rank, rows in self.given.items():
+            for rank, rows in self.sent.items():
                 room = np.empty((len(rows), array.shape[1]), array.dtype)
                 packed.append((array, rows, room))
                 sent.append((rank, room))
@@ -395,7 +395,6 @@ def _needs(tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> Needs:
 
 
 def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return the buffer rows of all nodes from `lo` to `hi` (k, d), box after box."""
     shape = hi - lo + 1
     box, left = ragged(np.prod(shape, axis=1))
     inner = steps_of(shape)[box]
@@ -403,20 +402,20 @@ def _rows(lo: np.ndarray, hi: np.ndarray, first: np.ndarray, steps: np.ndarray) 
     return first[box] + (places * steps[box]).sum(axis=1)
 
 
-def share_of(s: Setup, own: np.ndarray) -> dict[str, np.ndarray]:
+def share_of(s: Setup, mine: np.ndarray) -> dict[str, np.ndarray]:
     packed: dict[str, np.ndarray] = {}
     for k, block in enumerate(s.blocks):
-        points, tiles = share_of_tiling(k, block.tiling, own)
+        points, tiles = share_of_tiling(k, block.tiling, mine)
         arrays = arrays_of(block.points)
         packed |= tiles | {f"points/{k}/{name}": some_points(of, points) for name, of in arrays}
     return packed
 
 
 def share_of_tiling(
-    k: int, tiling: Tiling, own: np.ndarray
+    k: int, tiling: Tiling, mine: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the points in the tiles marked in `own`, and these tiles, packed."""
-    which = np.flatnonzero(own[occupied(tiling)[0]])
+    """Return the points in the tiles marked in `mine`, and these tiles, packed."""
+    which = np.flatnonzero(mine[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)
     rows = {name: getattr(tiling, name)[which] for name in OF_TILES}
@@ -426,12 +425,12 @@ def share_of_tiling(
     return points, {f"tiling/{k}/{name}": array for name, array in rows.items()}
 
 
-def stripped(found: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
-    return {n.removeprefix(stem): array for n, array in found.items() if n.startswith(stem)}
+def stripped(arrays: dict[str, np.ndarray], stem: str) -> dict[str, np.ndarray]:
+    return {n.removeprefix(stem): array for n, array in arrays.items() if n.startswith(stem)}
 
 
 def _joint(tilings: list[dict[str, np.ndarray]], name: str) -> np.ndarray:
-    return np.concatenate([part[name][: part["count"][0]] for part in tilings])
+    return np.concatenate([tiling[name][: tiling["count"][0]] for tiling in tilings])
 
 
 def by_tile(tilings: list[dict[str, np.ndarray]]) -> np.ndarray:

@@ -25,15 +25,15 @@ class ProcessShare(NamedTuple):
     tiles: int  # occupied tiles of points
     nodes: int  # in use
     others: int  # to which it sends
-    given: int  # bytes sent per step
+    sent: int  # bytes sent per step
     memory: int  # bytes touched in steps, and of a copy of the last good state
-    known: int  # of these, data about the whole scene
+    common: int  # of these, data about the whole scene
 
 
 class _Sums(NamedTuple):
     """Instead of sweeping, note which nodal arrays a step sums."""
 
-    found: list
+    sums: list
 
 
 @sweep_points.on(_Sums)
@@ -44,7 +44,7 @@ def _sweep_nothing(mode, *rest): ...
 @sum_buffers.on(_Sums)
 def _sum_buffers_sums(mode, quantities, s, due):
     if due:
-        mode.found.append((arrays_given(quantities, s.kin), s.nodes))
+        mode.sums.append((arrays_given(quantities, s.kin), s.nodes))
 
 
 class _PretendedComm(SerialComm):
@@ -62,8 +62,8 @@ def bytes_of_node(simulation: Simulation) -> int:
     step(StepKind(simulation.scheme, simulation.visits, sums), s, NoHooks(), True)
     control.values[:], control.clock[:], control.totals[:] = kept
     total = 0
-    for what, nodes in sums.found:
-        total += sum(array.itemsize * array.shape[1] for array in chosen_of(nodes, what))
+    for names, nodes in sums.sums:
+        total += sum(array.itemsize * array.shape[1] for array in chosen_of(nodes, names))
     return total
 
 
@@ -80,10 +80,11 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     ]
     of_all[0].share_out(of_all[0].loads(s.blocks)[:-1].sum(axis=0))
     parts = [_part(s, of_all[0].owner == rank) for rank in range(ranks)]
-    boxes += [tiles.own_boxes(part) for tiles, part in zip(of_all, parts, strict=True)]
+    boxes += [tiles.own_boxes(setup) for tiles, setup in zip(of_all, parts, strict=True)]
     per_node = bytes_of_node(simulation)
     return [
-        _share(simulation, part, tiles, per_node) for part, tiles in zip(parts, of_all, strict=True)
+        _share(simulation, setup, tiles, per_node)
+        for setup, tiles in zip(parts, of_all, strict=True)
     ]
 
 
@@ -98,17 +99,17 @@ def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) 
         points=sum(int(occupied(one)[1].sum()) for one in tilings),
         tiles=sum(int(one.count[0]) for one in tilings),
         nodes=nodes_in_use(s),
-        others=len(tiles.given),
-        given=per_node * sum(map(len, tiles.given.values())),
+        others=len(tiles.sent),
+        sent=per_node * sum(map(len, tiles.sent.values())),
         memory=sum(memory),
-        known=memory.known,
+        common=memory.common,
     )
 
 
-def _part(s: Setup, own: np.ndarray) -> Setup:
+def _part(s: Setup, mine: np.ndarray) -> Setup:
     blocks = []
     for block in s.blocks:
-        which = np.flatnonzero(own[occupied(block.tiling)[0]])
+        which = np.flatnonzero(mine[occupied(block.tiling)[0]])
         rows = {name: getattr(block.tiling, name)[which] for name in Tiling._fields[2:]}
         rows["count"] = np.array([len(which), *block.tiling.count[1:]])
         rows["share"] = np.zeros(2 * SHARES + 1, np.int64)

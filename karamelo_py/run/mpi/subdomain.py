@@ -123,10 +123,12 @@ class Subdomain(WholeDomain):
         if kept := kept_at_nodes(self.simulation.setup):
             self._share(self.counted(), [array for _, array in kept])
 
-    def _share(self, own: np.ndarray, arrays: list[np.ndarray]) -> None:
-        for nodes, *rows in self.comm.allgather((own, *(one[own] for one in arrays))):
-            for one, found in zip(arrays, rows, strict=True):
-                one[nodes] = found
+    def _share(self, numbers_here: np.ndarray, arrays: list[np.ndarray]) -> None:
+        for nodes, *rows in self.comm.allgather(
+            (numbers_here, *(one[numbers_here] for one in arrays))
+        ):
+            for one, values in zip(arrays, rows, strict=True):
+                one[nodes] = values
 
     def counted(self) -> np.ndarray:
         nodes = super().counted()
@@ -179,21 +181,21 @@ class Subdomain(WholeDomain):
         if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):
             return
         self.share_memory()
-        own = [tiles.owner[partition.occupied(block.tiling)[0]] for block in s.blocks]
-        others = tiles.partners(np.bincount(np.concatenate(own), minlength=self.comm.size))
-        given = {rank: partition.share_of(s, tiles.owner == rank) for rank in others}
+        owners = [tiles.owner[partition.occupied(block.tiling)[0]] for block in s.blocks]
+        others = tiles.partners(np.bincount(np.concatenate(owners), minlength=self.comm.size))
+        sent = {rank: partition.share_of(s, tiles.owner == rank) for rank in others}
         mine = partition.share_of(s, tiles.owner == self.comm.rank)
-        self.put([mine, *self.comm.exchange(given).values()])
+        self.put([mine, *self.comm.exchange(sent).values()])
 
     def answer(self, request: int, a: int, b: int) -> int:
         try:
             self.load.note()
-            found = self._answer(request, a, b)
+            result = self._answer(request, a, b)
             if request == ranks.NEXT:
                 self.load.next_block()
             else:
                 self.load.resume(0 if request in {ranks.SWEEP, ranks.GIVE} else None)
-            return found
+            return result
         except BaseException as error:
             # Exceptions cannot pass through a kernel, and the others wait.
             self.comm.fail(error)

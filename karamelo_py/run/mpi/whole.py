@@ -36,7 +36,7 @@ class Whole:
         self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
 
     def act(self, function: Callable[[Setup], None]) -> None:
-        """Call a function of the whole on the first process; all take over its changes.
+        """Call a function of the whole on rank 0; all ranks take over its changes.
 
         If it moved points, the step must begin again (`PointsMoved`).
         """
@@ -68,14 +68,14 @@ class Whole:
     @contextmanager
     def _in_place(self) -> Iterator[None]:
         simulation = self.simulation
-        own = simulation.setup, simulation.tiles, simulation.comm, simulation.domain
+        state = simulation.setup, simulation.tiles, simulation.comm, simulation.domain
         simulation.setup, simulation.tiles = self.setup, self.tiles
         simulation.comm, simulation.domain = SerialComm(), WholeDomain(simulation)
         try:
             yield
         finally:
             self.setup = simulation.setup
-            simulation.setup, simulation.tiles, simulation.comm, simulation.domain = own
+            simulation.setup, simulation.tiles, simulation.comm, simulation.domain = state
 
     def gather(self) -> None:
         simulation, comm = self.simulation, self.simulation.comm
@@ -83,10 +83,10 @@ class Whole:
         parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
         totals[WORK] = 0
         blocks = []
-        own = zip(self.setup.blocks, simulation.setup.blocks, strict=True)
-        for k, (block, mine) in enumerate(own):
-            counts = [part["counts"][k] for part in parts or ()]
-            order = by_tile([part["tiling"][k] for part in parts]) if comm.leads else None
+        blocks_here = zip(self.setup.blocks, simulation.setup.blocks, strict=True)
+        for k, (block, mine) in enumerate(blocks_here):
+            counts = [share["counts"][k] for share in parts or ()]
+            order = by_tile([share["tiling"][k] for share in parts]) if comm.leads else None
             points = sized(block.points, sum(counts)) if comm.leads else block.points
             rows = [array for _, array in arrays_of(points)]
             for row, (_, array) in zip(rows, arrays_of(mine.points), strict=True):
@@ -97,7 +97,7 @@ class Whole:
             blocks.append(block._replace(points=points))
         self.setup = self.setup._replace(blocks=tuple(blocks))
         if comm.leads:
-            totals[WORK] = sum(part["work"] for part in parts)
+            totals[WORK] = sum(share["work"] for share in parts)
             self._join(parts)
 
     def _own(self) -> dict:
@@ -119,18 +119,18 @@ class Whole:
         whole, tiles = self.setup, self.tiles
         for k, block in enumerate(whole.blocks):
             block.tiling.count[1] = 1 if tiles.direct else SHARES
-            join_tilings(block.tiling, [part["tiling"][k] for part in parts])
+            join_tilings(block.tiling, [share["tiling"][k] for share in parts])
         tiles.empty_nodes(whole)
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
             array[nodes] = 0  # including nodes that no box reaches
         memory = self.subdomain.memory()
-        for part in parts:
-            for (_, array), rows in zip(of_nodes(whole), part["at nodes"], strict=True):
-                array[part["nodes"]] = rows
-            for array, rows in zip(memory, part["memory"], strict=True):
-                array[part["nodes"]] = rows
+        for share in parts:
+            for (_, array), rows in zip(of_nodes(whole), share["at nodes"], strict=True):
+                array[share["nodes"]] = rows
+            for array, rows in zip(memory, share["memory"], strict=True):
+                array[share["nodes"]] = rows
 
     def _nodes(self, moved: bool) -> tuple:
         subdomain, tiles = self.subdomain, self.simulation.tiles
@@ -154,10 +154,10 @@ class Whole:
             one[nodes] = rows
 
     def _hand_back(self, nodes: np.ndarray, rows: list) -> None:
-        s, found = self.simulation.setup, self.simulation.comm.scatter(self._shares())
+        s, share = self.simulation.setup, self.simulation.comm.scatter(self._shares())
         here = np.isin(nodes, numbers(s.spans))
-        for (_, array), own in zip(of_nodes(s), rows, strict=True):
-            array[nodes[here]] = own[here]
+        for (_, array), mine in zip(of_nodes(s), rows, strict=True):
+            array[nodes[here]] = mine[here]
         for k, block in enumerate(s.blocks):
             for name, array in arrays_of(block.points):
-                array[...] = found[f"points/{k}/{name}"]
+                array[...] = share[f"points/{k}/{name}"]

@@ -143,7 +143,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates; of the corners only if those of other nodes are unknown."""
+    """Natural coordinates; of the corners only if those for other nodes are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -195,7 +195,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements: older formats repeat those of two physical groups."""
+    """Drop repeated elements: older formats repeat elements of two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -208,7 +208,7 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
     distance = np.abs(positions[:, dimension:]).max() if dimension < 3 else 0.0
     if distance > _PLANE * np.ptp(positions, axis=0).max():
         raise ScriptError(
-            f"the mesh does not lie {'on the x axis' if dimension == 1 else 'in the plane z = 0'}: "
+            f"the mesh does not lie {'on the x axis' if dimension == 1 else 'at z = 0'}: "
             f"a node is {distance:g} away from it",
             argument="file",
             expected=f"a mesh for {dimension}D",

@@ -211,7 +211,7 @@ class PositionQuantile(Compute):
 
     Parameters
     ----------
-    share
+    fraction
         Fraction of the mass, from 0 (the lowest point) to 1 (the highest).
 
     Example
@@ -226,9 +226,9 @@ class PositionQuantile(Compute):
 
     published = ("x", "y", "z")
 
-    def __init__(self, hub: Hub, group: ParticleGroup, share: Annotated[float, In(0, 1)]):
+    def __init__(self, hub: Hub, group: ParticleGroup, fraction: Annotated[float, In(0, 1)]):
         super().__init__(hub, group)
-        self.share = share
+        self.fraction = fraction
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
@@ -241,7 +241,7 @@ class PositionQuantile(Compute):
                 return
             if shift == 64 - BITS:
                 # Round-off must not shift a fraction such as 0.1 of ten equal points.
-                wanted = self.share * mass.sum(axis=1) * (1 - 1e-12)
+                wanted = self.fraction * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
                 up_to = below[axis] + np.cumsum(of_bits[occupied])

@@ -35,12 +35,12 @@ def absorb(mass, v, force, normal, support, values, dt):
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
     made = type(v)
-    held = made(*[where(a == a, a, -now) for a, now in zip(support, force, strict=True)])
-    left = force + held
+    balance = made(*[where(a == a, a, -now) for a, now in zip(support, force, strict=True)])
+    left = force + balance
     rates = [weight / mass * where(axis == k, along, across) for k in range(len(v))]
     damped = [dashpot(rates[k], mass, v[k], left[k], dt) for k in range(len(v))]
-    given = held + made(*damped)
-    return force + given, held, given
+    reaction = balance + made(*damped)
+    return force + reaction, balance, reaction
 
 
 def dashpot(rate, mass, v, force, dt):

@@ -104,7 +104,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # two points may share a box: one absorbed a small neighbour
+            for k in (0, 1):  # two points may lie in one box: one absorbed a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -183,8 +183,8 @@ def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Face
     middle, size = (np.concatenate(column) for column in zip(*tables, strict=True))
     none = np.zeros(len(middle), np.int64)
     rows = [
-        np.argmin(np.linalg.norm(part[:, None] - x0, axis=2), axis=1)
-        for part in np.array_split(middle, len(middle) * len(ids) // AT_ONCE + 1)
+        np.argmin(np.linalg.norm(batch[:, None] - x0, axis=2), axis=1)
+        for batch in np.array_split(middle, len(middle) * len(ids) // AT_ONCE + 1)
     ]
     return Faces(ids[np.concatenate(rows)], none, none, size * hub.domain.depth(middle), middle)
 
@@ -230,7 +230,7 @@ class OnEdge(Fix):
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Sums over the faces of a point keep this order, whenever its faces were found.
+            # Sums over the faces of a point have this order, whenever its faces were found.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]

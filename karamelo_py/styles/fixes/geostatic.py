@@ -124,13 +124,13 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     load = np.zeros_like(weights)
     corners = np.array(list(product((0, 1), repeat=flat.shape[1])), int)
     boxes = np.tile(np.arange(len(x)), len(corners))
-    part = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
+    fraction = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
     columns = np.concatenate([np.minimum(first + c, count - 1) for c in corners])
-    inner = part > 1e-9  # no second column for round-off
-    boxes, part, columns = boxes[inner], part[inner], columns[inner]
+    inner = fraction > 1e-9  # no second column for round-off
+    boxes, fraction, columns = boxes[inner], fraction[inner], columns[inner]
     column = np.tile(columns @ np.cumprod([1, *count])[:-1], 3)
     # The load in a column changes its slope at the tops and bottoms of boxes.
-    slope = (part * across.prod(axis=1)[boxes])[:, None] * weights[boxes]
+    slope = (fraction * across.prod(axis=1)[boxes])[:, None] * weights[boxes]
     slope = np.concatenate([slope, 0 * slope, -slope])
     z = np.concatenate([(x[:, -1] + k * size[:, -1])[boxes] for k in (0.5, 0, -0.5)])
     down = np.lexsort((-z, column))
@@ -139,7 +139,7 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     sums = np.cumsum(np.where(starts[:, None], 0, steps), axis=0)
     at = np.empty_like(sums)
     at[down] = sums - sums[np.maximum.accumulate(np.where(starts, np.arange(len(down)), 0))]
-    np.add.at(load, boxes, part[:, None] * at[len(boxes) : 2 * len(boxes)])
+    np.add.at(load, boxes, fraction[:, None] * at[len(boxes) : 2 * len(boxes)])
     return load
 
 

@@ -29,7 +29,7 @@ NOT_ROUND = 1e-9  # relative tolerance of moments of inertia
 class Components:
     """Script argument: a formula, or several in parentheses; NULL leaves a component free."""
 
-    script_kind = "a formula, or several in parentheses: (a, b)"
+    script_kind = "formulas: a, or (a, b)"
 
     def __init__(self, argument: Argument, items: list[Expression | None]):
         self.argument, self.items = argument, items
@@ -159,7 +159,7 @@ class RigidBody(Fix):
         spins = {1: (), 2: (5,), 3: (3, 4, 5)}[d] if not kin.hoops else ()
         moves = tuple(range(d)) if not kin.hoops else (1,)
         self.ways = (*moves, *spins)
-        self.given = velocity is not None, spin is not None
+        self.is_initial = velocity is not None, spin is not None
         self.previous = next((fix for fix in bodies_of(hub) if fix.body is solid), None)
         self.led = self._spread(motion, range(d)) + self._spread(turning, spins, 3)
         self._hold(fixed)
@@ -220,8 +220,8 @@ class RigidBody(Fix):
             )  # fmt: skip
         if before is not None:
             kept, self.previous = before.state.copy(), None
-            for given, at in zip(self.given, (kernel.V, kernel.W), strict=True):
-                if given:
+            for is_set, at in zip(self.is_initial, (kernel.V, kernel.W), strict=True):
+                if is_set:
                     kept[at : at + 3] = self.state[at : at + 3]
             if not self.hub.update.step:  # its points may have been moved
                 kept[kernel.X : kernel.X + 3] = self.state[kernel.X : kernel.X + 3]
@@ -266,42 +266,44 @@ class RigidBody(Fix):
             return 3 + axis in self.ways
         return axis < d
 
-    def _spread(self, given: Components | None, ways: Sequence[int], size: int = 3) -> list:
+    def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
         """Return formulas by axis, None if missing; `ways` from 3 on are rotations."""
         items: list[Expression | None] = [None] * size
-        if given is None:
+        if components is None:
             return items
-        if len(given.items) != len(ways):
-            what = "formulas" if len(ways) != 1 else "formula"
+        if len(components.items) != len(ways):
+            noun = "formulas" if len(ways) != 1 else "formula"
             raise ScriptError(
-                f"{len(given.items)} components", mark=given.argument.mark,
-                expected=f"{len(ways)} {what}" if ways else "nothing: it does not rotate here",
+                f"{len(components.items)} components", mark=components.argument.mark,
+                expected=f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here",
             )  # fmt: skip
-        for way, item, part in zip(ways, given.items, given.argument.listed(), strict=True):
+        for way, item, token in zip(
+            ways, components.items, components.argument.listed(), strict=True
+        ):
             items[way % 3] = item
             if item is None:
                 continue
             item.evaluate(self.hub.values)
             if way not in self.ways and not (item.is_constant and float(item.constant) == 0):
                 raise ScriptError(
-                    f"the body moves along the axis only, not along {WAYS[way]}", mark=part.mark,
+                    f"the body moves along the axis only, not along {WAYS[way]}", mark=token.mark,
                     expected="0",
                 )  # fmt: skip
         return items
 
     def _hold(self, fixed: Argument | None) -> None:
-        known = [WAYS[k] for k in self.ways]
-        for part in fixed.listed() if fixed else ():
-            name = part.text
-            if name not in known:
+        directions = [WAYS[k] for k in self.ways]
+        for token in fixed.listed() if fixed else ():
+            name = token.text
+            if name not in directions:
                 raise ScriptError(
-                    f"the body has no direction '{name}'", mark=part.mark,
-                    expected="some of " + ", ".join(known),
+                    f"the body has no direction '{name}'", mark=token.mark,
+                    expected="some of " + ", ".join(directions),
                 )  # fmt: skip
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
                 raise ScriptError(
-                    f"{name} is fixed, and {word} prescribes it", mark=part.mark,
+                    f"{name} is fixed, and {word} prescribes it", mark=token.mark,
                     expected="one of the two",
                 )  # fmt: skip
             self.led[WAYS.index(name)] = Expression(0.0)
@@ -316,7 +318,7 @@ class RigidBody(Fix):
                 expected="fixed=(...), or a domain in 2D or 3D",
             )  # fmt: skip
         d = self.hub.domain.dimension
-        given = self._spread(pivot, range(d)) if pivot.numbers() else []
+        position = self._spread(pivot, range(d)) if pivot.numbers() else []
         if velocity is not None or any(self.led[k] is not None for k in range(d)):
             raise ScriptError(
                 "the pivot holds the body, and velocity, motion or fixed moves or holds it too",
@@ -324,7 +326,7 @@ class RigidBody(Fix):
                 expected="spin=..., turning=... or fixed=(rx, ...)",
             )
         self.led[:d] = [Expression(0.0)] * d
-        return [0.0 if item is None else float(item.constant) for item in given]
+        return [0.0 if item is None else float(item.constant) for item in position]
 
     def _weigh(self, solid: Solid, mass: float | None, inertia: Components | None) -> None:
         self.weighed = solid.places
@@ -336,9 +338,9 @@ class RigidBody(Fix):
             centre[0] = 0
         arm = x - centre
         side = (np.asarray(solid.volume0, float) / self.hub.domain.depth(solid.x0)) ** (1 / d)
-        own = m * side**2 / 12  # of a square or cube, about each axis across
+        about_centre = m * side**2 / 12  # of a square or cube, about each axis across
         square = np.einsum("n,ni,nj->ij", m, arm, arm)
-        square[range(d), range(d)] += own.sum()
+        square[range(d), range(d)] += about_centre.sum()
         tensor = np.trace(square) * np.eye(3) - square
         if mass is not None:
             tensor *= mass / total
@@ -476,8 +478,8 @@ class ContactRigidBody(Fix):
     def behind(self, points: PointTable) -> tuple[int, float]:
         """Return the number of points in the body before the first step, and the largest depth."""
         depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
-        own = points.numbers - self.body.first_id
-        depth = depth[(own < 0) | (own >= self.body.count)]
+        index = points.numbers - self.body.first_id
+        depth = depth[(index < 0) | (index >= self.body.count)]
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
     def refuse(self, number: int) -> int:
