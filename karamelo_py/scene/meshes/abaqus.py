@@ -6,6 +6,7 @@ manual).
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[DeckKeyword]
     starts = [
         k for k, line in enumerate(lines) if line.startswith("*") and not line.startswith("**")
     ]
-    for at, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+    for at, end in pairwise([*starts, len(lines)]):
         head, first = lines[at].rstrip(), at + 1
         while head.endswith(",") and first < end:
             head, first = head + lines[first].strip(), first + 1
@@ -230,6 +231,8 @@ class _Deck:
         family, count = kind
         of_mesh = family if count == len(SHAPES[family].corners) else f"{family}{count}"
         table = _rows(keyword, count + 1)
+        if of_mesh == "line3":  # the second node is in the middle
+            table = table[:, [0, 1, 3, 2]]
         self.scope.elements.append(DeckElements(of_mesh, name, table[:, 0], table[:, 1:]))
         into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
 

@@ -153,13 +153,17 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
     entities = {} if names else dict.fromkeys(gmsh.model.getEntities(), "")
     names |= entities  # such as the properties of Nastran
     # By element type: nodes, and groups (-1: none).
+    left_out: dict[str, int] = {}
     by_kind: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for dim, tag in gmsh.model.getEntities():
         numbers = [tag] if entities else gmsh.model.getPhysicalGroupsForEntity(dim, tag)
         if only_groups and not len(numbers):
             continue
         for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
-            count = gmsh.model.mesh.getElementProperties(kind)[3]
+            name, _, _, count, *_ = gmsh.model.mesh.getElementProperties(kind)
+            if not count:  # parts of elements that a level set cuts
+                left_out[name] = left_out.get(name, 0) + len(elements)
+                continue
             if not entities and of_file and of_file.groups is not None:
                 groups = np.array([[of_file.groups.get(int(n), -1)] for n in elements])
             else:
@@ -179,4 +183,4 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
         for key, masks in sets.items():
             of = [n for (d, n), name in names.items() if d == dim and key in (name, str(n))]
             masks.append(np.concatenate([np.isin(groups, of).any(axis=1) for _, groups in parts]))
-    return Mesh(np.reshape(points, (-1, 3))[order], cells, sets, {}, {})
+    return Mesh(np.reshape(points, (-1, 3))[order], cells, sets, {}, left_out)

@@ -65,7 +65,7 @@ class Mesh(NamedTuple):
             error = unknown(message, group, named, argument="group")
             error.expected = error.expected if named else "no group: the whole mesh"
             raise error
-        masks = self.sets.get(name) or [self.node_sets[name]]
+        masks = self.sets[name] if name in self.sets else [self.node_sets[name]]
         if not any(mask.any() for mask in masks):
             filled = [n for n, masks in self.sets.items() if any(mask.any() for mask in masks)]
             error = unknown(

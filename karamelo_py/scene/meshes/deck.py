@@ -165,6 +165,9 @@ class Numbering(NamedTuple):
         return of_mesh[of_mesh >= 0]
 
 
+NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
+
+
 class Sets:
     def __init__(self) -> None:
         self.by_name: dict[str, list[np.ndarray]] = defaultdict(list)
@@ -233,7 +236,8 @@ class Merged:
         for name, items in body.part.sides.items():
             for of, face in items:
                 if of.isdigit():
-                    elements = self.elements.numbering[body.name].listed(np.array([int(of)]))
+                    numbering = self.elements.numbering.get(body.name, NO_NUMBERS)
+                    elements = numbering.listed(np.array([int(of)]))
                 else:
                     of_body = f"{body.name}.{of}"
                     in_body = of_body in self.elements.by_name

@@ -16,6 +16,9 @@ FAMILIES = {
 }  # fmt: skip
 MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # variables; not results
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line": ((0,), (1,)),
+    "SHELL": ((0, 1, 2, 3), (0, 3, 2, 1), (0, 1), (1, 2), (2, 3), (3, 0)),
+    "TRISHELL": ((0, 1, 2), (0, 2, 1), (0, 1), (1, 2), (2, 0)),
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
     "tetra": ((0, 1, 3), (1, 2, 3), (0, 3, 2), (0, 2, 1)),
@@ -88,7 +91,11 @@ def read_exodus(path: Path) -> Mesh:
         block = np.searchsorted(firsts, element, side="right") - 1
         for k, number in np.unique(np.column_stack([block, side]), axis=0):
             here = (block == k) & (side == number)
-            corners = list(SIDES[cells[k].family][number - 1])
+            of_type = cells[k].label.rstrip("0123456789")
+            of_family = SIDES.get(of_type, SIDES.get(cells[k].family, ()))
+            if number > len(of_family):
+                continue
+            corners = list(of_family[number - 1])
             faces = cells[k].nodes[element[here] - firsts[k]][:, corners]
             cells.append(CellBlock(FACE_TYPES[len(corners)], faces))
             of_set.append(called)

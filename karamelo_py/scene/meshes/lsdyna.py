@@ -5,6 +5,7 @@ In columns, long columns or with commas (LS-DYNA Keyword User's Manual, volume I
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +40,7 @@ def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[DeckKeyword]
     lines = [(n, line) for n, line in enumerate(text, 1) if not line.startswith("$")]
     starts = [k for k, (_, line) in enumerate(lines) if line.startswith("*")]
     is_long = False
-    for at, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+    for at, end in pairwise([*starts, len(lines)]):
         number, head = lines[at]
         name, *words = head[1:].upper().split() or [""]
         is_long |= name == "KEYWORD" and "LONG=Y" in words

@@ -11,21 +11,23 @@ _TYPES = (
     *(("vertex", 1), ("line", 2), ("triangle", 3), ("quad", 4)),
     *(("tetra", 4), ("hexahedron", 8), ("wedge", 6), ("pyramid", 5)),
 )
+_REMEDY = "in MFEM, write it as .vtu"
 _SECTIONS = re.compile(
     r"^\s*(dimension|elements|boundary|vertices|nodes|(?:bdr_)?attribute_sets)\s*$", re.M
 )
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Read a mesh; ValueError says what is not read. Attributes are groups."""
+    """Read a mesh, with attributes as groups; ValueError says what is not read."""
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
-        raise ValueError(f"it is of MFEM's kind '{text.strip().splitlines()[0]}'")
+        head = text.strip().splitlines()[0]
+        raise ValueError(f"it is of MFEM's kind '{head}': {_REMEDY}")
     _, *sections = _SECTIONS.split(text)
     bodies = dict(zip(sections[::2], sections[1::2], strict=True))
     words = {name: body.split() for name, body in bodies.items()}
     if "nodes" in words or len(words.get("vertices", ())) < 2:
-        raise ValueError("its elements have curved edges (a section 'nodes')")
+        raise ValueError(f"its elements have curved edges (a section 'nodes'): {_REMEDY}")
     count, d = int(words["vertices"][0]), int(words["vertices"][1])
     points = np.zeros((count, 3))
     points[:, :d] = np.array(words["vertices"][2:], float).reshape(count, d)

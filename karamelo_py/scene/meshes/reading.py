@@ -11,6 +11,7 @@ import warnings
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -36,13 +37,15 @@ CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 # Gmsh takes other text for its geometry language.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
 _BY_ENDING = (".unv", ".cgns")  # recognised by ending
-_MED = b"\x89HDF"
+_HDF5 = b"\x89HDF"
 # Files of other programs with endings of meshes: first bytes, and advice.
 _FOREIGN = (
     (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
     (re.compile(rb"\s*Begin\s+(ModelPart|Properties|Nodes)"), "a model of Kratos",
      "export it as .vtu or .msh"),
+    (re.compile(rb"(?s).*\bNZONE *= *([2-9]|\d\d)"), "a file of several zones (NZONE)",
+     "write each zone to a file"),
 )  # fmt: skip
 
 
@@ -79,7 +82,13 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
         with alone(path) as link:
             mesh = mesh_geometry(link, dimension, size)
     else:
-        mesh = _by_content(path)
+        try:
+            with np.errstate(all="ignore"):
+                mesh = _by_content(path)
+        except ScriptError:
+            raise
+        except FAILURES as error:
+            raise _unreadable(path, _reason(error)) from None
     if not len(mesh.points) or not sum(len(cells.nodes) for cells in mesh.cells):
         counts = ", ".join(f"{n} {kind}" for kind, n in mesh.left_out.items())
         raise ScriptError(
@@ -91,6 +100,12 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
         raise ScriptError(
             f"the mesh {path.name} has a node whose position is not a number", argument="file"
         )
+    for cells in mesh.cells:
+        if len(cells.nodes) and not 0 <= cells.nodes.min() <= cells.nodes.max() < len(mesh.points):
+            raise ScriptError(
+                f"the mesh {path.name} has an element with a node that is not there",
+                argument="file",
+            )
     return mesh
 
 
@@ -119,30 +134,40 @@ def _by_content(path: Path) -> Mesh:
         return read_deck(path)
     if ending == ".inp" and re.match(rb"\s*(#[^\n]*\n\s*)*\d+ +\d+ +\d+ +\d+ +\d+\s", begin):
         return _by_meshio(path, "avsucd")
-    if ending == ".obj":
+    if ending == ".obj" and b"\0" not in begin:
         return read_obj(path)
     if ending in EXODUS:
-        try:
-            return read_exodus(path)
-        except FAILURES as error:
-            raise _unreadable(path, _reason(error)) from None
+        return read_exodus(path)
     if ending in NASTRAN:
         return read_nastran(path)
     if begin.lstrip().startswith(b"MFEM"):
-        try:
-            return read_mfem(path)
-        except FAILURES as error:
-            raise _unreadable(path, _reason(error), "in MFEM, write it as .vtu") from None
+        return read_mfem(path)
     why = None
-    by_content = begin.startswith(_OF_GMSH) or (ending == ".med" and begin.startswith(_MED))
+    by_content = begin.startswith(_OF_GMSH) or (ending == ".med" and begin.startswith(_HDF5))
     if by_content or ending in _BY_ENDING:
         try:
+            if begin.startswith(_HDF5):
+                _read_all(path)
             return read_by_gmsh(path)
         except NoGmsh as error:
             why = f"Gmsh cannot be loaded ({error}), and meshio: "
-        except ValueError as error:
-            raise _unreadable(path, str(error)) from None
     return _by_meshio(path, why=why)
+
+
+def _read_all(path: Path) -> None:
+    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries print or crash."""
+    import h5py
+
+    def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
+        dict(item.attrs)
+        if isinstance(item, h5py.Dataset):
+            item[()]
+
+    try:
+        with h5py.File(path) as file:
+            file.visititems(visit)
+    except FAILURES as error:
+        raise ValueError(f"the file is damaged: {_reason(error)}") from None
 
 
 def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError:
@@ -155,12 +180,22 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
     )
 
 
+def _skip_close(file: Any, depth: int) -> None:
+    """Skip to the closing bracket; meshio's function never ends in a file without it."""
+    while depth > 0:
+        letter = file.read(1)
+        if not letter:
+            raise ValueError("it ends within brackets")
+        depth += (letter == b"(") - (letter == b")")
+
+
 def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
     # VTK's pixels and voxels, which meshio supports only in part.
     for number, name, count, dimension in ((8, "pixel", 4, 2), (11, "voxel", 8, 3)):
         meshio._common.num_nodes_per_cell.setdefault(name, count)
         meshio._mesh.topological_dimension.setdefault(name, dimension)
         meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
+    meshio.ansys._ansys._skip_close = _skip_close
     try:
         # meshio prints, and ends the process if no format fits.
         with (
@@ -237,4 +272,5 @@ def _reason(error: BaseException) -> str:
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
         return "its content does not fit its ending"
-    return f"{' '.join(str(error).split())} ({type(error).__name__})"
+    kind = "" if type(error) is ValueError else f" ({type(error).__name__})"
+    return f"{' '.join(said.split())}{kind}"
