@@ -51,7 +51,6 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    """Return True if plastic flow dissipates an impact."""
     return not any(law_traits(kind).rebounds for kind in law_kind(law))
 
 
@@ -139,7 +138,6 @@ def sides(body: Body) -> np.ndarray:
 
 
 def fixed_directions(facts: BasicFacts, body: Body) -> np.ndarray:
-    """Mask (d,) of the directions in which fixes hold nodes at a body."""
     fixes = [fix for fix, x in fixes_at(facts, body) if len(x)]
     return np.array([any(fix.formulas[k] is not None for fix in fixes) for k in range(facts.d)])
 
@@ -204,7 +202,6 @@ def _free_time(facts: BasicFacts, motion: BodyMotion) -> float:
 
 
 def _meeting(motion: BodyMotion, other: BodyMotion) -> float:
-    """Time until two bodies' bounding boxes meet, or inf."""
     begin, end = 0.0, inf
     v = motion.velocity - other.velocity
     for speed, gap, over in zip(v, other.low - motion.high, other.high - motion.low, strict=True):

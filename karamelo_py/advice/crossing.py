@@ -46,7 +46,6 @@ def loses(facts: BasicFacts) -> bool:
 
 
 def expected(facts: BasicFacts) -> Crossing:
-    """Predict the path of material under impact or initial stress."""
     most = Crossing(0.0, 0.0)
     if not (facts.waves > 0 and loses(facts)):
         return most
@@ -93,8 +92,6 @@ def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 class BodyBoxes(NamedTuple):
-    """Bounding boxes of n bodies and their motion, arrays (n, d)."""
-
     centre: np.ndarray
     velocity: np.ndarray
     low: np.ndarray

@@ -158,7 +158,6 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 
 
 def collides(hub: Hub) -> tuple[str, str] | None:
-    """Name cause and fix of inelastic collisions, if contact is possible."""
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
             "contact that removes penetrations within one step: the grid carries only the part of "

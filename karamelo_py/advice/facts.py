@@ -100,7 +100,6 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def moving_walls(self) -> bool:
-        """Return True if a rigid solid moves or a fix leads its points."""
         rigid = [solid.rigid for solid in self.hub.solids.values()]
         led = (fix for fix in self.hub.fixes.values() if fix.leads_points)
         led = (fix for fix in led if not all(map(is_zero, fix.formulas)))
@@ -109,7 +108,6 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def faces_in_cells(self) -> bool:
-        """Return True if cells contain points of a rigid solid and of another."""
         cells: tuple[list, list] = ([], [])
         for solid in self.hub.solids.values():
             at = np.floor((solid.x0 - self.hub.domain.lo[: self.d]) / self.hub.domain.h)
@@ -118,7 +116,6 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def free_turns(self) -> float:
-        """Revolutions of the free solid that rotates most."""
         free = [b.motion.spin for b in self.bodies if self.turns and is_free(self, b)]
         return max(free, default=0.0) * self.duration / (2 * pi)
 

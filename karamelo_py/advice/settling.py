@@ -61,7 +61,6 @@ def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: boo
 
 
 def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
-    """Return True if fixes hold a body along k at one end only."""
     h = lattice_at(facts, body).h
     ends = [x[:, k] for fix, x in fixes_at(facts, body) if fix.formulas[k] is not None]
     x = np.concatenate(ends) if ends else np.zeros(0)
@@ -71,7 +70,6 @@ def _clamped(facts: BasicFacts, body: Body, k: int) -> bool:
 
 
 def driven(facts: BasicFacts) -> Settling:
-    """Count the cells by which fixes on nodes stretch, compress or shear an elastic body."""
     most = Settling()
     for body in facts.bodies if facts.moves and facts.scheme.traits.inertia else ():
         fixes = [(f, x) for f, x in fixes_at(facts, body) if len(x) and body.solid in facts.elastic]
@@ -83,7 +81,6 @@ def driven(facts: BasicFacts) -> Settling:
 
 
 def _way(facts: BasicFacts, formula: Expression, x: np.ndarray) -> np.ndarray:
-    """Displacements at the mean position, at some times."""
     values, now, speeds = facts.hub.values, facts.hub.update.time, np.zeros(16)
     for n in range(16):
         values.set("time", now + facts.duration * (n + 0.5) / 16)

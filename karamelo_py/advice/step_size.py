@@ -47,7 +47,6 @@ def what_follows(simulation: Simulation, step: float) -> str:
 
 
 def own_step_instead_of(simulation: Simulation) -> float | None:
-    """Return the default step if the script overrides it, else None."""
     update = simulation.hub.update
     if update.dt_factor is None and update.fixed_dt is None:
         return None

@@ -36,7 +36,6 @@ def help_of(family: str, name: str) -> Help:
 
 
 def describe_parameter(parameter: Parameter) -> str:
-    """Describe kind and default: ``a number above 0, 0.9 when left out``."""
     family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
     if parameter.keyword and parameter.optional and default is None:
         text = text.removesuffix(" or NULL")
@@ -198,7 +197,6 @@ def _explain(family: str, name: str) -> int:
 
 
 def _about(word: str) -> list[tuple[str, str]]:
-    """Find styles by a fragment of the name, then by summary, else by text."""
     begins = _patterns(word)
     matches: list[list[tuple[str, str]]] = [[], [], [], []]
     for family in families():

@@ -62,7 +62,6 @@ PATIENCE, LONGER = 2.0, 6.0
 
 
 def outcome_of(act: Callable[[], int], *, debugging: bool = False) -> tuple[int, str]:
-    """Return the exit status of a function, and a message to print."""
     try:
         return act(), ""
     except (KeyboardInterrupt, *FAILURES) as error:
@@ -81,7 +80,6 @@ def _ended_by(error: BaseException, *, debugging: bool) -> tuple[int, str]:
 
 
 def rendered(error: BaseException) -> str:
-    """Render an error without a traceback."""
     if isinstance(error, ScriptError):
         return error.render()
     if isinstance(error, OSError) and error.errno in OF_THE_SYSTEM:
@@ -259,7 +257,6 @@ def keep_to_oneself() -> None:
 
 
 def _report_to_launcher(rank: int) -> None:
-    """Report to the launcher, and take streams and signals as rank 0."""
     global _link
     name = os.environ.pop(SOCKET, None)
     if name is None:
@@ -310,7 +307,6 @@ def has_terminal() -> bool | None:
 def together(
     asked: int | None, run: Callable[[mpi.MpiComm], int], *, debugging: bool = False
 ) -> int:
-    """Call `run` as one of `asked` processes; return the exit status."""
     size, rank = mpi.launched()
     comm: mpi.MpiComm | None = None
 

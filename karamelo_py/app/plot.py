@@ -21,7 +21,6 @@ is explained by karamelo-py help command plot."""
 
 
 def read_text(path: Path, expected: str | None = None) -> str:
-    """Read a file; "" if it is not text."""
     try:
         return reading.read_text(path, largest=None)
     except OSError as error:

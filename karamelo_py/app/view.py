@@ -167,7 +167,6 @@ def _scene(options: argparse.Namespace) -> Hub:
 def _log_beside(
     file: Path, first: Snapshot, options: argparse.Namespace, scene: Hub
 ) -> dict[int, dict[str, float]]:
-    """Read the log next to a dump, by step, if anything needs it."""
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
     text = " ".join(filter(None, formulas))
     words = re.findall(r"[^\W\d]\w*\b(?! *\()", text)  # without calls

@@ -47,7 +47,6 @@ def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument
 
 
 def judge(hub: Hub, made: Material) -> None:
-    """Test the law of a plug-in; warn of values that hardly any material has."""
     try_law(hub, made)
     with attributed(hub):
         for doubt, hint in doubts(made.whole):

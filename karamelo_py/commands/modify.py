@@ -83,7 +83,6 @@ def _parts(material: Material) -> list[MaterialPart]:
 
 
 def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
-    """Return the material, or its only part, that has all the constants."""
     names = {(argument.keyword() or ("",))[0] for argument in numbers}
     if names <= set(material.arguments):
         return material

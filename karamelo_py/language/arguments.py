@@ -65,7 +65,6 @@ class Argument:
         return None if meaningful else self.text
 
     def words(self, literals: Sequence[str] = ()) -> str:
-        """Return the text, even if it looks like arithmetic."""
         if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -139,7 +138,6 @@ class Argument:
         return self._from(start, start + len(text))
 
     def keyword(self) -> tuple[str, Argument] | None:
-        """Split ``name = value``."""
         match = _KEYWORD.match(self.text)
         if not match:
             return None
@@ -147,7 +145,6 @@ class Argument:
 
 
 def with_gap(arguments: Sequence[Argument]) -> Argument | None:
-    """Return the first argument that may lack a comma."""
     return next((argument for argument in arguments if _GAP.search(argument.text)), None)
 
 

@@ -131,7 +131,6 @@ def number(hub: Scene, argument: Any, name: str, expected: str | None = None) ->
 
 
 def finite(hub: Scene, value: float, name: str, argument: Any | None = None) -> float:
-    """Refuse infinity, and NaN except in a rehearsal."""
     if math.isfinite(value) or (math.isnan(value) and hub.rehearsing):
         return value
     message = f"{name} must be a finite number, not {value}"

@@ -46,7 +46,6 @@ def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | No
 
 
 def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
-    """Find missing arguments by words that fit only later slots."""
     missing, rest = [], list(arguments)
     for slot in slots:
         words = () if slot.shown == slot.name else slot.kind.words

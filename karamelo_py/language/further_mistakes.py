@@ -143,7 +143,6 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
 
 def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Return mistakes in syntax and names; if too many, the last one counts the rest."""
     errors = sorted([*first.others, *misnamed(interpreter, first.statements)], key=_order)
     more = len(errors) - MOST_OF_TEXT
     besides = [ScriptError(f"and {plural(more, 'more mistake')} after these")] if more > 0 else []

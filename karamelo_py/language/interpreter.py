@@ -315,7 +315,6 @@ class Interpreter:
         raise unknown.unknown_name(self, name, evaluation.mark_of(raw, node))
 
     def means_something(self, name: str) -> bool:
-        """Return True if a name has a meaning as a call or in later lines."""
         meaningful = self.knows(name) or name in WORDS or name in FUNCTIONS
         return (
             meaningful

@@ -71,7 +71,6 @@ def is_foreign(style: type | Callable) -> bool:
 
 
 def knows(family: str, name: str) -> bool:
-    """True if `family` has a style of this name, perhaps a broken one."""
     return name in _families().get(family, {}) or _of_module(family, name) is not None
 
 

@@ -71,7 +71,6 @@ class Restrictions(NamedTuple):
         return feature.kind in self.without or feature.kind in self.but
 
     def error(self, subject: Feature, feature: Feature) -> ScriptError:
-        """Return the error of a capability, with its words and mark, about a feature."""
         kind = feature.kind
         names = [AS_WRITTEN.get(kind, "{}").format(name) for name in self.only.get(kind, ())]
         instead = ", ".join(names[:-1]) + " or " * (len(names) > 1) + "".join(names[-1:])
@@ -136,7 +135,6 @@ def known_failures() -> Iterator[tuple[type, str, str, str]]:
 
 
 def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
-    """Declare a needless cost, for `check`."""
     _rules.setdefault(("suggestion", part), []).append((when, "", cost, instead))
 
 

@@ -288,7 +288,6 @@ def longer(name: str, arguments: Sequence[Any]) -> str | None:
 
 
 def renamed(family: str, style: str, ID: str, words: Sequence[str]) -> str | None:
-    """Give the current form of a renamed style, also without arguments."""
     form = table()["renamed"].get(f"{family} {style}")
     try:
         return form and f"{family}({form.format(*words, ID=ID, all=', '.join(words))})"

@@ -22,8 +22,6 @@ LINES = 0.05
 
 
 class Console:
-    """Output to `out` and `err` (standard streams); if `quiet`, only warnings."""
-
     def __init__(
         self,
         out: TextIO | None = None,

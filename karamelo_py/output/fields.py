@@ -61,7 +61,6 @@ class Fields(PointTable):
 
     @property
     def _rows(self) -> Rows:
-        """Clear the cache after a step."""
         simulation = self.simulation
         key = (id(simulation), simulation.step, simulation.version)
         if key != self._key:
@@ -169,7 +168,6 @@ class Fields(PointTable):
         return value, -number
 
     def pieces(self, *, to_first: bool = False) -> Iterator[PointTable]:
-        """Yield all points in pieces; with `to_first`, to rank 0 only."""
         s = self.setup
         orders = [np.argsort(block.points.id) for block in s.blocks]
         ordered = [block.points.id[order] for block, order in zip(s.blocks, orders, strict=True)]
@@ -211,14 +209,12 @@ class Fields(PointTable):
         return any("epdot" in asker.columns for asker in askers)
 
     def absent_at_points(self) -> list[str]:
-        """Names for `particle` that are 0 in this scene."""
         present = self.columns_of_laws() | {*declared_columns(self.hub, "point_fields")}
         if any(has_rate(material.law) for material in self.hub.materials.values()):
             present.add("epdot")
         return absent(point_table.COLUMNS, present)
 
     def absent_at_nodes(self) -> list[str]:
-        """Names for `node` that are 0 in this scene."""
         present = {*declared_columns(self.hub, "node_fields"), *["T"] * self.hub.update.thermal}
         return absent(node_columns.COLUMNS, present)
 
@@ -234,7 +230,6 @@ class Fields(PointTable):
         return self.simulation.nodes.occupied()
 
     def node(self, name: str) -> np.ndarray:
-        """A column (n,) of all nodes; nodes without mass are at rest."""
         return np.concatenate([piece.node(name) for piece in self.node_pieces([name])])
 
 

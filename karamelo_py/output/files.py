@@ -37,7 +37,6 @@ def folder_of_discarded() -> Path | None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[BinaryIO]:
-    """Open a temporary file that becomes `path` once complete."""
     if folder_of_discarded() is not None:
         yield BytesIO()
         return
@@ -58,7 +57,6 @@ def write_whole(path: Path, text: str) -> None:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Return the content, empty if the file is missing or incomplete."""
     with suppress(OSError, ValueError):
         return json.loads(path.read_text(encoding="utf-8"))
     return {}

@@ -79,7 +79,6 @@ class Log(Rhythmic):
         self.hub.console.log_line(_row(cells, self._widths))
 
     def resumed(self) -> None:
-        """Delete rows after the restored state."""
         if self._file is not None and self._is_kept:
             self._file.truncate(self._end)
 

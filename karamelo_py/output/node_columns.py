@@ -51,7 +51,6 @@ def by_lattice(hub: Scene, nodes: np.ndarray) -> Iterator[tuple[Any, slice]]:
 
 
 def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
-    """Positions (n, 3) of ascending node numbers."""
     positions = np.empty((len(nodes), 3))
     for lattice, rows in by_lattice(hub, nodes):
         positions[rows] = lattice.positions(nodes[rows])
@@ -116,7 +115,6 @@ def load(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.ndarray:
-    """Component of a vector that begins at ``first(kin)`` in an array of nodes."""
     if axis >= nodes.hub.domain.dimension:
         return np.zeros(len(nodes.ids))
     component = nodes.arrays[name][:, first(nodes.kin) + axis]
@@ -124,7 +122,6 @@ def of_vector(name: str, first: Callable, axis: int, nodes: NodeTable) -> np.nda
 
 
 def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, Callable]:
-    """Columns of a vector; ``*`` in the name becomes the axis."""
     return {
         name.replace("*", axis): partial(of_vector, f"nodes/{array}", first, k)
         for k, axis in enumerate(AXES)

@@ -141,7 +141,6 @@ def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | 
 
 
 def _crossed(depths: np.ndarray, axis: int) -> np.ndarray:
-    """Mask (n,) of the sections that cut the surface."""
     within = np.moveaxis(depths, axis, 0).reshape(depths.shape[axis], -1) > 0
     return np.asarray(within.any(axis=1) & ~within.all(axis=1))
 
@@ -245,7 +244,6 @@ class Front:
         return _contours(across, up, filled.T, 0.5)
 
     def hides(self, x: np.ndarray, height: np.ndarray, around: int = 0) -> np.ndarray:
-        """Mask of x (n, 2) whose cells `around` are all in front of these heights."""
         return -_largest(-self.height, around)[self._cells(x)] > height + 3 * self.cell
 
 
@@ -256,7 +254,6 @@ def split(line: np.ndarray, hidden: np.ndarray) -> Iterator[tuple[np.ndarray, bo
 
 
 def spacing(x: np.ndarray, count: int = 1) -> float:
-    """Mean distance of points (n, d) from their nearest `count` neighbours."""
     if len(x) <= count:
         return 0.0
     near = []

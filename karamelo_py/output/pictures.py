@@ -278,7 +278,6 @@ class Picture:
         self._laid_out = True
 
     def _make_room_at_left(self) -> None:
-        """Move the axes if the label of y would lie outside."""
         label = self.axes.yaxis.label
         out = MARGIN - label.get_window_extent(self.canvas.get_renderer()).x0
         if out <= MARGIN or not self.axes.axison or not label.get_text():
@@ -451,7 +450,6 @@ class SpacePicture(PlanePicture):
         return (x - self.middle) @ self.view.T
 
     def _draw_edges(self, axis: int, reach: float) -> None:
-        """Draw four edges; ticks at the lowest one, for z at the leftmost."""
         others = [k for k in range(3) if k != axis]
         edges = []
         for low_high in product(*((self.lo[k], self.hi[k]) for k in others)):

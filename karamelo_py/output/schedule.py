@@ -66,7 +66,6 @@ class Output:
         self.files[file] = writer
 
     def begin(self, *, within: bool = False) -> None:
-        """Write the first state unless the run continues `within` another."""
         if self.hub.rehearsing:
             return
         if self.plots.file is not None and not self.plots:

@@ -96,7 +96,6 @@ def write_rows(table, start, text, at):
 
 
 def _put_integer(text, at, n):
-    """Write an integer and return its end, or `at` if it is too large."""
     if not -LARGEST_INTEGER < n < LARGEST_INTEGER:
         return at
     text[index(at)] = MINUS

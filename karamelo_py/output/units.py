@@ -55,7 +55,6 @@ class Units(NamedTuple):
         return si * TIMES[self.time] ** powers.time
 
     def name(self, powers: Powers) -> str:
-        """Unit with a name (MPa), else a product (mm/ms)."""
         if powers in NAMED:
             order = log10(self.si(powers))
             if isclose(order, round(order), abs_tol=1e-9) and round(order) in PREFIXES:

@@ -30,7 +30,6 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
         top.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
 
         def virtual(group: h5py.Group, name: str, parts: Sequence[str]) -> None:
-            """Map columns to a virtual array; missing ones are 0."""
             layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
             layout.dcpl.set_obj_track_times(False)  # equal runs write equal files
             for k, component in enumerate(parts):

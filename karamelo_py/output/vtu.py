@@ -53,7 +53,6 @@ class Column:
         self._last = 0
 
     def add(self, rows: np.ndarray) -> None:
-        """Append rows (n,) or (n, components)."""
         components = f' NumberOfComponents="{rows.shape[1]}"' if rows.ndim == 2 else ""
         self._kind = f'type="{TYPES[rows.dtype]}" Name="{self.name}"{components}'
         self._rest += rows.tobytes()

@@ -54,7 +54,6 @@ class NodesByNumber:
         return nodes[self.simulation.setup.nodes.sums[nodes, MASS] > 0]
 
     def mass_of(self, group: NodeGroup) -> np.ndarray:
-        """Return the nodal mass of a group and its first moments: (4,), rounded once."""
         self.simulation.show_on_nodes()
         hub = self.points.hub
         nodes = np.intersect1d(self.with_mass(), hub.groups[group.id].members, assume_unique=True)

@@ -28,7 +28,6 @@ class BodyMotion(NamedTuple):
         return float((self.high - self.low).max()) / 2
 
     def drift(self, free: int) -> np.ndarray:
-        """Rigid velocity (d,) along the directions from `free` on."""
         return np.where(np.arange(len(self.velocity)) < free, 0.0, self.velocity)
 
     @property

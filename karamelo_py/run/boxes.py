@@ -15,8 +15,6 @@ SPAN = 256  # maximum nodes of a span
 
 
 class Boxes(NamedTuple):
-    """Boxes of nodes that b tiles of points reach."""
-
     order: np.ndarray  # (b,) order of summation
     grid: np.ndarray  # (b,)
     lo: np.ndarray  # (b, d) first nodes
@@ -53,7 +51,6 @@ def joined_spans(boxes: np.ndarray) -> np.ndarray:
 
 
 def ranges_of_shares(rows: np.ndarray, owner: np.ndarray, count: int) -> np.ndarray:
-    """Make `Setup.ranges` from rows (k, 2) of `count` owners, merging adjoining rows."""
     order = np.lexsort((rows[:, 0], owner))
     rows, owner = rows[order], owner[order]
     apart = (rows[1:, 0] != rows[:-1, 1]) | (owner[1:] != owner[:-1])
@@ -71,12 +68,10 @@ def extents(starts: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple[np.
 
 
 def used(spans: np.ndarray) -> np.ndarray:
-    """Return the used rows of spans, whose first row is their count."""
     return spans[: 1 + spans[0, 0]]
 
 
 def without(spans: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the parts of disjoint spans (k, 2) outside disjoint `others`."""
     edges = np.concatenate([spans.T.ravel(), others.T.ravel()])
     steps = np.repeat([1, -1, 2, -2], [len(spans)] * 2 + [len(others)] * 2)
     order = np.argsort(edges, kind="stable")

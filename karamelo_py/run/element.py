@@ -206,7 +206,6 @@ class Point:
     def _slopes(
         self, state: tuple, dl: np.ndarray, dt: float, ways: Sequence[np.ndarray]
     ) -> np.ndarray:
-        """Derivatives (6, w) of the stress after `dl` by w changes (3, 3) of it."""
         places = self.kin.Tensor.places
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         stress = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
@@ -253,7 +252,6 @@ class Point:
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
-        """dt grad v (3, 3) of a strain increment: pure shear, or simple in `shear`."""
         full = np.diag(increment[:3])
         for k, (i, j) in SHEARS.items():
             simple = k in shear

@@ -72,7 +72,6 @@ class EnergyWatch:
         self.told_of_loss = False
 
     def begin(self, *, set_anew: bool) -> None:
-        """Begin, or continue unless fields were `set_anew` since the last step."""
         simulation, watch, heat = self.simulation, self.watch, self.heat
         update = simulation.hub.update
         watch.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)

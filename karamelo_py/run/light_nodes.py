@@ -52,7 +52,6 @@ def stable_share(hub: Hub, grids: NamedTuple) -> float:
 
 
 def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
-    """Value 2 / w (c/h) of one solid's light nodes."""
     method, volume = hub.update.method, solid.volume0
     kin = method.kinematics(hub)
     places = method.places(kin, solid, float)

@@ -17,7 +17,6 @@ class Trouble(NamedTuple):
 
 
 def when(simulation: Any, later: int = 0) -> str:
-    """Format time and step (`later` steps on)."""
     return f"step {simulation.step + later}, t = {simulation.time:.6g}"
 
 

@@ -163,7 +163,6 @@ class SimulationOnCard(Simulation):
         return status
 
     def _report(self, number: int) -> None:
-        """Report the failed point in the tiles, as the CPU does."""
         for block in self.setup.blocks:
             report = block.tiling.report
             report[:, 2] = 0

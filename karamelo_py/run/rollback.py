@@ -116,7 +116,6 @@ class RollBack:
         )
 
     def _repeat(self) -> None:
-        """Repeat the steps up to the last good one; the outputs have their rows."""
         step, present = self.simulation.step, PartStates.of(self.hub, OUTPUTS)
         self.point.return_to(self.simulation)
         self.point.again(self.simulation.advance, step)

@@ -73,8 +73,6 @@ def scene_key(hub: Hub) -> tuple:
 
 
 class SceneArrays:
-    """Arrays and threads of a scene, or of one process's subdomain."""
-
     def __init__(self, hub: Hub, previous: SceneArrays | None = None):
         self.hub = hub
         self.comm: SerialComm = hub.settings.comm
@@ -158,7 +156,6 @@ class SceneArrays:
         )
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
-        """Return the largest velocity component relative to a common velocity."""
         velocities = (block.points.v for block in self.setup.blocks)
         # No copy: there may be millions of points.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
@@ -212,7 +209,6 @@ class SceneArrays:
             mark_nodes(self.setup)
 
     def sort_if_due(self) -> None:
-        """Sort the points if one may have left its tile's reach, or none is sorted."""
         motion = self.control.motion[0]
         if motion.drift > motion.drift_limit:
             self.sort()

@@ -60,7 +60,6 @@ class Simulation(SceneArrays):
 
     @cached_property
     def light_nodes(self) -> float:
-        """Stable step over h/c allowed by the nodes of thin and round solids."""
         return stable_share(self.hub, self.setup.grids)
 
     @property

@@ -143,7 +143,6 @@ def own_weight_of_drift(hub: Hub) -> float:
 
 
 def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
-    """Return the reference velocity (3,) that gives the common drift this weight."""
     bodies = motions(simulation) if weight != 1 else []
     common = np.zeros(3)
     if bodies:
@@ -210,7 +209,6 @@ def fastest_wave(simulation: SceneState) -> float:
 
 
 def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
-    """Return an undeformed solid's wave speed without viscosity, and if it is viscous."""
     law, kin = law_on(solid.material.whole, solid.h, solid.T0), simulation.kin
     viscous = not isinstance(parameter(law, "viscosity", Absent()), Absent)
     law = law._replace(viscosity=Absent()) if viscous else law

@@ -45,7 +45,6 @@ class Domain:
 
     @property
     def tolerance(self) -> float:
-        """Distance from a face within which a point lies on it."""
         size = self.h if self.h is not None else float((self.hi - self.lo).max()) * 1e-3
         return RELATIVE_TOLERANCE * size
 

@@ -50,7 +50,6 @@ class AnyGroup(Named):
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        """Look a group up; ``all`` is every node or point."""
         if ALL in (argument.text, argument.word()):
             return (ParticleGroup if cls is AnyGroup else cls)(hub, everything=True)
         try:
@@ -70,8 +69,6 @@ class AnyGroup(Named):
 
 
 class ParticleGroup(AnyGroup):
-    """Points, chosen by their reference positions when added."""
-
     kind = "particles"
     script_kind = "a group of points, or all"
     # From the lowest bit of a byte on, and 64 spare bits.
@@ -101,7 +98,6 @@ class ParticleGroup(AnyGroup):
                 yield ids[self.has(ids)]
 
     def has(self, ids: np.ndarray) -> np.ndarray:
-        """Mask (n,) by point number."""
         if self.all:
             return np.ones(len(ids), np.bool_)
         return (self._bits.take(ids >> 3, mode="clip") >> (ids & 7) & 1).astype(np.bool_)

@@ -299,7 +299,6 @@ class Hub:
         code: str = "",
         cause: str = "",
     ) -> None:
-        """Warn and record the warning, except in a rehearsal."""
         if not self.rehearsing:
             self.record.warn(message, hint, mark or self.mark, code, cause)
             text = render_message(
@@ -341,7 +340,6 @@ class Hub:
                 )
 
     def rehearsal(self) -> Hub:
-        """Copy the hub without objects that commands never change."""
         other = copy.copy(self)
         other.rehearsing = True
         other.parts = Parts(other)

@@ -73,7 +73,6 @@ class Lattice:
         return self.lo + self.places(numbers) * self.spacing
 
     def between(self, lo: np.ndarray, hi: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """Numbers (m,) and positions (m, d) of the nodes in a box, ascending, in chunks."""
         used = slice(self.dimension)
         corner, shape = self.lo[used], self.shape[used]
         below = (lo[used] - corner) / self.spacing - 1e-6

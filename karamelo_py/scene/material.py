@@ -50,7 +50,6 @@ class Material(MaterialPart):
 
     @property
     def words(self) -> str:
-        """Describe a material: ``steel (eos-strength: linear, plastic)``."""
         styles = [
             registry.name_of(kind, type(law))
             for kind, law in zip(self.whole._fields, self.whole, strict=True)

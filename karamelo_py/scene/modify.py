@@ -66,7 +66,6 @@ class Publisher:
         self.hub.values.set(f"{self.id}_{name}" if name else self.id, float(value))
 
     def publish_components(self, vector: np.ndarray) -> None:
-        """Publish ID_x, ID_y, ID_z."""
         for name, value in zip("xyz", vector, strict=False):
             if name in self.published:
                 self.publish(name, value)

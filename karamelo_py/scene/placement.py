@@ -55,7 +55,6 @@ class Filled:
         self._number[tuple(self._subs.T)] = np.arange(len(places))
 
     def candidates(self, begin: int, end: int) -> np.ndarray:
-        """Positions (m, d) in cells from `begin` to before `end`."""
         centre = self._corner + (positions(*self._cells, begin, end) + 0.5) * self._h
         return (centre[:, None, :] + self._places).reshape(-1, len(self._corner))
 

@@ -183,7 +183,6 @@ def misfit(function: Callable, count: int) -> str:
 
 
 def check_part(hub: Scene, name: str, plugin: Any) -> None:
-    """Refuse an incomplete transfer, basis, method or scheme (`name`: ``basis smooth``)."""
     family, kind = name.partition(" ")[0], type(plugin)
     missing = [attribute for attribute in SAID.get(family, ()) if not hasattr(kind, attribute)]
     error = f"{kind.__name__} has no attribute {', '.join(missing)}" if missing else ""

@@ -167,7 +167,6 @@ class Solid(Named):
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
-        """Positions (n, d) by ascending numbers."""
         positions = np.empty((len(numbers), self.domain.dimension))
         for begin in range(0, len(numbers), CHUNK):
             some = numbers[begin : begin + CHUNK]

@@ -43,7 +43,6 @@ def _is_dump(path: Path) -> bool:
 
 
 def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
-    """Columns of the last snapshot that a new solid can have, without zero ones."""
     from karamelo_py.output import snapshots  # with XML, for dumps only
 
     *_, last = snapshots.read(path)

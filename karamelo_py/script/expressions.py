@@ -90,8 +90,6 @@ class Expression:
         return terms.evaluated(self._term, lambda name: values.get(_published(name, values)))
 
     def program(self, values: Values) -> formula.Program:
-        """Compile the formula for present values."""
-
         def push(name: str) -> tuple[int, int]:
             if name in POINT_SEEDS:
                 return formula.POINT, POINT_SEEDS.index(name)
@@ -124,7 +122,6 @@ class Expression:
         return out
 
     def evaluate_columns(self, values: Values, columns: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Evaluate (n,) for rows of at most six named `columns`."""
         names = list(columns)
         if not names:
             return np.array([self.evaluate(values)])

@@ -23,7 +23,6 @@ _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
 
 def check_characters(text: str) -> None:
-    """Refuse files of Abaqus and LS-DYNA, and characters that need quotes."""
     first = _KEYWORD.match(text)
     if first and first[1].lower() in table()["abaqus"].split():
         hint = "docs/howto/from-abaqus.md says it in this language; solid mesh reads its mesh"

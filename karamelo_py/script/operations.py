@@ -135,7 +135,6 @@ def quietly(name: str, *numbers: float) -> float:
 
 
 def numbered(*names: str) -> tuple[tuple[int, Callable], ...]:
-    """Return numbers and functions of operations; interpreted, none raises."""
     every = UNARY | BINARY
     return tuple(
         (OPERATIONS[name], functools.partial(quietly, name) if INTERPRETED else every[name])

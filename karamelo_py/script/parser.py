@@ -61,7 +61,6 @@ def parse_expression(raw: syntax.Raw) -> syntax.Node:
 
 
 def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node]:
-    """Parse an expression from outside a script, such as the command line."""
     raw = syntax.Raw(syntax.Source(text, file), 0, len(text))
     return raw, parse_expression(raw)
 

@@ -135,8 +135,6 @@ class Statement:
 
 @dataclass(frozen=True, slots=True)
 class Assignment(Statement):
-    """``name = expression``: `right` as written, `node` its tree."""
-
     name: str
     right: Raw
     node: Node

@@ -69,8 +69,6 @@ _PRECEDENCE = {
 
 
 class Term:
-    """A number, a seed's name, or an operation on terms."""
-
     __slots__ = ("names", "operands", "operation", "size", "value")
 
     def __init__(self, operation: str, operands: "tuple[Term, ...]", value: Any):
@@ -150,7 +148,6 @@ def _inverse_normal(p: Term) -> Term:
 
 
 def alike(one: Term, other: Term) -> bool:
-    """Return True for equal terms, up to the operand order of + and *."""
     numbers: dict[tuple, int] = {}
     kinds: dict[int, int] = {}
     for term in (*in_order(one), *in_order(other)):

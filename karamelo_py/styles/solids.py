@@ -124,7 +124,6 @@ class RegionSolid(Solid):
         self._warn_of_size(hub)
 
     def _volumes(self, placement: Placement) -> tuple[float, float] | None:
-        """Volumes of the points and of the shape; None if the shape's volume is unknown."""
         whole = self.region.volume
         total = float(np.sum(np.broadcast_to(placement.volume, self.count)))
         return None if whole is None else (total, whole)

@@ -90,7 +90,6 @@ class Scaled(NamedTuple):
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:
-    """Measure strong, then weak scaling."""
     counts = sorted({1, *ranks})
     for n in counts:
         yield measured_with_ranks(job._replace(ranks=n))

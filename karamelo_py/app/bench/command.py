@@ -189,7 +189,6 @@ def _print_solved(one: measure.Solved) -> None:
 
 
 def commit() -> str | None:
-    """Return the commit of the package, None outside a repository."""
     folder = Path(karamelo_py.__file__).parent
 
     def git(*words: str) -> str:

@@ -95,13 +95,11 @@ class Measured(NamedTuple):
 
     @property
     def swept(self) -> float:
-        """Time of separate sweeps over one compiled step."""
         swept = sum(self.sweeps_of_points.values()) + sum(self.sweeps_of_nodes.values())
         return (swept - self.waits) * self.best / self.points
 
     @property
     def told_apart(self) -> bool:
-        """Return True if sweeps are long enough to be timed."""
         return self.swept <= APART
 
     @property
@@ -111,7 +109,6 @@ class Measured(NamedTuple):
 
     @property
     def nodes(self) -> float:
-        """Fraction of the sweeps spent on nodes."""
         nodes = sum(self.sweeps_of_nodes.values())
         swept = nodes + sum(self.sweeps_of_points.values())
         return nodes / swept if swept else 0.0
@@ -132,7 +129,6 @@ class Measured(NamedTuple):
         return "memory" if self.roofline_in_place >= ALONE else "arithmetic"
 
     def record(self) -> dict[str, Any]:
-        """Speeds in particle-steps/s, times in seconds."""
         speeds = {"best": self.best, "median": self.median, "limited_by": self.limit}
         return speeds | {"share_of_nodes": self.nodes, "share_of_rest": self.rest} | self._asdict()
 
@@ -262,7 +258,6 @@ def _waits(simulation: Simulation) -> np.ndarray:
 
 
 def timed_steps(simulation: Simulation, count: int) -> float:
-    """Take steps and return the seconds, also on a GPU."""
     card = simulation.hub.settings.card
     wait = card.wait if card else lambda: None
     wait()
@@ -274,7 +269,6 @@ def timed_steps(simulation: Simulation, count: int) -> float:
 
 
 def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], dict[str, float]]:
-    """Seconds per step of each sweep over points, and over nodes: summed medians."""
     s, scheme = simulation.setup, simulation.hub.update.scheme
     timed = Timed(simulation.mode, {}, {})
     begin(StepKind(scheme, Fused(), timed), s, NoHooks(), True)

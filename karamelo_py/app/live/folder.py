@@ -78,7 +78,6 @@ class FolderPage:
         return grown or len(self._states) > before
 
     def _dumps(self) -> list[Path]:
-        """Return the particle dumps with most columns; their names differ by number only."""
         kinds: dict[str, list[Path]] = {}
         for path in sorted(self.folder.iterdir()):
             if path.is_file() and (path.suffix in WHOLE or _is_text_dump(path)):

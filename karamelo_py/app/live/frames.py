@@ -81,7 +81,6 @@ class KeptFrames:
             return [[k, f.step, plain(f.time), f.column, f.of] for k, f in self._kept.items()]
 
     def answer(self, words: Mapping[str, str]) -> bytes | None:
-        """Return the positions of a frame, one coordinate after another, then its column."""
         with self._lock:
             frame = self._kept.get(number_in(words))
         return None if frame is None else frame.numbers.tobytes()
@@ -93,7 +92,6 @@ def number_in(words: Mapping[str, str]) -> int:
 
 
 def plain(value: object) -> object:
-    """Replace numbers that JSON lacks by None."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return value

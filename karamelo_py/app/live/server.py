@@ -204,7 +204,6 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 self._give(b"{}", "application/json")
 
         def _is_from_here(self) -> bool:
-            """Return True if Host and Origin, if sent, are this server."""
             host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
             try:
                 here = urlsplit(f"//{host}").hostname in HERE
@@ -213,7 +212,6 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
                 return False
 
         def _asked(self) -> tuple[str | None, dict[str, str]]:
-            """Return the requested name (None without the secret word) and the query."""
             asked = urlsplit(self.path)
             before, _, name = asked.path.lstrip("/").partition("/")
             right = secrets.compare_digest(before.encode(), server.token.encode())

@@ -185,7 +185,6 @@ class Adviser:
         return {name: case[name] for name in self.study.names}
 
     def pilot(self, count: int) -> None:
-        """Run all choices up to the target or `count` runs, with earlier runs."""
         for _ in range(min(count, len(self.values))):
             for choice in self.choices:
                 if not self._met(choice):
@@ -213,7 +212,6 @@ class Adviser:
         ]
 
     def _crosses(self, choice: ChoiceRuns, step: int) -> bool:
-        """Return True if gradients jump, and points may cross cells at a step."""
         finer = np.exp(abs(np.log(self.xs[step] / self.xs[len(choice.rows) - 1])))
         stay = column(choice.rows[-1:], "path")[0] * finer <= STILL  # NaN if unknown
         return not stay and bool(choice.kind & {*JUMPING} and choice.kind & {*CROSSED})
@@ -377,7 +375,6 @@ def run(options: Namespace) -> int:
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
-    """Order values by the work that they cause, as `check` measures."""
     ordered = sorted(values, key=float)
     work = []
     for value in (ordered[0], ordered[-1]):
@@ -478,7 +475,6 @@ def _nothing(adviser: Adviser) -> int:
 
 
 def carry_out(adviser: Adviser, best: Candidate | None, script: Path) -> int:
-    """Run finer variants until the target is met."""
     best = best or adviser.hopeful()
     while best is not None and best.forecast is not None:
         advised = best.step == len(best.choice.rows)

@@ -221,7 +221,6 @@ def write_page(page: Path, entries: list[Entry], folder: Path, inputs: Path) -> 
 
 
 def part_of_page(entry: Entry, folder: Path, shown: Path, inputs: Path) -> str:
-    """Write an entry's section of the page; copy its pictures to `shown`."""
     parts = [entry.name, entry.text]
     title = re.split(r"[.:](?:\s|$)", " ".join(entry.text.split()))[0] or entry.name
     for path in sorted(path for path in folder.iterdir() if path.suffix in PICTURES):

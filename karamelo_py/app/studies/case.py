@@ -187,7 +187,6 @@ class Launch:
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        """Return the peak memory (MiB), and whether time was up."""
         pause, memory = 0.005, None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
@@ -238,7 +237,6 @@ def record_of(folder: Path) -> Record:
 
 
 def facts_of(record: Record) -> dict[str, float]:
-    """Collect `COLUMNS` from all runs of a script, or from the first."""
     runs = record.get("runs", [])
     first = runs[0] if runs else {}
     names = ("points", "nodes", "nodes_per_point", "bytes_per_point", "dt", "stable_dt", "own_dt")

@@ -130,8 +130,6 @@ class Table(NamedTuple):
 
 @dataclass
 class GroupedRuns:
-    """Runs that differ in one variable, in its order."""
-
     choice: dict[str, str]  # variables that differ between lines
     rows: list[Mapping[str, str]]
     # NaN where missing.
@@ -148,7 +146,6 @@ class GroupedRuns:
 
     @property
     def rises(self) -> bool:
-        """Return True if the variable grows with refinement, by particle-steps if known."""
         done = column(self.rows, "particle_steps")
         return not order(self.x, done if np.isfinite(done).all() else self.cost).exponent < 0
 
@@ -258,7 +255,6 @@ class Family:
 
 
 def errors(rows: Sequence[Row], name: str) -> np.ndarray:
-    """Errors of rows, signed where possible; NaN where missing."""
     signed = column(rows, name + SIGNED)
     return np.where(np.isfinite(signed), signed, column(rows, name))
 

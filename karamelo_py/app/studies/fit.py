@@ -67,7 +67,6 @@ class Observation:
             self.times, self.wanted = next(iter(table.values())), table[column]
 
     def differences(self, log: Mapping[str, np.ndarray], case: Mapping[str, str]) -> np.ndarray:
-        """Log minus measurement (n,), over the largest measurement."""
         if self.times is None:
             values = np.array([self.item.of(log, case)])
         elif log["Time"][-1] < self.times[-1] * (1 - 1e-9):
@@ -92,7 +91,6 @@ class End:
 
     @property
     def left(self) -> float:
-        """Root mean square difference."""
         return float(np.sqrt(np.mean(self.off**2)))
 
 
@@ -113,7 +111,6 @@ class Search:
         return self.fixed | {n: f"{x:.10g}" for n, x in zip(self.names, at, strict=True)}
 
     def differences(self, *fractions: np.ndarray) -> list[np.ndarray]:
-        """Return the differences at these positions; inf for a failed run."""
         cases, results = [self.case(fraction) for fraction in fractions], []
         for case, row in zip(cases, self.study.run(cases), strict=True):
             try:

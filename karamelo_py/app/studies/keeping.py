@@ -34,7 +34,6 @@ class Kept(NamedTuple):
 
 
 def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, float]:
-    """Return the verdict, and the mean of the last part over the first."""
     span = ENDS * (x[-1] - x[0])
     first, last = float(y[x <= x[0] + span].mean()), float(y[x >= x[-1] - span].mean())
     if first == 0:

@@ -215,7 +215,6 @@ class History(NamedTuple):
 def histories(
     table: Table, by: Sequence[str], over: str, curve: str, *, log: str, names: Sequence[str]
 ) -> list[History]:
-    """Collect curves labelled by `names` or the variables `by`."""
     curves = []
     for k, row in enumerate(table.rows):
         columns = read_log(table.path.parent / row["folder"], log)

@@ -81,7 +81,6 @@ class Law:
 
 
 def measured_in(path: Path, x: str, result: str) -> History:
-    """Read the columns with these names, else the first two."""
     columns = read_table(path)
     if len(columns) < 2:
         raise ScriptError(f"{path} has one column", expected="two, of x and of what was measured")

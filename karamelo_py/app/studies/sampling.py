@@ -42,7 +42,6 @@ def require_power_of_2(option: str, count: int) -> None:
 
 
 def random_variables(words: Sequence[str]) -> tuple[list[Random], list[str]]:
-    """Separate ``NAME=normal(1, 0.1)`` from other words of -var."""
     variables, others = [], []
     for word in words:
         name, _, text = (piece.strip() for piece in word.partition("="))

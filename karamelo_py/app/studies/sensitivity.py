@@ -47,7 +47,6 @@ Results = Callable[[np.ndarray], np.ndarray]  # (d, n) to (results, n)
 def sobol(
     laws: Sequence, results: Results, n: int, seed: int
 ) -> list[list[tuple[Interval, Interval]]]:
-    """First and total indices, for each result and each variable."""
     from scipy.stats import sobol_indices
 
     require_power_of_2("-n", n)
@@ -74,7 +73,6 @@ def sobol(
 def morris(
     laws: Sequence, results: Results, n: int, seed: int
 ) -> list[list[tuple[Interval, float]]]:
-    """mu* with its interval, and sigma, for each result and each variable."""
     from SALib.analyze import morris as analyzer
     from SALib.sample import morris as sampler
 

@@ -54,7 +54,6 @@ def probability(count: int, of: int) -> Interval:
 
 
 def samples_in(rows: Sequence[Row], others: Sequence[str]) -> dict[str, list[Row]]:
-    """Group rows by the values of variables that are not random."""
     cases: dict[str, list[Row]] = {}
     for row in rows:
         cases.setdefault(", ".join(f"{name} = {row[name]}" for name in others), []).append(row)

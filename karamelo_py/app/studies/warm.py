@@ -177,7 +177,6 @@ def keep(link: socket.socket) -> NoReturn:
 
 
 def _run(request: list[str], out: int, err: int, stays: int | None = None) -> NoReturn:
-    """Run a case; leave a copy if it went well."""
     from karamelo_py.app.start import main
 
     folder, *sys.argv[1:] = request

@@ -180,7 +180,6 @@ def opened(path: Path, group: str = "state") -> Iterator[dict[str, InFile]]:
 
 @contextmanager
 def reading() -> Iterator[None]:
-    """Convert HDF5 errors within the block to errors about a damaged file."""
     try:
         yield
     except OSError as error:

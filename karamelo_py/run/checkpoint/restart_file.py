@@ -180,8 +180,6 @@ def is_restart(path: Path) -> bool:
 
 
 class Restart:
-    """A file's content; ``*`` in the name means the largest number."""
-
     def __init__(self, path: Path, out: Path | None = None):
         import h5py
 

@@ -59,7 +59,6 @@ class AveragedVolumes:
             loops.bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
 
     def _matrix(self, name: str) -> sp.csr_matrix:
-        """Sum point tensors times weights and gradients of their nodes: (m, m d)."""
         e = self.equations
         columns = (e.pairs[1][:, None] * e.d + np.arange(e.d)).ravel()
         data = np.zeros(len(columns))
@@ -70,7 +69,6 @@ class AveragedVolumes:
         return sp.csr_matrix((data, columns, e.d * e.layout.first), (m, m * e.d))
 
     def stiffness(self) -> sp.csr_matrix:
-        """Assemble the coupling of points through mean volumes: (m d, m d)."""
         e, m = self.equations, len(self.equations.nodes)
         S = sp.diags(1 / self.volume) @ self._matrix("cofactors")
         data = np.zeros(len(e.pairs[1]))

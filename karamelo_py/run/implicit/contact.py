@@ -64,7 +64,6 @@ class Contact:
         self.respond(np.zeros((m, self.d)), supposed=True)
 
     def _shares(self) -> np.ndarray:
-        """Return nodal masses (m,) as fractions of an inner node's."""
         equations = self.equations
         mass = equations.mass / self._around(equations.positions[:, 0], self.s.grids.spacing[0])
         most = np.zeros(len(self.s.grids.first))
@@ -72,7 +71,6 @@ class Contact:
         return mass / np.maximum(most[equations.grid], 1e-300)
 
     def _stiffness(self, moduli: np.ndarray) -> np.ndarray:
-        """Return spring stiffnesses (c,), from the softer body of each pair."""
         both = np.stack([moduli[self.a], moduli[self.b]])
         softer = np.where(both > 0, both, np.inf).min(0)
         h = self.s.grids.spacing[self.a]
@@ -182,7 +180,6 @@ class Contact:
         return a + inverse * (forces - self.jump.T @ drag)
 
     def _stopping(self, v: np.ndarray, inverse: np.ndarray, rows: sp.csr_matrix) -> np.ndarray:
-        """Return impulses (m, d) that make `rows` (r, m d) of velocities (m, d) vanish."""
         seen = rows @ v.ravel()
         if not np.any(seen):
             return np.zeros_like(v)
@@ -191,13 +188,11 @@ class Contact:
         return -(rows.T @ np.atleast_1d(spsolve(W.tocsc(), seen))).reshape(v.shape)
 
     def _across(self) -> sp.csr_matrix:
-        """Return the matrix (c, m d) of relative normal displacements."""
         c, d = self.normal.shape
         at = np.repeat(np.arange(c), d), np.arange(c * d)
         return (sp.csr_matrix((self.normal.ravel(), at), (c, c * d)) @ self.jumps).tocsr()
 
     def publish(self) -> None:
-        """Publish the forces on bodies, remember contacts, and heat nodes by friction."""
         tag, values = self.tag, self.s.control.values
         step = int(values[TIMESTEP]) + 1
         x = np.zeros((len(self.first), 3))

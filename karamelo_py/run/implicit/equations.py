@@ -109,7 +109,6 @@ class Equations:
         return seen, response
 
     def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
-        """Mask nodes (m,) of rigid points; return their velocities (m, d), too."""
         mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
         for block, seen in tools:
             loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
@@ -245,7 +244,6 @@ class Equations:
         return rigid_motions(self.positions, free_from(self.s.kin))
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
-        """Expand a matrix (m, m) to all components (m d, m d), uncoupled."""
         blocks = matrix.data[:, None, None] * np.eye(self.d)
         shape = tuple(self.d * size for size in matrix.shape)
         return sp.bsr_matrix((blocks, matrix.indices, matrix.indptr), shape)
@@ -288,7 +286,6 @@ class Equations:
         return sp.csr_matrix((data, self.pairs[1], self.layout.first), (m, m))
 
     def moduli(self) -> "Moduli":
-        """Estimate Young's moduli at rest: 2.6 times the mean shear modulus."""
         kin = self.s.kin
         places = kin.Tensor.places
         of_grids = np.zeros((2, len(self.s.grids.first)))

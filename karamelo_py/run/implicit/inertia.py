@@ -83,7 +83,6 @@ class Motion:
         return np.where(self.fixed, (self.prescribed - self.v) / self.dt, free)
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
-        """Add inertia to the residual forces (m, d)."""
         a = self.acceleration(u)
         # Reactions are those at the end of the step.
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))

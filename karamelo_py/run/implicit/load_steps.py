@@ -416,8 +416,6 @@ class Equilibrium(NamedTuple):
 
 
 class ImplicitSimulation(Simulation):
-    """Takes load steps, and implicit steps with inertia, on the CPU."""
-
     repeats_steps = False
     remedy = "smaller load steps (set_dt), or another tolerance, iterations or solver"
     implicit = True

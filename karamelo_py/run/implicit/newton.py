@@ -123,7 +123,6 @@ class Newton:
 
     @property
     def unstable(self) -> bool:
-        """Return True if the solver found the last stiffness not positive definite."""
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:

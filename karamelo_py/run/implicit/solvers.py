@@ -34,7 +34,6 @@ def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
 
 
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
-    """Scale rows and columns to a diagonal of 1, or by factors `s` (n,)."""
     if A.format == "bsr":
         A = A.tocsr()
         A.eliminate_zeros()  # of decoupled components, which may be many
@@ -121,7 +120,6 @@ def amg(
 
 
 def is_symmetric(A: sp.spmatrix) -> bool:
-    """Return True if A x = A^T x for a random x, up to rounding."""
     x = np.random.default_rng(0).uniform(0.5, 1.5, A.shape[0])
     return bool(np.linalg.norm(A @ x - A.T @ x) <= 1e-9 * np.linalg.norm(abs(A) @ x))
 

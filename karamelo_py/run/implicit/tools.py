@@ -44,7 +44,6 @@ class PushingTool:
         self.included = self.force = self.at(self.way)  # included in the forces of the step
 
     def at(self, way: np.ndarray) -> np.ndarray:
-        """Return forces (n, d) on points displaced by `way` (n, d)."""
         return self.fix.forces(Displaced(self.view, way))
 
     def respond(self, u: np.ndarray) -> None:
@@ -55,7 +54,6 @@ class PushingTool:
         return self.gather.T @ (self.force - self.included)
 
     def matrix(self) -> sp.bsr_matrix:
-        """Return the stiffness (m d, m d) of the forces, by central differences."""
         n = len(self.way)
         slopes = np.empty((n, self.d, self.d))
         for j, step in enumerate(self.near * np.eye(self.d)):

@@ -111,7 +111,6 @@ def check_scene(hub: Hub) -> None:
 
 
 def _features(hub: Hub) -> Iterator[Feature]:
-    """Yield the choices of a scene, and its options without restrictions."""
     update, settings, method = hub.update, hub.settings, hub.update.method
     kin = method.kinematics(hub)
     mark, name = method.mark, registry.name_of("method", type(method))
@@ -166,7 +165,6 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
 
 
 def _check_restrictions(hub: Hub) -> None:
-    """Refuse combinations that a capability of the scene does not support."""
     declared = {
         Feature(restrictions.option, "", words, restrictions.instead, mark): restrictions
         for restrictions, words, mark in _restricted(hub)
@@ -256,7 +254,6 @@ def lower(
 
 
 def fixes_of_bodies(hub: Hub) -> tuple:
-    """Return the fixes of free rigid bodies, and those that hold nodes; () without bodies."""
     fixes = [fix for fix in hub.fixes.values() if fix.body or fix.prescribes_velocity]
     return tuple(fixes) if any(fix.body for fix in fixes) else ()
 
@@ -315,7 +312,6 @@ def resume_nodes(nodes: arrays.Nodes, grids: NamedTuple, previous: State) -> Non
 
 
 def part_of(solid: Solid, first: int, end: int) -> Solid:
-    """Return a copy of a solid with the points of ids [first, end)."""
     begin, end = (min(max(i - solid.first_id, 0), solid.count) for i in (first, end))
     other = copy.copy(solid)
     for name, value in vars(solid).items():
@@ -333,7 +329,6 @@ def point_kinds(hub: Hub) -> tuple[type, ...]:
 def lower_points(
     hub: Scene, solids: list, kin: NamedTuple, kinds: tuple[type, ...], real: type
 ) -> tuple[arrays.Points, NamedTuple]:
-    """Lower the points of solids whose laws are of one kind, and these laws."""
     method = hub.update.method
     law_of_solids = [law_on(s.material.law, s.h, s.T0) for s in solids]
     if hub.fields.rate_is_asked_for():

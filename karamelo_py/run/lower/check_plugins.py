@@ -204,7 +204,6 @@ def _try_basis(hub: Hub, setup: Setup) -> None:
 
 
 def _try_functions(plugin: PartInUse, setup: Setup, points: Points, p: int) -> None:
-    """Check at a point that basis functions sum to 1 and their gradients to 0."""
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
     at = place_at(basis, kin, points.x[0] if points.home is None else points.home, p)

@@ -25,8 +25,6 @@ RESTRICTIONS = Restrictions(
 
 
 class PoreWater(NamedTuple):
-    """The fluid of a material: numbers of its `Saturated`."""
-
     restrictions = RESTRICTIONS
 
     n: float
@@ -40,11 +38,9 @@ class PoreWater(NamedTuple):
 
     @property
     def stiffness(self) -> float:
-        """Stiffness of the water in the pores, per strain."""
         return self.K / self.n
 
     def heavier(self, dry: float) -> float:
-        """Density of soil and water over the `dry` density."""
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
@@ -62,5 +58,4 @@ class PoreWater(NamedTuple):
         return f"Tv = {Tv:.2g} across the shortest side of '{solid.id}', {state}"
 
     def set_pressure(self, points: PointsView, pressure: np.ndarray) -> None:
-        """Set the pressure (n,) of the water of points; dry ones are unaffected."""
         points.impose(rows.impose_pore_pressure, pressure, Saturated)

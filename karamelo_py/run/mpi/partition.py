@@ -70,8 +70,6 @@ FINE = 1000  # integer work per unit of cost
 
 
 class Needs(NamedTuple):
-    """Used nodes of a process: boxes of them at k tiles of nodes."""
-
     tile: np.ndarray  # (k,) ascending
     lo: np.ndarray  # (k, d)
     hi: np.ndarray  # (k, d)
@@ -133,7 +131,6 @@ class SharedTiles(Tiles):
         return self.owner is not before
 
     def loads(self, blocks: Sequence[Block]) -> np.ndarray:
-        """Count points of each sorted block, and nodes in reach: (blocks + 1, tiles)."""
         counts = np.zeros((len(blocks) + 1, self.count), np.int64)
         for row, block in zip(counts, blocks, strict=False):
             tiles, points = occupied(block.tiling)
@@ -249,7 +246,6 @@ class SharedTiles(Tiles):
         return tile % int(self._first_of_nodes[1]) if self.one_space else tile
 
     def _reached(self, boxes: Boxes) -> tuple[Boxes, Reached]:
-        """Find what own boxes reach; add the overlaps of others' boxes at nodes used here."""
         _, reached = super()._reached(boxes)
         of, tile = self._of[reached.box], self._tile_of_domain(reached.tile)
         me = self.comm.rank

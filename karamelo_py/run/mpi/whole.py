@@ -25,8 +25,6 @@ class PointsMoved(Exception):
 
 
 class Whole:
-    """Arrays of a whole scene, gathered from the processes and handed out again."""
-
     def __init__(self, simulation: SceneState, subdomain: Any):
         self.simulation, self.subdomain = simulation, subdomain
         # With arrays of nodes, and one point.

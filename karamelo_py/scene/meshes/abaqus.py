@@ -97,7 +97,6 @@ def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
 
 
 def _spherical(x: np.ndarray) -> np.ndarray:
-    """From radius, longitude and latitude in degrees."""
     turn, rise = np.radians(x[:, 1]), np.radians(x[:, 2])
     flat = x[:, 0] * np.cos(rise)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.sin(rise)], axis=1)
@@ -124,7 +123,6 @@ def _system(keyword: DeckKeyword) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _motion(keyword: DeckKeyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Translation, then rotation about two points, in degrees."""
     rows = [table_of(keyword._replace(lines=[line]), 1, 7)[0] for line in keyword.lines[:2]]
     shift = rows[0][:3] if rows else np.zeros(3)
     if len(rows) < 2:

@@ -93,7 +93,6 @@ FACE_TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 
 
 def outer_faces_of(mesh: Mesh, mask: np.ndarray) -> list[CellBlock]:
-    """Faces of one element only, with all nodes in the mask (N,)."""
     highest = max((cells.dimension for cells in mesh.cells if cells.family in FACES), default=0)
     faces: dict[int, list[np.ndarray]] = {}
     for cells in mesh.cells:

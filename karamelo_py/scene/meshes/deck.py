@@ -135,7 +135,6 @@ def into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
 
 
 def members(sets: SetItems, name: str) -> np.ndarray:
-    """Ascending numbers of a set, or the number itself."""
     if name.lstrip("-").isdigit() and name not in sets:
         return np.array([int(name)])
     return np.unique(np.concatenate([np.empty(0, np.int64), *_resolved(sets, name, ())]))

@@ -133,7 +133,6 @@ def elements_of(
 
 
 def in_order(cells: CellBlock) -> CellBlock:
-    """Reorder pixels and voxels (row by row), and halve six-sided prisms."""
     order = {
         "pixel": ("quad", [[0, 1, 3, 2]]),
         "voxel": ("hexahedron", [[0, 1, 3, 2, 4, 5, 7, 6]]),
@@ -257,7 +256,6 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
 
 
 def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted det J (n, q) and positions (n, q, d) at Gauss points."""
     if shape.simplex and len(reference) == len(shape.corners):
         edges = nodes[:, 1:] - nodes[:, :1]
         weights = np.linalg.det(edges)[:, None] / math.factorial(shape.dimension)
@@ -311,7 +309,6 @@ def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndar
 
 
 def _of_pyramids(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_functions` of a cube whose upper corners coincide."""
     cube = SHAPES["hexahedron"].corners
     functions, slopes = _functions("hexahedron", cube, points)
     upper = [of[:, 4:].sum(axis=1, keepdims=True) for of in (functions, slopes)]

@@ -32,13 +32,11 @@ class Skin:
         return np.concatenate([surface.faces for surface in self.surfaces])
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Depth (n,) of positions (n, >= d), negative outside, up to `reach`."""
         if self.open:
             return -np.minimum.reduce([distances(surface, x, reach) for surface in self.surfaces])
         return np.maximum.reduce([depths(surface, x, reach) for surface in self.surfaces])
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of positions (n, >= d) in the body or on its faces."""
         return self.depth(np.asarray(x), 2 * self.tolerance) >= -self.tolerance
 
 
@@ -93,14 +91,12 @@ def _once(rows: np.ndarray) -> np.ndarray:
 
 
 def _halves(rank: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
-    """Split quadrilaterals (n, 4, d) into triangles from the corner of lowest `rank`."""
     order = (np.argmin(rank, axis=1)[:, None] + np.arange(4)) % 4
     turned = np.take_along_axis(corners, order[:, :, None], axis=1)
     return [turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]]
 
 
 def triangles_of(mesh: Mesh) -> np.ndarray:
-    """Triangles (m, 3) of a surface; quadrilaterals are split inside their outline."""
     parts = [np.empty((0, 3), np.int64)]
     for cells in mesh.cells:
         nodes = cells.nodes
@@ -244,7 +240,6 @@ def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
 def _within(
     shells: list[np.ndarray], lo: np.ndarray, hi: np.ndarray, tolerance: float
 ) -> np.ndarray:
-    """Mask (n, n) of shells completely inside others."""
     n = len(shells)
     within = np.zeros((n, n), bool)
     for k in range(n):

@@ -52,7 +52,6 @@ class _Entry(NamedTuple):
     file: Path
 
     def whole(self, k: int) -> int:
-        """Field `k` from 0; 0 if empty."""
         try:
             return int(self.fields[k] or 0) if k < len(self.fields) else 0
         except ValueError:
@@ -109,7 +108,6 @@ def _entries(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Entry]:
 
 
 def _spherical(x: np.ndarray) -> np.ndarray:
-    """From radius, angle from z, and longitude, in degrees."""
     down, turn = np.radians(x[:, 1]), np.radians(x[:, 2])
     flat = x[:, 0] * np.sin(down)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), x[:, 0] * np.cos(down)], axis=1)

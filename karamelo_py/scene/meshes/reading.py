@@ -230,7 +230,6 @@ def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np
 
 
 def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Named sets, and integer tags as ``name`` and ``name:number``."""
     for name, elements in mesh.cell_sets.items():
         if not name.startswith("gmsh:"):
             yield (

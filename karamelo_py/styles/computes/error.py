@@ -201,7 +201,6 @@ class Error(Compared, Compute):
         self.publish_all(now, self.norm.largest, self.norm.history)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Return magnitudes (2, n) of differences and exact values, and weights (n,)."""
         x, x0 = points.position, points.reference_position
         squares = np.zeros((2, points.count))
         for name, weight, formula in self.parts:
@@ -323,6 +322,5 @@ class Reference(Compared, Compute):
         return sizes, points.reference_volume[within], exact, np.ones(len(exact))
 
     def _exact(self, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the mask (n,) of the positions that the curve covers, and its values there."""
         within = (at >= self.curve[0][0]) & (at <= self.curve[0][-1])
         return within, np.interp(at[within], *self.curve)

@@ -16,8 +16,6 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Mean(Compute):
-    """Base of means over weights (`terms`); with zero total weight the mean is `empty`."""
-
     empty = 0.0
 
     def sums(self) -> Sequence[float]:
@@ -252,7 +250,6 @@ class PositionQuantile(Compute):
         self.publish_components(_numbers(np.array(first, np.uint64)))
 
     def masses(self, points: PointTable, shift: int, first: list[int]) -> tuple:
-        """Masses of points whose coordinates begin with the bits `first`, by their next bits."""
         terms_by_axis = []
         for axis, begin in enumerate(first):
             bits = _bits(points.position[:, axis].astype(float)) >> np.uint64(shift)

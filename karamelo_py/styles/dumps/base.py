@@ -56,7 +56,6 @@ class Dump(Rhythmic):
         self.hub.warn(begins_anew(self.path()), mark=self.mark)
 
     def warn_of_absent(self, columns: Sequence[str], absent: Sequence[str], owner: str) -> None:
-        """Warn that columns are 0 because no point or node (`owner`) stores them."""
         empty = [name for name in dict.fromkeys(columns) if name in absent]
         if empty:
             self.hub.warn(f"dump: {', '.join(empty)} will be 0: {owner} have no such field")
@@ -68,8 +67,6 @@ LEADING = ("id", "type", "tag")
 
 
 class TableRows(NamedTuple):
-    """Ids and types (n,) in the order of ids, and columns."""
-
     ids: np.ndarray
     types: np.ndarray
     columns: list[np.ndarray]

@@ -126,7 +126,6 @@ class GridVtk(OfNodes, VtkDump):
     """
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Store the numbers of the written nodes, if some are omitted."""
         if self.occupied:
             kept.append(ids)
 

@@ -45,7 +45,6 @@ class EdgeHeat(OnEdge, HeatFix):
 
 
 def on_points(points: PointsView, faces: Faces, of_faces: np.ndarray) -> np.ndarray:
-    """Sum face values (m,) over the faces of each point (n,)."""
     return np.bincount(faces.point, of_faces, len(points.ids))
 
 

@@ -116,14 +116,12 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
 
 
 def in_parts(x: np.ndarray, size: float) -> np.ndarray:
-    """Return the centres (n PARTS^d, d) of the sub-boxes of boxes around `x`."""
     d = x.shape[1]
     places = (np.array(list(itertools.product(range(PARTS), repeat=d))) + 0.5) / PARTS - 0.5
     return (x[:, None, :] + size * places).reshape(-1, d)
 
 
 def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np.ndarray:
-    """Return the surface area (n,) in boxes around `x`, summed over sub-boxes at an edge."""
     lengths, d = np.linalg.norm(area, axis=1), x.shape[1]
     corners = np.array(list(itertools.product((-0.5, 0.5), repeat=d)))
     depth = region.depth((x[:, None, :] + size * corners).reshape(-1, d), 2 * size)
@@ -157,7 +155,6 @@ def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Return the surface at the points `ids` of a solid, in every orientation."""
     pieces = surface_at(solid, region, ids)
     none = np.zeros(len(pieces.point), np.int64)
     area = pieces.length * solid.domain.depth(pieces.middle)

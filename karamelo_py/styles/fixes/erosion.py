@@ -59,7 +59,6 @@ class Erosion(Fix):
             hub.warn(f"{', '.join(empty)} will be 0: points have no such field")
 
     def between_steps(self) -> bool:
-        """Return True if points met the condition."""
         tables = self.hub.fields.each(self, "meeting")
         ids = np.sort(np.concatenate([np.empty(0, np.int64), *tables]))
         if not len(ids):

@@ -229,7 +229,6 @@ class Keeper:
         self.seen = self._look()
 
     def forgotten(self) -> list[str]:
-        """Names of values that have changed since the last call and are not remembered."""
         before, self.seen = self.seen, self._look()
         return [name for name, seen in before.items() if self.seen.get(name, seen) != seen]
 

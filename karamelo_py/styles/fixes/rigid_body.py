@@ -237,7 +237,6 @@ class RigidBody(Fix):
             self.hub.values.array[slot] = self.state[column]
 
     def rigid_positions(self) -> np.ndarray:
-        """Positions (n, d) of its points."""
         d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
         arm[:, :d] = self.body.x0
         arm -= self.constants[kernel.START : kernel.START + 3]
@@ -255,7 +254,6 @@ class RigidBody(Fix):
             )
 
     def slots(self) -> np.ndarray:
-        """Slots of its values and their columns in the state, (k, 2)."""
         columns = dict(zip(("", "r", "v", "w", "f", "t"), COLUMNS, strict=True))
         names = [(name, columns[name[:-1]] + "xyz".index(name[-1])) for name in self.published]
         return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])

@@ -180,7 +180,6 @@ class VelocityNodes(Fix):
         return next(iter(bounds), "")
 
     def defined(self) -> None:
-        """Refuse walls outside the domain; warn of two velocities of a node."""
         if self.hub.domain.h is None:
             return
         self.group.refuse_past_domain()

@@ -25,7 +25,6 @@ def start(mass, v, x_old, x, value, before, dt, kick):
 
 
 def carry(mass, v, x_old, x, value, before, dt, kick):
-    """Move the point with the value; the total is the force needed."""
     return value, x_old + dt * value, mass * (value - v) / kick
 
 
@@ -184,7 +183,6 @@ def _differ(simulation: Any, other: Any, fix: Any, axis: int, ids: np.ndarray) -
 
 
 def _within(simulation: Any, support: Any, driven: Any) -> np.ndarray:
-    """Ids of the driven points in cells whose corners are all held."""
     hub, method = simulation.hub, simulation.hub.update.method
     still = np.zeros(support.group.total(), np.bool_)
     still[support.nodes] = True

@@ -37,7 +37,6 @@ class ToolFix(PointForces):
             )
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Number of points in the tool now, and the largest depth."""
         depth = self.depth_of(points)
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
@@ -55,7 +54,6 @@ class ToolFix(PointForces):
         return points.position.astype(float) - self.now(*origin)
 
     def side(self, points: PointsView) -> np.ndarray:
-        """Edges (n,) of the points' cubes."""
         domain = self.hub.domain
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
@@ -83,7 +81,6 @@ def unit(vector: np.ndarray) -> np.ndarray:
 
 
 def begin_behind(plane: Any, scene: Any) -> Any:
-    """Count the points past a surface before the first step, for the warning."""
     if scene.simulation.step > 0:
         return False
     counts, depths = zip(*scene.hub.fields.each(plane, "behind"), strict=True)

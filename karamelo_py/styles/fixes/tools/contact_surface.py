@@ -102,7 +102,6 @@ class ContactSurface(StiffTool):
         return ways[:, 0], (ways[:, 1] - ways[:, 0]) / dt
 
     def depth(self, x: np.ndarray) -> np.ndarray:
-        """Depth (n,) of positions that move with the region, a cell at most."""
         return self.region.depth(x, self.hub.domain.h)
 
     def depth_of(self, points: PointTable) -> np.ndarray:

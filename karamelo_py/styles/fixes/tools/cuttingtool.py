@@ -71,7 +71,6 @@ class CuttingTool(ToolFix):
         return normals / np.linalg.norm(normals, axis=1, keepdims=True), tip
 
     def _depths(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Depths (n, 2) of points below both faces, and the normals (2, 2)."""
         normals, tip = self._faces()
         return (tip - points.position.astype(float)) @ normals.T, normals
 
