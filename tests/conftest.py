@@ -10,6 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from textwrap import dedent
@@ -81,6 +82,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     sizes = Counter(groups.values())
     sizes[""] = 0
     items.sort(key=lambda item: (-sizes[groups[item]], groups[item]))
+
+
+def pytest_collection(session: pytest.Session) -> None:
+    """In a new checkout, two processes rewrite the assertions of half of the modules each."""
+    whole = [Path(name).resolve() for name in session.config.args] == [TESTS]
+    if whole and os.environ.get("PYTEST_XDIST_WORKER") == "gw1":
+        modules = sorted(TESTS.glob("test_*.py"), reverse=True)
+        for module in modules[: len(modules) // 2]:
+            with suppress(Exception, pytest.skip.Exception):  # told where it is collected
+                import_module(module.stem)
 
 
 def pytest_collection_finish() -> None:

@@ -60,14 +60,13 @@ SHARED = {
     "two_disks": "disks", "axis_aligned": "neo-hookean",
     "hertz": "contact", "slump": "soil",
     "dam_break": "water", "dam_ritter": "water",
-    "thick_cylinder": "implicit",
 }  # fmt: skip
-# Of these a sibling shows the same in less: a cylinder and a vertical cut in test_implicit.py,
-# slump, taylor_bar_axisymmetric, friction in test_contact_grid.py, disks that turn in
-# test_conservation.py, a bar that vibrates in test_bar.py.
+# Of these a sibling shows the same in less: a cylinder and a vertical cut in test_implicit.py, a
+# slab in test_heat.py, slump, taylor_bar_axisymmetric, friction in test_contact_grid.py, disks that
+# turn in test_conservation.py, a bar that vibrates in test_bar.py.
 SHOWN = {"footing", "static_footing", "lame", "static_slope", "collapse", "incline"}
 SHOWN |= {"taylor_bar", "taylor_bar_227", "tensile_bar", "disk_impact", "spinning_disk"}
-SHOWN |= {"vibrating_bar"}
+SHOWN |= {"vibrating_bar", "thick_cylinder", "heat_slab"}
 SMALL = [
     pytest.param(name, marks=pytest.mark.xdist_group(SHARED.get(name, name)))
     for name in scenes()

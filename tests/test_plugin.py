@@ -841,7 +841,7 @@ def test_rubber_of_a_plug_in_is_that_of_its_formula(tmp_path, site):
         f"material(energy, hyperelastic, 1000, 3e5*({chains}) + 1e8/2*(J - 1)^2)",
     ]
     for name, ends in paths.items():
-        lines += [f"load_path({name}, 20, {ends})"]
+        lines += [f"load_path({name}, 5, {ends})"]
         lines += [f"element({law}_{name}, {law}, {name})" for law in ("own", "energy")]
     (tmp_path / "in.file").write_text("\n".join(lines) + "\n", "utf-8")
     done = karamelo_py(site, tmp_path, "in.file")

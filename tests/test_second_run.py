@@ -1,6 +1,7 @@
 """The second run of a script compiles nothing: each run is a process of its own."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -44,11 +45,11 @@ def kernels(folder: Path) -> set[str]:
 )
 def test_the_second_run_compiles_nothing(tmp_path, name):
     script, threads, variables = SCENES[name]
-    if not isinstance(script, Path):
-        (tmp_path / "in.script").write_text(script, encoding="utf-8")
-        script = tmp_path / "in.script"
+    if isinstance(script, Path):
+        script = re.sub(r"(?m)^(plot|save_plot)\(.*$", "", script.read_text("utf-8"))
+    (tmp_path / "in.script").write_text(script, encoding="utf-8")
     words = [part for key, value in variables.items() for part in ("-var", key, str(value))]
-    command = [sys.executable, "-m", "karamelo_py.app.cli", str(script), "--threads", threads]
+    command = [sys.executable, "-m", "karamelo_py.app.cli", "in.script", "--threads", threads]
     own = tmp_path / "cache"
     environment = {**os.environ, "KARAMELO_PY_CACHE": str(own), "NUMBA_NUM_THREADS": "2"}
 
