@@ -829,16 +829,12 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
     assert done.returncode == 1 and said in done.stderr and "in.file:8" in done.stderr
 
 
-def test_rubber_of_a_plug_in_is_that_of_its_formula(tmp_path, site):
-    """A law of F in Python and its energy as a formula: the same stress along three paths."""
-    chains = " + ".join(
-        f"{a}*((I1*J^(-2/3))^{i} - 3^{i})/({b}*25^{i - 1})"
-        for i, (a, b) in enumerate([(1, 2), (1, 20), (11, 1050), (19, 7000), (519, 673750)], 1)
-    )
+def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
+    """A law of F in Python: the same stress along three paths as the energy of Gent (1996)."""
     paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}
     lines = [
-        "material(own, mpm_examples.rubber.ArrudaBoyce, 1000, 3e5, 25, 1e8)",
-        f"material(energy, hyperelastic, 1000, 3e5*({chains}) + 1e8/2*(J - 1)^2)",
+        "material(own, mpm_examples.rubber.Gent, 1000, 3e5, 25, 1e8)",
+        "material(energy, gent, 1000, 3e5, 25, 1e8)",
     ]
     for name, ends in paths.items():
         lines += [f"load_path({name}, 5, {ends})"]
@@ -852,3 +848,34 @@ def test_rubber_of_a_plug_in_is_that_of_its_formula(tmp_path, site):
             for law in ("own", "energy")
         )
         np.testing.assert_allclose(own, energy, rtol=1e-8, atol=1e-2)
+
+
+MUD = """
+method(ulmpm, APIC, quadratic-spline)
+dimension(2, 0, 1, 0, 1, 0.25)
+region(box, block, 0, 1, 0, 1)
+eos(mud, fluid, 1500, 1e5, 7)
+strength(mud, mpm_examples.thick.Bingham, 5, 20, {slowest})
+material(mud, eos-strength, mud, mud)
+load_path(shear, 1, exy=0.01, duration=0.02)
+element(e, mud, shear)
+solid(mud, region, box, 1, mud, 0.25)
+log_modify(custom, step, dt)
+run(1)
+"""
+
+
+def test_mud_of_a_plug_in_tells_the_step_of_its_viscosity(tmp_path, site):
+    """tau = mu d + tau_y d/(d + slowest) at the rate d = 1; the step is that of nu at rest."""
+    for slowest in (1e-2, 2e-5):
+        (tmp_path / "in.mud").write_text(MUD.format(slowest=slowest), "utf-8")
+        done = karamelo_py(site, tmp_path, "in.mud")
+        assert done.returncode == 0, done.stderr
+        row = np.genfromtxt(tmp_path / "element_e.txt", names=True)[-1]
+        assert row["sxy"] == pytest.approx(5 + 20 / (1 + slowest), rel=1e-9)
+        assert row["dissipated"] == pytest.approx(0.02 * row["sxy"], rel=1e-3)
+        dt = np.loadtxt(tmp_path / "log.mpm", skiprows=1)[-1, 1]
+        nu, c = 4 / 3 * (5 + 20 / slowest) / 1500, np.sqrt(7e5 / 1500)
+        a = nu / 0.25
+        assert dt <= 0.25 / (np.hypot(c, a) + a)
+    assert dt < 0.5 * 0.25 / c

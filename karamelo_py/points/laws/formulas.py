@@ -12,7 +12,8 @@ from math import cos, cosh, sin, sinh, sqrt, tan, tanh
 from typing import Any, ClassVar
 
 from karamelo_py.compiler import importable, real, where
-from karamelo_py.compiler.powers import exponential, logarithm, power
+from karamelo_py.compiler.powers import exponential, power
+from karamelo_py.compiler.powers import logarithm_near_one as logarithm
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.script import evaluation, syntax, terms

@@ -1,85 +1,54 @@
-"""Rubber by Arruda & Boyce (1993): eight chains in a cube, with a limit of their stretch."""
+"""Rubber of Gent (1996): a law of the deformation gradient."""
 
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
-from karamelo_py.compiler.powers import power
-from karamelo_py.language.signature import Positive
+from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, dev, tr
 from karamelo_py.points.laws.elastic import OfDeformation
 
-SERIES = 1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750
 
-
-class _ArrudaBoyce(NamedTuple):
-    specific_volume: float  # volume per mass before deformation
+class Parameters(NamedTuple):
+    specific_volume: float
     mu: float
-    N: float
+    Jm: float
     K: float
 
 
-class ArrudaBoyce(OfDeformation, _ArrudaBoyce):
-    """Rubber whose chains have a limit of their stretch.
+class Gent(OfDeformation, Parameters):
+    """Rubber whose I1 - 3 has a limit Jm.
 
-    Parameters
-    ----------
-    rho
-        Density before deformation.
-    mu
-        Shear modulus of the chains.
-    N
-        Segments of a chain; it locks at the stretch sqrt(N).
-    K
-        Bulk modulus.
-
-    Example
-    -------
-    material(seal, mpm_examples.rubber.ArrudaBoyce, 1000, 3e5, 25, 1e8)
+    material(seal, mpm_examples.rubber.Gent, 1000, 3e5, 80, 1e8)
     """
 
     in_lanes = True  # several points at once
 
     @classmethod
-    def given(
-        cls,
-        rho: Annotated[float, Positive],
-        mu: Annotated[float, Positive],
-        N: Annotated[float, Positive],
-        K: Annotated[float, Positive],
-    ):
-        """The law from density, moduli and segments."""
-        return cls(1 / rho, mu, N, K)
+    def given(cls, rho: float, mu: float, Jm: float, K: float):
+        return cls(1 / rho, mu, Jm, K)
 
 
-def slopes(law, x):
-    """First and second derivative of the chain energy by x = J^(-2/3) tr b."""
-    first = law.mu * sum(i * c * (x / law.N) ** (i - 1) for i, c in enumerate(SERIES, 1))
-    second = sum(i * (i - 1) * c * (x / law.N) ** (i - 2) for i, c in enumerate(SERIES[1:], 2))
-    return first, law.mu / law.N * second
-
-
-@laws.kirchhoff_stress.on(ArrudaBoyce)
-def kirchhoff_stress(law, kin, state):
-    J, b = det(state.F), state.F.left_cauchy_green()
-    part = power(J, -2 / 3)
-    first, _ = slopes(law, part * tr(b))
-    return 2 * first * part * dev(b) + law.K * J * (J - 1) * I
-
-
-@laws.energy_density.on(ArrudaBoyce)
-def energy_density(law, kin, state):
+def isochoric(state):
     J = det(state.F)
-    x = power(J, -2 / 3) * tr(state.F.left_cauchy_green())
-    chains = sum(c / law.N ** (i - 1) * (x**i - 3**i) for i, c in enumerate(SERIES, 1))
-    return law.mu * chains + 0.5 * law.K * (J - 1) * (J - 1)
+    return J, power(J, -2 / 3) * state.F.left_cauchy_green()
 
 
-@laws.wave_speed_squared.on(ArrudaBoyce)
+@laws.kirchhoff_stress.on(Gent)
+def kirchhoff_stress(law, kin, state):
+    J, b = isochoric(state)
+    return law.mu * law.Jm / (law.Jm + 3 - tr(b)) * dev(b) + law.K * J * (J - 1) * I
+
+
+@laws.energy_density.on(Gent)
+def energy_density(law, kin, state):
+    J, b = isochoric(state)
+    chains = -0.5 * law.mu * law.Jm * logarithm(1 - (tr(b) - 3) / law.Jm)
+    return chains + 0.5 * law.K * (J - 1) * (J - 1)
+
+
+@laws.wave_speed_squared.on(Gent)
 def wave_speed_squared(law, kin, state):
-    """A bound: the largest stretch squared is below the largest row sum of b."""
-    J, b = det(state.F), state.F.left_cauchy_green()
-    part = power(J, -2 / 3)
-    first, second = slopes(law, part * tr(b))
-    a = part * b.largest_row_sum()
-    modulus = 8 / 3 * first * a + 4 * second * a * a + law.K * J * max(2 * J - 1, 0)
-    return modulus * law.specific_volume
+    J, b = isochoric(state)
+    largest, slope = b.largest_row_sum(), law.mu * law.Jm / (law.Jm + 3 - tr(b))
+    chains = slope * largest * (4 / 3 + 2 * slope * largest / (law.mu * law.Jm))
+    return (chains + law.K * J * max(2 * J - 1, 0)) * law.specific_volume
