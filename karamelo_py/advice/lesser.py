@@ -30,7 +30,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 
 def _given(fix: Fix) -> tuple:
-    """NaN without formulas: it may do anything."""
+    """Return the formulas; NaN without any, because the fix may do anything."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
@@ -43,7 +43,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """A group has all or no points (nodes) of equal `key`."""
+    """Return True if a group has all or no points (nodes) of equal `key`."""
     group = fix.group
     if group is None or group.all:
         return group is not None
@@ -115,7 +115,7 @@ def _thin(hub: Hub) -> Words:
 
 
 def _is_led(hub: Hub, k: int) -> bool:
-    """Some fix prescribes velocities along k."""
+    """Return True if some fix prescribes velocities along k."""
     led = (fix.formulas for fix in hub.fixes.values() if fix.prescribes_velocity)
     return any(len(formulas) <= k or formulas[k] is not None for formulas in led)
 
@@ -158,7 +158,7 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> tuple[int, tuple[float, float]
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Nodes of the planes `low` and `high` (in cells) are fixed along k."""
+    """Return True if nodes of the planes `low` and `high` (in cells) are fixed along k."""
     lattice = hub.lattices[0]
     fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -241,7 +241,7 @@ def _mirrored(hub: Hub) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """For each fix, whether it neither acts along k nor depends on it."""
+    """Yield True for each fix that neither acts along k nor depends on it, else False."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]

@@ -228,7 +228,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """In a rehearsal, include runs that will begin."""
+        """Return True after the first run, in a rehearsal also before runs that will begin."""
         return bool(self.begun or self.update.step)
 
     @property
