@@ -118,7 +118,7 @@ def test_formulas_cannot_grow_without_end(hub, monkeypatch):
         expected = expected * expected + 0.1
     assert f.evaluate(hub.values) == pytest.approx(expected, rel=1e-12)
     assert f.text == "a long formula of time"
-    monkeypatch.setattr("karamelo_py.script.terms._MAX_SIZE", 100)
+    monkeypatch.setattr("karamelo_py.script.expressions._MAX_SIZE", 100)
     with pytest.raises(ScriptError, match="too long") as caught:
         run(hub, "f = time\n" + "f = f + x\n" * 60)
     assert caught.value.mark.column == 5

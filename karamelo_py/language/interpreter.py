@@ -292,6 +292,8 @@ class Interpreter:
             self.evaluate(parse_expression(raw), raw)
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
+        if isinstance(node, syntax.NumberLiteral):  # most arguments
+            return node.value
         return evaluation.evaluate(node, raw, self)
 
     def knows(self, name: str) -> bool:

@@ -2,37 +2,38 @@
 
 from collections.abc import Mapping
 
-from karamelo_py.script.terms import Term, applied, constant, in_order
+from karamelo_py.script.expressions import Expression, applied
+from karamelo_py.script.terms import in_order
 
-ZERO, ONE = constant(0.0), constant(1.0)
+ZERO, ONE = Expression(0.0), Expression(1.0)
 
 
-def is_number(term: Term, value: float) -> bool:
+def is_number(term: Expression, value: float) -> bool:
     return term.operation == "number" and term.value == value
 
 
-def plus(a: Term, b: Term) -> Term:
+def plus(a: Expression, b: Expression) -> Expression:
     return b if is_number(a, 0) else a if is_number(b, 0) else applied("+", a, b)
 
 
-def times(a: Term, b: Term) -> Term:
+def times(a: Expression, b: Expression) -> Expression:
     """Multiply; 0 and 1 are omitted."""
     if is_number(a, 0) or is_number(b, 0):
         return ZERO
     return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
 
 
-def to_power(base: Term, exponent: float) -> Term:
+def to_power(base: Expression, exponent: float) -> Expression:
     """Raise to a power; 0 and 1 are omitted."""
     if exponent in (0, 1):
         return base if exponent else ONE
-    return applied("^", base, constant(exponent))
+    return applied("^", base, Expression(exponent))
 
 
 # Slopes of functions of one number, from x and the value f.
 OF_ONE = {
-    "neg": lambda x, f: constant(-1),
-    "sqrt": lambda x, f: applied("/", constant(0.5), f),
+    "neg": lambda x, f: Expression(-1),
+    "sqrt": lambda x, f: applied("/", Expression(0.5), f),
     "exp": lambda x, f: f,
     "log": lambda x, f: applied("/", ONE, x),
     "sin": lambda x, f: applied("cos", x),
@@ -44,14 +45,14 @@ OF_ONE = {
 }
 
 
-def derivative(root: Term, name: str) -> Term:
-    slopes: dict[int, Term] = {}
+def derivative(root: Expression, name: str) -> Expression:
+    slopes: dict[int, Expression] = {}
     for term in in_order(root):
         slopes[id(term)] = _derivative(term, name, [slopes[id(x)] for x in term.operands])
     return slopes[id(root)]
 
 
-def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
+def _derivative(term: Expression, name: str, slopes: list[Expression]) -> Expression:
     operation, operands = term.operation, term.operands
     if name not in term.names:
         return ZERO
@@ -80,8 +81,8 @@ def _derivative(term: Term, name: str, slopes: list[Term]) -> Term:
     return plus(of_base, times(times(term, applied("log", a)), t))
 
 
-def replaced(root: Term, by: Mapping[str, Term]) -> Term:
-    results: dict[int, Term] = {}
+def replaced(root: Expression, by: Mapping[str, Expression]) -> Expression:
+    results: dict[int, Expression] = {}
     for term in in_order(root):
         if term.operation == "name":
             results[id(term)] = by.get(term.value, term)

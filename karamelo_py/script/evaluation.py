@@ -1,14 +1,74 @@
 """Evaluate expression trees to numbers, texts and formulas."""
 
 import math
+from collections.abc import Callable
 from functools import partial, reduce
 from typing import Any, Protocol
 
 from karamelo_py.script import syntax
 from karamelo_py.script.errors import ScriptError, plural
-from karamelo_py.script.expressions import Expression, Value
+from karamelo_py.script.expressions import Expression, Value, applied
 from karamelo_py.script.functions import FUNCTIONS, TAIL, compute
-from karamelo_py.script.terms import REWRITTEN, applied
+
+REWRITTEN: dict[str, Callable[..., Expression]] = {
+    "pow": lambda a, b: applied("^", a, b),
+    "mod": lambda a, b: applied("%", a, b),
+    "tgamma": lambda a: applied("gamma", a),
+    "exp2": lambda a: applied("^", Expression(2.0), a),
+    "degrees": lambda a: applied("*", a, Expression(180 / math.pi)),
+    "radians": lambda a: applied("*", a, Expression(math.pi / 180)),
+    "remainder": lambda a, b: applied(
+        "-", a, applied("*", b, applied("round", applied("/", a, b)))
+    ),
+    "inv_norm": lambda a: _inverse_normal(a),
+}
+
+# Numerators and denominators, highest power first, of Wichura's algorithm AS 241 (1988) for the
+# inverse normal distribution: in the middle, and in the tails.
+_MIDDLE = (
+    (
+        2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
+        13731.693765509461125, 1971.5909503065514427, 133.14166789178437745, 3.3871328727963666080,
+    ),
+    (
+        5226.4952788528545610, 28729.085735721942674, 39307.895800092710610, 21213.794301586595867,
+        5394.1960214247511077, 687.18700749205790830, 42.313330701600911252, 1.0,
+    ),
+)  # fmt: skip
+_SIDES = (
+    (
+        7.74545014278341407640e-4, 2.27238449892691845833e-2, 2.41780725177450611770e-1,
+        1.27045825245236838258, 3.64784832476320460504, 5.76949722146069140550,
+        4.63033784615654529590, 1.42343711074968357734,
+    ),
+    (
+        1.05075007164441684324e-9, 5.47593808499534494600e-4, 1.51986665636164571966e-2,
+        1.48103976427480074590e-1, 6.89767334985100004550e-1, 1.67638483018380384940,
+        2.05319162663775882187, 1.0,
+    ),
+)  # fmt: skip
+
+
+def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Expression) -> Expression:
+    terms = []
+    for coefficients in polynomials:
+        term = Expression(coefficients[0])
+        for coefficient in coefficients[1:]:
+            term = applied("+", applied("*", term, r), Expression(coefficient))
+        terms.append(term)
+    return applied("/", *terms)
+
+
+def _inverse_normal(p: Expression) -> Expression:
+    q = applied("-", p, Expression(0.5))
+    middle = _quotient(_MIDDLE, applied("-", Expression(0.180625), applied("*", q, q)))
+    tail = applied("min", p, applied("-", Expression(1.0), p))
+    far = applied("sqrt", applied("neg", applied("log", tail)))
+    side = _quotient(_SIDES, applied("-", far, Expression(1.6)))
+    within = applied(">=", tail, Expression(TAIL))
+    side = applied("if", within, applied("*", applied("sign", q), side), Expression(math.nan))
+    near = applied("<=", applied("abs", q), Expression(0.425))
+    return applied("if", near, applied("*", q, middle), side)
 
 
 class NameScope(Protocol):
@@ -104,9 +164,9 @@ def usage(name: str) -> str:
 
 def _apply(operation: str, node: syntax.Node, values: tuple, raw: syntax.Raw) -> float | Expression:
     if any(isinstance(value, Expression) for value in values):
-        terms = [Expression(value)._term for value in values]
+        operands = [Expression(value) for value in values]
         try:
-            return Expression(REWRITTEN.get(operation, partial(applied, operation))(*terms))
+            return REWRITTEN.get(operation, partial(applied, operation))(*operands)
         except ScriptError as error:
             error.mark = mark_of(raw, node)
             raise

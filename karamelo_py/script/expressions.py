@@ -20,6 +20,7 @@ FIRST = frozenset(POINT_SEEDS[3:])
 GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
+_MAX_SIZE = 20000
 CHUNK = 1 << 18  # points per evaluation of a formula
 
 
@@ -29,56 +30,65 @@ class Expression:
     `names` are its seeds: some of x y z x0 y0 z0, time timestep dt, published names.
     """
 
-    __slots__ = ("_term",)
+    __slots__ = ("names", "operands", "operation", "size", "value")
 
-    def __init__(self, value: float | terms.Term | Expression):
-        if not isinstance(value, terms.Term):
-            value = value._term if isinstance(value, Expression) else terms.constant(value)
-        self._term: terms.Term = value
+    def __init__(
+        self, value: Any, operation: str = "number", operands: tuple[Expression, ...] = ()
+    ):
+        """`value` is a number, a formula, or the name of a seed."""
+        if isinstance(value, Expression):
+            operation, operands, value = value.operation, value.operands, value.value
+        self.operation: str = operation
+        self.operands: tuple[Expression, ...] = operands
+        self.value: Any = float(value) if operation == "number" else value
+        own = {value} if operation == "name" else ()
+        self.names: frozenset[str] = frozenset(own).union(*(one.names for one in operands))
+        # Counts shared operations repeatedly; exact only where needed.
+        self.size: int = 1 + sum(one.size for one in operands)
+        if self.size > _MAX_SIZE:
+            self.size = len(terms.in_order(self))
+        if self.size > _MAX_SIZE:
+            raise ScriptError("the formula is too long", expected=f"at most {_MAX_SIZE} operations")
 
     @classmethod
     def seed(cls, name: str) -> Expression:
-        return cls(terms.Term("name", (), name))
+        return cls(name, "name")
 
     @classmethod
     def from_script(cls, hub: Any, argument: Any) -> Self:
         value = argument.value(hub)
         if isinstance(value, str):
             raise ScriptError(
-                f"'{value}' is text", push=argument.push, expected="a number or a formula"
+                f"'{value}' is text", mark=argument.mark, expected="a number or a formula"
             )
         return cls(value)
 
     def minus(self, other: Expression) -> Expression:
-        return Expression(terms.applied("-", self._term, other._term))
-
-    @property
-    def names(self) -> frozenset[str]:
-        return self._term.names
+        return applied("-", self, other)
 
     @property
     def is_constant(self) -> bool:
-        return not self._term.names
+        return not self.names
 
     @property
     def constant(self) -> float:
         if not self.is_constant:
             raise ValueError(f"{self.text} is not constant")
-        return self._term.value
+        return self.value
 
     @property
     def text(self) -> str:
         """Write the formula in script syntax down to its seeds, unless too long."""
-        if not terms.is_short(self._term):
+        if not terms.is_short(self):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
-        return terms.text_of(self._term)
+        return terms.text_of(self)
 
     def __repr__(self) -> str:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
         """Return True if both are visibly the same number everywhere."""
-        return terms.alike(self._term, other._term)
+        return terms.alike(self, other)
 
     def evaluate(self, values: Values) -> float:
         """Return the present number; ScriptError for a formula of positions."""
@@ -87,7 +97,7 @@ class Expression:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
             expected = "a formula of time and of values of fixes and computes"
             raise ScriptError(message, name=self.text, expected=expected)
-        return terms.evaluated(self._term, lambda name: values.get(_published(name, values)))
+        return terms.evaluated(self, lambda name: values.get(_published(name, values)))
 
     def program(self, values: Values) -> formula.Program:
         def push(name: str) -> tuple[int, int]:
@@ -95,13 +105,11 @@ class Expression:
                 return formula.POINT, POINT_SEEDS.index(name)
             return formula.GLOBAL, values.slot(_published(name, values))
 
-        return terms.program(self._term, push)
+        return terms.program(self, push)
 
     def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
         """Compile a formula without published numbers for a stack of this depth."""
-        return terms.program(
-            self._term, lambda name: (formula.POINT, seeds.index(name)), depth=depth
-        )
+        return terms.program(self, lambda name: (formula.POINT, seeds.index(name)), depth=depth)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
@@ -136,10 +144,12 @@ class Expression:
             rows[:, k] = columns[name]
         out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
         now, before = (np.ascontiguousarray(block) for block in (rows[:, :3], rows[:, 3:]))
-        formula.evaluate_all(
-            terms.program(self._term, push), values.array, now, before, out, scratch
-        )
+        formula.evaluate_all(terms.program(self, push), values.array, now, before, out, scratch)
         return out
+
+
+def applied(operation: str, *operands: Expression) -> Expression:
+    return Expression(None, operation, operands)
 
 
 Value = float | str | Expression

@@ -1,57 +1,18 @@
-"""Terms of formulas (numbers, names, operations), as text and as programs."""
+"""Trees of formulas (numbers, names, operations): order, value, text and program."""
 
 import math
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from karamelo_py.script import formula
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.functions import TAIL, compute_quietly
+from karamelo_py.script.functions import compute_quietly
 from karamelo_py.script.operations import OPERATIONS
 
-_MAX_SIZE = 20000
 _MAX_SHOWN = 1000
 _MAX_LEVELS = 100
-
-REWRITTEN: dict[str, Callable[..., "Term"]] = {
-    "pow": lambda a, b: applied("^", a, b),
-    "mod": lambda a, b: applied("%", a, b),
-    "tgamma": lambda a: applied("gamma", a),
-    "exp2": lambda a: applied("^", constant(2.0), a),
-    "degrees": lambda a: applied("*", a, constant(180 / math.pi)),
-    "radians": lambda a: applied("*", a, constant(math.pi / 180)),
-    "remainder": lambda a, b: applied(
-        "-", a, applied("*", b, applied("round", applied("/", a, b)))
-    ),
-    "inv_norm": lambda a: _inverse_normal(a),
-}
-
-# Numerators and denominators, highest power first, of Wichura's algorithm AS 241 (1988) for the
-# inverse normal distribution: in the middle, and in the tails.
-_MIDDLE = (
-    (
-        2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
-        13731.693765509461125, 1971.5909503065514427, 133.14166789178437745, 3.3871328727963666080,
-    ),
-    (
-        5226.4952788528545610, 28729.085735721942674, 39307.895800092710610, 21213.794301586595867,
-        5394.1960214247511077, 687.18700749205790830, 42.313330701600911252, 1.0,
-    ),
-)  # fmt: skip
-_SIDES = (
-    (
-        7.74545014278341407640e-4, 2.27238449892691845833e-2, 2.41780725177450611770e-1,
-        1.27045825245236838258, 3.64784832476320460504, 5.76949722146069140550,
-        4.63033784615654529590, 1.42343711074968357734,
-    ),
-    (
-        1.05075007164441684324e-9, 5.47593808499534494600e-4, 1.51986665636164571966e-2,
-        1.48103976427480074590e-1, 6.89767334985100004550e-1, 1.67638483018380384940,
-        2.05319162663775882187, 1.0,
-    ),
-)  # fmt: skip
 
 _PRECEDENCE = {
     "||": 1,
@@ -68,29 +29,22 @@ _PRECEDENCE = {
 }
 
 
-class Term:
-    __slots__ = ("names", "operands", "operation", "size", "value")
+class Term(Protocol):
+    """A number, a seed's name, or an operation on terms (:class:`expressions.Expression`)."""
 
-    def __init__(self, operation: str, operands: "tuple[Term, ...]", value: Any):
-        self.operation = operation
-        self.operands = operands
-        self.value = value
-        self.names: frozenset[str] = frozenset()
-        if operation == "name":
-            self.names = frozenset({value})
-        elif operands:
-            self.names = frozenset().union(*(term.names for term in operands))
-        # Counts shared operations repeatedly; exact only where needed.
-        self.size: int = 1 + sum(term.size for term in operands)
-        if self.size > _MAX_SIZE:
-            self.size = len(in_order(self))
-        if self.size > _MAX_SIZE:
-            raise ScriptError("the formula is too long", expected=f"at most {_MAX_SIZE} operations")
+    operation: str
+    value: Any
+
+    @property
+    def operands(self) -> Sequence[Any]: ...
 
 
-def in_order(root: Term) -> list[Term]:
+Tree = TypeVar("Tree", bound=Term)
+
+
+def in_order(root: Tree) -> list[Tree]:
     """List `root` and the terms below it once each, operands first."""
-    ordered: dict[int, Term] = {}
+    ordered: dict[int, Tree] = {}
     open_terms = [(root, False)]
     while open_terms:
         term, done = open_terms.pop()
@@ -115,36 +69,6 @@ def evaluated(root: Term, value_of: Callable[[str], float]) -> float:
             result = compute_quietly(term.operation, *[results[id(t)] for t in term.operands])
         results[id(term)] = result
     return results[id(root)]
-
-
-def constant(value: float) -> Term:
-    return Term("number", (), float(value))
-
-
-def applied(operation: str, *operands: Term) -> Term:
-    return Term(operation, operands, None)
-
-
-def _quotient(polynomials: tuple[tuple[float, ...], ...], r: Term) -> Term:
-    terms = []
-    for coefficients in polynomials:
-        term = constant(coefficients[0])
-        for coefficient in coefficients[1:]:
-            term = applied("+", applied("*", term, r), constant(coefficient))
-        terms.append(term)
-    return applied("/", *terms)
-
-
-def _inverse_normal(p: Term) -> Term:
-    q = applied("-", p, constant(0.5))
-    middle = _quotient(_MIDDLE, applied("-", constant(0.180625), applied("*", q, q)))
-    tail = applied("min", p, applied("-", constant(1.0), p))
-    far = applied("sqrt", applied("neg", applied("log", tail)))
-    side = _quotient(_SIDES, applied("-", far, constant(1.6)))
-    within = applied(">=", tail, constant(TAIL))
-    side = applied("if", within, applied("*", applied("sign", q), side), constant(math.nan))
-    near = applied("<=", applied("abs", q), constant(0.425))
-    return applied("if", near, applied("*", q, middle), side)
 
 
 def alike(one: Term, other: Term) -> bool:

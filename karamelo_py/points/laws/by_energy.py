@@ -31,7 +31,7 @@ from karamelo_py.script import terms
 from karamelo_py.script.derivatives import derivative, plus, replaced, times, to_power
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
-from karamelo_py.script.terms import Term, constant
+from karamelo_py.script.terms import Term
 
 INVARIANTS = ("I1", "I2", "J")
 FIBRES = ("I4", "I6")  # squared stretches of two fibre families
@@ -75,13 +75,13 @@ class OfStretches(ByEnergy):
 
 FIELDS = ("specific_volume", "lam", "G", "at_rest")
 
-_L = [Term("name", (), name) for name in STRETCHES]
+_L = [Expression.seed(name) for name in STRETCHES]
 _A, _B, _C = [to_power(one, 2) for one in _L]
 IN_STRETCHES = {
     "I1": plus(plus(_A, _B), _C),
     "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
     "J": times(times(_L[0], _L[1]), _L[2]),
-    **dict.fromkeys(FIBRES, constant(1.0)),  # matrix only
+    **dict.fromkeys(FIBRES, Expression(1.0)),  # matrix only
 }
 
 
@@ -94,9 +94,9 @@ def law_of(
     at rest. Raise ScriptError for operations without a derivative, stress or no stiffness at rest,
     and formulas that distinguish principal directions.
     """
-    term = replaced(energy._term, {"I3": to_power(Term("name", (), "J"), 2)})
+    term = replaced(energy, {"I3": to_power(Expression.seed("J"), 2)})
     check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
-    stretched = replaced(term, {**IN_STRETCHES, "T": constant(T)})
+    stretched = replaced(term, {**IN_STRETCHES, "T": Expression(T)})
     slopes = [derivative(stretched, name) for name in STRETCHES]
     curves = [derivative(slopes[0], name) for name in STRETCHES[:2]]
     lam, G, at_rest = _judged(stretched, slopes, curves)

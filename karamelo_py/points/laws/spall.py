@@ -222,7 +222,7 @@ class DamageFormula(ByRate, DamageFields):
     def given(
         cls, rate: RateFormula, *, brittleness: AboveZero = 1e30, T: FromZero = 293.0
     ) -> NamedTuple:
-        term = rate._term
+        term = rate
         check_operations(term, "rate")
         writer = ProgramWriter(RateFormula.names)
         codes: dict[str, Any] = {"rate": writer.code(term), "directed": "s1" in rate.names}

@@ -113,7 +113,7 @@ class EosFormula(ByPressure, EosFields):
 
 def eos_of(rho0: float, formula: Expression, E: float, style: str) -> NamedTuple:
     """Build the equation of state; ScriptError without a value or stiffness at rest."""
-    term = formula._term
+    term = formula
     check_operations(term, "p")
     slopes = [derivative(term, name) for name in NAMES]
     rest = dict(zip(NAMES, (1.0, E), strict=True))
