@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import j0, j1
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import atlas
@@ -182,3 +183,10 @@ def test_what_drifts_is_told_as_the_table_says(run_interpreted, variables, energ
     said = run_interpreted(ROOT / "inputs" / "in.energy_disk", *words, command="check").err
     assert ("noise of a drift" in said) == ("before" in told)
     assert float(energy) <= 1.1 or told
+
+
+def test_the_mode_of_the_disk():
+    """k R J0(k R) / J1(k R) = 2 mu / (lambda + 2 mu), in plane strain, for nu = 0.3."""
+    text = (ROOT / "inputs" / "in.energy_disk").read_text("utf-8")
+    kR = float(re.search(r"^kR += (\S+)", text, re.M)[1])
+    assert kR * j0(kR) / j1(kR) == pytest.approx(0.4 / 0.7, abs=1e-4)
