@@ -27,7 +27,7 @@ from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.equations.heat import HeatContent, HeatFlow, TemperatureGradient, Warming
 from karamelo_py.kernels.records import accumulate, accumulate_affine, row
 from karamelo_py.kernels.sweep import Extent, OldWeights, Visit, context_of, sweep_points
-from karamelo_py.kernels.views import place_at
+from karamelo_py.kernels.views import location_at
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.points.basis import (
@@ -387,7 +387,7 @@ def _map(basis, by, grid, x, mass, nodes, seen, out, p):
 
     `by` is the basis, or what takes its place at the corners of domains, or in a block of nodes.
     """
-    here = place_at(basis, KIN, x, p)
+    here = location_at(basis, KIN, x, p)
     stencil = locate(basis, KIN, grid, here)
     nodes_of = _nodes_of(by, grid, stencil)
     total = real(0, here[0]), real(0, here[0]), real(0, here[0])

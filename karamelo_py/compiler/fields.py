@@ -214,13 +214,13 @@ def field(fields: tuple, kind: type) -> Any:
     return None
 
 
-def load(array, p, like):
-    """Load components 0, 1, ... of point `p`, as many as `like` has; () without an array."""
+def load(array, p, template):
+    """Load components 0, 1, ... of point `p`, as many as `template` has; () without an array."""
     if array is None:
         return ()
-    if type(like) is tuple:
-        return tuple([array[k, p] for k in range(len(like))])
-    return nested_as(like, tuple([array[k, p] for k in range(count_in(like))]))
+    if type(template) is tuple:
+        return tuple([array[k, p] for k in range(len(template))])
+    return nested_as(template, tuple([array[k, p] for k in range(count_in(template))]))
 
 
 def store(array, p, values):
@@ -273,35 +273,35 @@ def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     return np.array(rows, np.int64).reshape(-1, 2)
 
 
-def _row(address: int, like: Any, count: int) -> np.ndarray:
-    """View `count` items at an address as integers like `like`."""
-    memory = (ctypes.c_char * int(count * like.itemsize)).from_address(int(address))
-    return np.frombuffer(memory, like.dtype)
+def _row(address: int, template: Any, count: int) -> np.ndarray:
+    """View `count` items at an address as integers like `template`."""
+    memory = (ctypes.c_char * int(count * template.itemsize)).from_address(int(address))
+    return np.frombuffer(memory, template.dtype)
 
 
 @implements(_row)
 @intrinsic
-def _row_in_kernels(address, like, count):
-    row = types.Array(like, 1, "C")
+def _row_in_kernels(address, template, count):
+    row = types.Array(template, 1, "C")
 
     def codegen(builder, pointer, _, size):
-        data = builder.inttoptr(pointer, llvm.memory_type(like).as_pointer())
-        return llvm.make_array(builder, row, data, [size], [I64(like.bitwidth // 8)])
+        data = builder.inttoptr(pointer, llvm.memory_type(template).as_pointer())
+        return llvm.make_array(builder, row, data, [size], [I64(template.bitwidth // 8)])
 
-    return row(types.int64, like, types.int64), codegen
+    return row(types.int64, template, types.int64), codegen
 
 
 def pick_items(
-    address: int, like: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
+    address: int, template: Any, order: np.ndarray, room: np.ndarray, c: int, begin: int, end: int
 ) -> None:
     """Set ``room[c, p]`` to item ``order[p]`` of a row of integers, for p in [begin, end)."""
-    row = _row(address, like, order.size)
+    row = _row(address, template, order.size)
     for p in range(begin, end):
         room[c, p] = row[index(order[p])]
 
 
-def put_items(address: int, like: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
+def put_items(address: int, template: Any, room: np.ndarray, c: int, begin: int, end: int) -> None:
     """Set item p of a row to ``room[c, p]``, for p in [begin, end)."""
-    row = _row(address, like, end)
+    row = _row(address, template, end)
     for p in range(begin, end):
         row[index(p)] = room[c, p]

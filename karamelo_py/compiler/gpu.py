@@ -329,7 +329,7 @@ class Counted(Emulator):
     def free(self, address: int) -> None:
         pass
 
-    def copy_to(self, address: int, there: int, size: int) -> None:
+    def copy_to(self, address: int, source: int, size: int) -> None:
         pass
 
     copy = copy_from = copy_to

@@ -338,7 +338,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
         return llvm.item_pointer(builder, kind, array, [at, *rest])
     steps = None
     if isinstance(of, Beside):
-        of, at, steps = of.nodes, *(builder.extract_value(at, part) for part in (0, 1))
+        of, at, steps = of.nodes, *(builder.extract_value(at, k) for k in (0, 1))
     first = llvm.cast(builder, lane(builder, at, k), of.scalar, types.intp)
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:

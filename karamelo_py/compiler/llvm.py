@@ -104,7 +104,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
         return value
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
         parts = zip(unpack(builder, value), kind, wanted, strict=True)
-        return make_tuple(builder, wanted, [cast(builder, *part) for part in parts])
+        return make_tuple(builder, wanted, [cast(builder, *items) for items in parts])
     if isinstance(wanted, Lanes) and not isinstance(kind, Lanes):
         return splat(builder, cast(builder, value, kind, wanted.scalar), wanted)
     to, of = register_type(wanted), kind
@@ -213,7 +213,7 @@ def _converted(
     if not isinstance(kind, types.BaseTuple):
         return truth(value)
     items = zip(kind, unpack(builder, value), strict=True)
-    parts = [_converted(builder, item, part, to, truth) for item, part in items]
+    parts = [_converted(builder, item, value, to, truth) for item, value in items]
     return make_struct(builder, to(kind), parts)
 
 
@@ -240,7 +240,10 @@ def make_array(
     builder: ir.IRBuilder, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
 ) -> ir.Value:
     made = register_type(kind)
-    parts = [data, *(make_struct(builder, made.elements[1], part) for part in (shape, strides))]
+    parts = [
+        data,
+        *(make_struct(builder, made.elements[1], numbers) for numbers in (shape, strides)),
+    ]
     return make_struct(builder, made, parts)
 
 

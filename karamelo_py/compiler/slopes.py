@@ -293,13 +293,13 @@ def _raised(x, y, made):
 
 
 @implements(real, Dual)
-def _real(value, like):
-    return real(value, like.value)
+def _real(value, template):
+    return real(value, template.value)
 
 
 @implements(round_off, Dual)
-def _round_off(like):
-    return round_off(like.value)
+def _round_off(template):
+    return round_off(template.value)
 
 
 @implements(fma, Dual)

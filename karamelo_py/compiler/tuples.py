@@ -11,14 +11,14 @@ def flat(nested):
     return numbers
 
 
-def nested_as(like, numbers):
+def nested_as(template, numbers):
     made, begin = [], 0
-    for item in like:
+    for item in template:
         inner = isinstance(item, tuple)
         end = begin + (count_in(item) if inner else 1)
         made.append(nested_as(item, numbers[begin:end]) if inner else numbers[begin])
         begin = end
-    return type(like)(*made) if hasattr(like, "_fields") else tuple(made)
+    return type(template)(*made) if hasattr(template, "_fields") else tuple(made)
 
 
 def count_in(nested):

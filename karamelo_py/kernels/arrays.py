@@ -47,8 +47,8 @@ def of_change(kin):
     return 4 if kin.dimension == 3 else kin.dimension
 
 
-def vector_at(kin, records, i, first, like):
-    return vector(kin, row(records, i, first, (*like,)))
+def vector_at(kin, records, i, first, template):
+    return vector(kin, row(records, i, first, (*template,)))
 
 
 # Record widths by dimension.
@@ -58,10 +58,10 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """Points of one law, by tile. A place (w numbers) is a position, then a stored domain shape."""
+    """Points of one law, by tile; a location (w numbers) is position and stored domain shape."""
 
-    x: np.ndarray  # (2, w, n) places now and after the move; `motion.now` is the index
-    home: np.ndarray | None  # (w, n) reference places (total frame)
+    x: np.ndarray  # (2, w, n) locations now and after the move; `motion.now` is the index
+    home: np.ndarray | None  # (w, n) reference locations (total frame)
     v: np.ndarray  # (d, n)
     mass: np.ndarray  # (n,)
     state: np.ndarray  # (s, n), of the law
@@ -133,8 +133,8 @@ class Buffers(NamedTuple):
     number: int  # index among the buffers of a scene
 
 
-class Places(NamedTuple):
-    """Places of points during a sweep, each (w, n)."""
+class Locations(NamedTuple):
+    """Locations of points during a sweep, each (w, n)."""
 
     where: np.ndarray  # for weights
     x: np.ndarray  # before the move
@@ -152,7 +152,7 @@ class OnGrids(NamedTuple):
     kin: Tag
     grids: Grid
     of: np.ndarray  # (n,) grid of each point
-    x: np.ndarray  # (n,) places
+    x: np.ndarray  # (w, n) locations
 
 
 class Matter(NamedTuple):
@@ -286,7 +286,7 @@ MOTION = np.dtype([
     ("drift_limit", np.float64),
     ("pace", np.float64),  # largest move in a step since then
     ("path", np.float64),  # largest path of a point, in cells
-    ("now", np.int64),  # index of the present places
+    ("now", np.int64),  # index of the present locations
     ("wrong", np.int64),  # 1 if a point failed
 ])  # fmt: skip
 # Energy monitor (`kernels.watch`, `run.energy`): energies, counts, fractions.

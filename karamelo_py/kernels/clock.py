@@ -33,9 +33,9 @@ def kick(s: Setup) -> Number:
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
 
-def common_velocity(kin: Tag, motion: Any, like: Number) -> tuple:
-    """Return the reference velocity (d,) for speeds, in the type of `like`."""
-    return vector(kin, [real(motion.common[0, k], like) for k in range(kin.dimension)])
+def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
+    """Return the reference velocity (d,) for speeds, in the type of `template`."""
+    return vector(kin, [real(motion.common[0, k], template) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # of a step

@@ -7,7 +7,7 @@ from karamelo_py.compiler import at_hand, index, kernel, where
 from karamelo_py.compiler.fields import load, store
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.records import put_at
-from karamelo_py.kernels.views import deformation_of, place_at, state_at
+from karamelo_py.kernels.views import deformation_of, location_at, state_at
 from karamelo_py.points import laws as law_functions
 from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
@@ -80,7 +80,7 @@ def export_to_nodes(at, values, unit, out):
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
     for p in range(values.size):
         grid = record(grids, index(grid_of[p]))
-        stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
+        stencil = locate(basis, kin, grid, location_at(basis, kin, where, p))
         for k in range(support(basis, kin)):
             node_weight = entry(basis, kin, grid, stencil, k)
             n, value = index(node_weight[0]), node_weight[1] * values[p]
@@ -96,7 +96,7 @@ def export_velocity_moment(at, gradients, out):
     flat = planar(kin)
     for p in range(out.shape[1]):
         grid = record(grids, index(grid_of[p]))
-        position = place_at(basis, kin, where, p)
+        position = location_at(basis, kin, where, p)
         stencil = locate(basis, kin, grid, position)
         total = zero(flat, position[0])
         gradient = load(gradients, p, total)

@@ -42,7 +42,7 @@ from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, SOFT, direction_of
-from karamelo_py.kernels.views import place_at, state_at, volume_of
+from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.bodies import radius
 from karamelo_py.points.grid import node_position
@@ -556,7 +556,7 @@ def _about_origin(body, k):
 
 @noinline
 def _place_of(s, points, p):
-    return place_at(
+    return location_at(
         s.basis, s.kin, points.x[s.control.motion[0].now] if s.frame.moves else points.home, p
     )
 

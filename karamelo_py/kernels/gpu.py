@@ -25,7 +25,7 @@ from karamelo_py.kernels.lanes import OneByOne
 from karamelo_py.kernels.stencils import gathered_by
 from karamelo_py.kernels.step import ABOVE_LIMIT, DONE, MOST_ABOVE_LIMIT, SHRUNK, SMALLEST, STOPPED
 from karamelo_py.kernels.sums import columns_in_turn
-from karamelo_py.kernels.views import PointView, node_of, place_at
+from karamelo_py.kernels.views import PointView, location_at, node_of
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
@@ -142,13 +142,13 @@ class Stage:
         def point(s, block, p):
             c, points = context(s), block.points
             grid = record(c.grids, index(points.grid[p]))
-            places = sweep.places_of(c.frame, points, c.now, c.then)
-            return c, PointView(sweep.work_of(c, grid, c.nodes, block, places), (), p, c.dt)
+            locations = sweep.locations_of(c.frame, points, c.now, c.then)
+            return c, PointView(sweep.work_of(c, grid, c.nodes, block, locations), (), p, c.dt)
 
-        def place_of(pt):
+        def location_of(pt):
             w = pt.w
-            places = w.places.y if lists and w.frame.moves else w.places.where
-            return place_at(w.basis, w.kin, places, pt.p)
+            locations = w.locations.y if lists and w.frame.moves else w.locations.where
+            return location_at(w.basis, w.kin, locations, pt.p)
 
         def keep(pt, cells):
             if keeps:
@@ -174,7 +174,7 @@ class Stage:
         def count_point(i, fate, s, block, cells):
             points = block.points
             c, pt = point(s, block, index(i))
-            where = place_of(pt)
+            where = location_of(pt)
             is_inside = inside(pt.w.grid, c.kin, where)
             for k in range(corners):
                 number = 0  # the run ends
@@ -186,14 +186,14 @@ class Stage:
             if not is_inside:
                 goes_wrong(fate, points.id[pt.p])
 
-        self._point, self._place = point, place_of
+        self._point, self._location = point, location_of
         self.load, self.load_point = load_of_point, load_point
         self.gather, self.count = gather_point, count_point
 
-    def scatter(self, part: int) -> Callable:
-        point, place, quantities = self._point, self._place, self.row.visit.quantities
+    def scatter(self, section: int) -> Callable:
+        point, location, quantities = self._point, self._location, self.row.visit.quantities
         columns, only_if_more, corners = self.columns, self.row.only_if_more, self.corners
-        count, (begin, end) = self.support, self.nodes_of(part)
+        count, (begin, end) = self.support, self.nodes_of(section)
         filled = tuple(dict.fromkeys(name for name, _, _ in columns))
         widths = tuple(max(c for n, c, _ in columns if n == name) + 1 for name in filled)
 
@@ -218,16 +218,16 @@ class Stage:
                 for k in range(begin, end):
                     room_of(name, rooms, None)[k, column] = c.dt - c.dt
             out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
-            like = load_all(quantities, pt)  # for its shape alone
+            template = load_all(quantities, pt)  # for its shape alone
             for q in range(first, last):
                 behind = cells.order[min(q + 1, last - 1)]  # read ahead
                 here = pt._replace(p=p)
-                stencil = locate(out.basis, out.kin, out.grid, place(here))
+                stencil = locate(out.basis, out.kin, out.grid, location(here))
                 seen = stencil if corners == 1 else of_corner(stencil, corner)
-                numbers = tuple([cells.loads[k, p] for k in range(len(flat(like)))])
+                numbers = tuple([cells.loads[k, p] for k in range(len(flat(template)))])
                 for k in range(begin, end):
                     node = node_of(out, seen, k)._replace(i=index(k))  # numbered within the cell
-                    scattered_all(quantities, nested_as(like, numbers), node)
+                    scattered_all(quantities, nested_as(template, numbers), node)
                 p, corner = _point_and_corner(corners, size, behind)
             for j, (name, column, _) in enumerate(columns):
                 for k in range(begin, end):
@@ -240,14 +240,14 @@ class Stage:
     def numbers(self) -> int:
         return len(self.columns) * -(-self.support // self.parts)
 
-    def nodes_of(self, part: int) -> tuple[int, int]:
+    def nodes_of(self, section: int) -> tuple[int, int]:
         count = self.support
-        return count * part // self.parts, count * (part + 1) // self.parts
+        return count * section // self.parts, count * (section + 1) // self.parts
 
-    def sum(self, part: int, anew: bool) -> Callable:
+    def sum(self, section: int, anew: bool) -> Callable:
         """Return the function of a node that sums over cells, from zero if `anew`."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
-        begin, end = self.nodes_of(part)
+        begin, end = self.nodes_of(section)
 
         def sum_node(i, fate, s, cells, use):
             if use[i] == 0 or (only_if_more and is_last(s)):

@@ -160,10 +160,9 @@ def _act_on_parts(members, task, call, k):
     my_heat.coldest, my_heat.hottest = heat.coldest, heat.hottest
     here = hold(arrays.with_items(hooks, chosen=private.chosen, scratch=private.scratch))
     values, sums = private.values, private.totals
-    own = arrays.with_items(
-        control, values=values, totals=sums, step=private.step, heat=private.heat
+    mine = hold(
+        arrays.with_items(control, values=values, totals=sums, step=private.step, heat=private.heat)
     )
-    mine = hold(own)
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)

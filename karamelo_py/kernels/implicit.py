@@ -18,7 +18,7 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Block, Setup
 from karamelo_py.kernels.lanes import lanes_with, points_from
-from karamelo_py.kernels.views import deformation_of, place_at, state_at
+from karamelo_py.kernels.views import deformation_of, location_at, state_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.basis.cpdi import AtCorners
 from karamelo_py.points.kinematics import (
@@ -103,12 +103,12 @@ def points_of(count, k):
 
 
 @by_threads
-def see(frame, at, matter, seen, part):
+def see(frame, at, matter, seen, chunk):
     (basis, _, grids, of, where), seen = at_hand(at), at_hand(seen)
     kin, points, laws = at_hand(matter)
-    for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
+    for p in range(points_of(points.mass.size, chunk), points_of(points.mass.size, chunk + 1)):
         grid = record(grids, of[p])
-        stencil = locate(basis, kin, grid, place_at(basis, kin, where, p))
+        stencil = locate(basis, kin, grid, location_at(basis, kin, where, p))
         count = 0
         for k in range(support(basis, kin)):
             node, weight, slope = entry(basis, kin, grid, stencil, k)
@@ -145,12 +145,12 @@ def gradient_at(kin, seen, p, k):
 
 
 @by_threads
-def strain(kin, seen, u, response, part):
+def strain(kin, seen, u, response, chunk):
     """Compute H of each point from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
     most = 0.0
-    for p in range(points_of(count, part), points_of(count, part + 1)):
+    for p in range(points_of(count, chunk), points_of(count, chunk + 1)):
         H = zero(kin, u[0, 0])
         shift = zero_vector(kin, u[0, 0])
         for k in range(seen.count[p]):
@@ -160,7 +160,7 @@ def strain(kin, seen, u, response, part):
             shift = shift + seen.weights[p, k] * moved
         store(response.increment, p, H)
         most = max(most, shift.largest())
-    response.furthest[part] = most
+    response.furthest[chunk] = most
 
 
 def strained_point(matter, response, p):
@@ -187,25 +187,25 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 @by_threads
-def respond(matter, dt, response, part):
+def respond(matter, dt, response, chunk):
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
-    end = points_of(points.mass.size, part + 1)
-    for q in range(points_of(points.mass.size, part), end, lanes.width):
+    end = points_of(points.mass.size, chunk + 1)
+    for q in range(points_of(points.mass.size, chunk), end, lanes.width):
         p = points_from(lanes, q, end)
         law, state, H, volume = strained_point(matter, response, p)
         store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt))
 
 
 @by_threads
-def respond_to_changes(matter, dt, response, tangent, part):
+def respond_to_changes(matter, dt, response, tangent, chunk):
     matter, response = at_hand(matter), at_hand(response)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
     first, count = tangent.first, tangent.end - tangent.first
-    last = points_of(count, part + 1)
-    for q in range(points_of(count, part), last, lanes.width):
+    last = points_of(count, chunk + 1)
+    for q in range(points_of(count, chunk), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
         law, state, H, volume = strained_point(matter, response, p)
         _, slopes = stress_and_tangent(law, kin, state, H, dt)
@@ -260,10 +260,10 @@ def spread(seen, places):
 
 
 @by_threads
-def mark_pairs(seen, pairs, part):
+def mark_pairs(seen, pairs, chunk):
     seen, pairs = at_hand(seen), at_hand(pairs)
     m, width = pairs.codes.size, seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p = seen.entries[e] // width
             for k in range(seen.count[p]):
@@ -271,11 +271,11 @@ def mark_pairs(seen, pairs, part):
 
 
 @by_threads
-def add_forces(kin, seen, stress, f, part):
+def add_forces(kin, seen, stress, f, chunk):
     """Add the nodal forces V0 P grad N of stresses (t, n) to nodes (m, d)."""
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         total = vector(kin, [f[a, i] for i in range(kin.dimension)])
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
@@ -318,13 +318,13 @@ def by_displacement(kin, D, g):
 
 
 @by_threads
-def add_stiffness(kin, seen, tangent, blocks, part):
+def add_stiffness(kin, seen, tangent, blocks, chunk):
     """Add derivatives of the points' forces to blocks K (b, d d)."""
     seen, (pairs, K) = at_hand(seen), at_hand(blocks)
     first, end, values, done = tangent
     t = kin.tensor_size
     m, width = pairs.codes.size, seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         e = seen.starts[a] + done[a]
         while e < seen.starts[a + 1] and seen.entries[e] < end * width:
             p, k = seen.entries[e] // width, seen.entries[e] % width

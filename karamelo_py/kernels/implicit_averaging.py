@@ -60,11 +60,11 @@ def cofactors(A):
 
 
 @by_threads
-def grow(matter, response, averages, part):
+def grow(matter, response, averages, chunk):
     """Compute volumes before and after the increment, and their derivatives."""
     matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
     kin, points, _ = matter
-    for p in range(points_of(points.mass.size, part), points_of(points.mass.size, part + 1)):
+    for p in range(points_of(points.mass.size, chunk), points_of(points.mass.size, chunk + 1)):
         law, state, H, volume = strained_point(matter, response, p)
         A, volume = I + H, volume * jacobian(law, kin, state)
         averages.volume[0, p] = volume
@@ -87,13 +87,13 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
 
 
 @by_threads
-def respond_averaged(matter, dt, response, averages, part):
+def respond_averaged(matter, dt, response, averages, chunk):
     matter, response, averages = at_hand(matter), at_hand(response), at_hand(averages)
     kin, points, laws = matter
     lanes = lanes_with((), laws, points.mass)
-    end = points_of(points.mass.size, part + 1)
+    end = points_of(points.mass.size, chunk + 1)
     t = kin.tensor_size
-    for q in range(points_of(points.mass.size, part), end, lanes.width):
+    for q in range(points_of(points.mass.size, chunk), end, lanes.width):
         p = points_from(lanes, q, end)
         law, state, H, volume = strained_point(matter, response, p)
         (ratio,) = load(averages.ratio, p, (volume,))
@@ -124,11 +124,11 @@ def keep_averaged_stress(matter, response, averages):
 
 
 @by_threads
-def bring_mean(kin, response, averages, part):
+def bring_mean(kin, response, averages, chunk):
     """Add the terms of the average of q to P and its derivatives."""
     response, averages = at_hand(response), at_hand(averages)
     count = averages.mean.shape[1]
-    for p in range(points_of(count, part), points_of(count, part + 1)):
+    for p in range(points_of(count, chunk), points_of(count, chunk + 1)):
         q = averages.mean[0, p]
         H = load(response.increment, p, zero(kin, q))
         made = cofactors(I + seeded(H))
@@ -141,21 +141,21 @@ def bring_mean(kin, response, averages, part):
 
 
 @by_threads
-def sum_at_nodes(seen, values, sums, part):
+def sum_at_nodes(seen, values, sums, chunk):
     seen = at_hand(seen)
     m, width = sums.size, seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             sums[a] += seen.weights[p, k] * values[0, p]
 
 
 @by_threads
-def average(seen, nodes, values, part):
+def average(seen, nodes, values, chunk):
     """Fill ``values`` (1, n) with averages at points of nodal values (m,)."""
     seen = at_hand(seen)
     count = seen.nodes.shape[0]
-    for p in range(points_of(count, part), points_of(count, part + 1)):
+    for p in range(points_of(count, chunk), points_of(count, chunk + 1)):
         sum_of = 0.0
         for k in range(seen.count[p]):
             sum_of += seen.weights[p, k] * nodes[seen.nodes[p, k]]
@@ -163,12 +163,12 @@ def average(seen, nodes, values, part):
 
 
 @by_threads
-def add_slopes(kin, seen, tensors, blocks, part):
+def add_slopes(kin, seen, tensors, blocks, chunk):
     """Add N_a T grad N_b of point tensors T (t, n) to pairs of nodes, d numbers each."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     d = kin.dimension
     m, width = pairs.codes.size, seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             weight = seen.weights[p, k]
@@ -181,11 +181,11 @@ def add_slopes(kin, seen, tensors, blocks, part):
 
 
 @by_threads
-def add_products(seen, values, blocks, part):
+def add_products(seen, values, blocks, chunk):
     """Add N_a N_b times point values (1, n) to pairs of nodes."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)
     m, width = pairs.codes.size, seen.nodes.shape[1]
-    for a in range(m * part // PARTS, m * (part + 1) // PARTS):
+    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
             scale = seen.weights[p, k] * values[0, p]

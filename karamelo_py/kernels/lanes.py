@@ -21,8 +21,8 @@ def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
 
 @implements(lanes_with, by_type=True)
 def _lanes_with(parts, laws, mass):
-    classes = (*(part.instance_class for part in parts), *classes_in(laws))
-    in_lanes = all(getattr(part, "in_lanes", False) for part in classes)
+    classes = (*(tag.instance_class for tag in parts), *classes_in(laws))
+    in_lanes = all(getattr(tag, "in_lanes", False) for tag in classes)
     made = lanes_for(mass.dtype.bitwidth) if in_lanes else OneByOne
     return lambda parts, laws, mass: made()
 
@@ -49,6 +49,8 @@ def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 
-def zero_of(lanes: Tag, like: Number) -> Number:
-    """Return 0 in the type of `like`, or in lanes of it."""
-    return like - like if isinstance(lanes, OneByOne) else spread(lanes, like - like)
+def zero_of(lanes: Tag, template: Number) -> Number:
+    """Return 0 in the type of `template`, or in lanes of it."""
+    return (
+        template - template if isinstance(lanes, OneByOne) else spread(lanes, template - template)
+    )

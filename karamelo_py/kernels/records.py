@@ -25,15 +25,15 @@ def clear_first(array, i):
 
 
 @shared
-def row(array, i, first, like):
-    """Return (array[i, first], ..., array[i, first + len(like) - 1])."""
+def row(array, i, first, template):
+    """Return (array[i, first], ..., array[i, first + len(template) - 1])."""
     if isinstance(i, Weighted):
-        total = [a - a for a in like]
+        total = [a - a for a in template]
         for one, weight in zip(i.rows, i.weights, strict=True):
-            record = row(array, one, first, like)
+            record = row(array, one, first, template)
             total = [fma(weight, x, t) for x, t in zip(record, total, strict=True)]
         return tuple(total)
-    return tuple([array[i, first + k] for k in range(len(like))])
+    return tuple([array[i, first + k] for k in range(len(template))])
 
 
 @shared
@@ -62,11 +62,11 @@ def accumulate_affine(array, nodes, first, weights, field):
             array[node, first + c] += weight * number
 
 
-def move_record(target, source, first, like, keep):
+def move_record(target, source, first, template, keep):
     """Move components of a record of `source` to one of `target`, or add them if `keep`."""
     array, i = target
     other, j = source
-    for k in range(first, first + len(like)):
+    for k in range(first, first + len(template)):
         array[i, k] = (array[i, k] if keep else 0) + other[j, k]
         other[j, k] = 0
 
@@ -126,36 +126,38 @@ def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> 
     return [shuffle(builder, *pair, list(range(8))) for pair in zip(*parts, strict=True)]
 
 
-def _gathered(builder: ir.IRBuilder, lanes: Lanes, first: Any, like: Any, read: Callable) -> list:
+def _gathered(
+    builder: ir.IRBuilder, lanes: Lanes, first: Any, template: Any, read: Callable
+) -> list:
     """Gather by ``read(lane, column, count)``, which loads components of one point."""
     components: list = []
-    for begin, count in _chunks(len(like)):
+    for begin, count in _chunks(len(template)):
         column = builder.add(first, I64(begin))
         rows = [read(k, column, count) for k in range(lanes.width)]
         components += _lanes_from(builder, rows, lanes, count)
-    return components[: len(like)]
+    return components[: len(template)]
 
 
 @intrinsic
-def _gather_row(array, nodes, first, like):
+def _gather_row(array, nodes, first, template):
     lanes = Lanes(array.dtype, nodes.width)
-    made = types.UniTuple(lanes, len(like))
+    made = types.UniTuple(lanes, len(template))
 
     def codegen(builder, table, at, first, _):
         def read(k, column, count):
             pointer = at_lane(builder, array, table, nodes, at, k, column)
             return builder.load(_record(builder, array, pointer, count), align=_size(array))
 
-        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
+        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, template, read))
 
-    return made(array, nodes, types.int64, like), codegen
+    return made(array, nodes, types.int64, template), codegen
 
 
 @intrinsic
-def _gather_weighted(array, nodes, first, weights, like):
+def _gather_weighted(array, nodes, first, weights, template):
     """Sum by weight before records become lanes."""
     lanes = weights[0]
-    made = types.UniTuple(lanes, len(like))
+    made = types.UniTuple(lanes, len(template))
 
     def codegen(builder, *values):
         table, places, first, factors, _ = values
@@ -173,9 +175,9 @@ def _gather_weighted(array, nodes, first, weights, like):
                 total = _fma(builder, [weight, builder.load(pointer, align=size), total])
             return total
 
-        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, like, read))
+        return llvm.make_tuple(builder, made, _gathered(builder, lanes, first, template, read))
 
-    return made(array, nodes, types.int64, weights, like), codegen
+    return made(array, nodes, types.int64, weights, template), codegen
 
 
 @implements(prefetch_records, Lanes, Beside)
@@ -190,11 +192,13 @@ def _prefetch_records(array, nodes):
 
 
 @implements(row, by_type=True)
-def _row(array, i, first, like):
+def _row(array, i, first, template):
     if isinstance(i, Lanes | Beside):
         return _gather_row
     if tag_class(i) is Weighted and lanes_of(i):
-        return lambda array, i, first, like: _gather_weighted(array, i.rows, first, i.weights, like)
+        return lambda array, i, first, template: _gather_weighted(
+            array, i.rows, first, i.weights, template
+        )
     return None
 
 
@@ -225,13 +229,13 @@ def _scatter(array, nodes, first, values):
 
 
 @implements(move_record)
-def _move_record(target, source, first, like, keep):
-    _move(*target, *source, first, like, keep)
+def _move_record(target, source, first, template, keep):
+    _move(*target, *source, first, template, keep)
 
 
 @intrinsic
 def _move(*kinds):
-    array, _, other, _, _, like, _ = kinds
+    array, _, other, _, _, template, _ = kinds
 
     def codegen(builder, *values):
         here, i, source_table, j, first, _, keep = values
@@ -239,7 +243,7 @@ def _move(*kinds):
 
         def address(kind, table, node):
             pointer = llvm.item_pointer(builder, kind, table, [node, first])
-            return _record(builder, kind, pointer, len(like))
+            return _record(builder, kind, pointer, len(template))
 
         to, of = address(array, here, i), address(other, source_table, j)
         before = builder.load(to, align=size)
@@ -249,7 +253,7 @@ def _move(*kinds):
         builder.store(zero, of, align=size)
 
     number = types.int64
-    return types.void(array, number, other, number, number, like, types.boolean), codegen
+    return types.void(array, number, other, number, number, template, types.boolean), codegen
 
 
 def _records(builder: ir.IRBuilder, parts: list) -> list:

@@ -16,7 +16,7 @@ from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.kernels.table import Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
-from karamelo_py.kernels.views import place_at
+from karamelo_py.kernels.views import location_at
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws.rigid import Rigid
@@ -73,7 +73,9 @@ def _add_forces(s, block, p):
     basis, kin, points, totals, d = s.basis, s.kin, block.points, s.control.totals, s.kin.dimension
     rigid, forces, torques = field(s.nodes.fields, RigidSums), s.contact.force, s.contact.torque
     grid = record(s.grids, points.grid[p])
-    stencil = locate(basis, kin, grid, place_at(basis, kin, points.x[s.control.motion[0].now], p))
+    stencil = locate(
+        basis, kin, grid, location_at(basis, kin, points.x[s.control.motion[0].now], p)
+    )
     first, turning = forces[points.id[p]], torques[points.id[p]]
     for node in range(support(basis, kin)):
         n, weight, _ = entry(basis, kin, grid, stencil, node)

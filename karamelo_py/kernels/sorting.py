@@ -9,7 +9,7 @@ from karamelo_py.compiler.fields import pick_items, put_items
 from karamelo_py.compiler.threads import by_team, by_threads, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import Number
-from karamelo_py.kernels.views import place_at
+from karamelo_py.kernels.views import location_at
 from karamelo_py.points.basis import extent
 from karamelo_py.points.grid import Grid, cells_along, in_cells
 
@@ -238,5 +238,5 @@ def widest(at):
     basis, kin, grids, of, x = at_hand(at)
     far = 0.0
     for p in range(x.shape[1]):
-        far = max(far, extent(basis, kin, record(grids, of[p]), place_at(basis, kin, x, p)))
+        far = max(far, extent(basis, kin, record(grids, of[p]), location_at(basis, kin, x, p)))
     return far

@@ -123,7 +123,7 @@ def all_by_corners(parts, w):
         "loss": field(w.nodes.fields, EnergyLoss) is not None,
         "anything": True,
     }
-    unless = [type(part).not_at_corners for part in parts]
+    unless = [type(tag).not_at_corners for tag in parts]
     return not any(present[name] for names in unless for name in names)
 
 
@@ -226,7 +226,7 @@ def _scatter_nodes_stencil(stencil, lanes, quantities, w, loads):
         _scatter(quantities, w, stencil, loads)
         return
     parts, sources = affine_parts(quantities, w, stencil, loads), (quantities, loads)
-    if not _even(w, stencil, any(len(part) and len(part[-1]) for part in parts)):
+    if not _even(w, stencil, any(len(term) and len(term[-1]) for term in parts)):
         _scatter(quantities, w, stencil, loads)
     elif product.sees_same_nodes(stencil):
         _scatter_parts(lanes, w, product.with_one_node(stencil), sources, parts)
@@ -259,10 +259,10 @@ def _scatter_block(lanes, quantities, w, block, loads):
 
 def _scatter_parts(lanes, w, stencil, sources, parts):
     quantities, loads = sources
-    affine = tuple([part for part in parts if len(part)])
+    affine = tuple([term for term in parts if len(term)])
     if len(affine):
         give_affine(lanes, w, stencil, affine)
-    rest = [k for k, part in enumerate(parts) if not len(part)]
+    rest = [k for k, term in enumerate(parts) if not len(term)]
     if len(rest):
         _scatter(tuple([quantities[k] for k in rest]), w, stencil, tuple([loads[k] for k in rest]))
 

@@ -54,8 +54,8 @@ def _take_record(quantities, kin, into, out_of, keep):
     for name, first, end, add in _columns(quantities, kin):
         array = node_array(nodes, name)
         if array is not None:
-            like = (0,) * (end - first)
-            move_record((array, n), (node_array(buffers, name), m), first, like, add or keep)
+            template = (0,) * (end - first)
+            move_record((array, n), (node_array(buffers, name), m), first, template, add or keep)
 
 
 def _clear_record(quantities, kin, nodes, n):

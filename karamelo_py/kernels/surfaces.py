@@ -220,7 +220,7 @@ def nearest(kin, surface, x, reach):
 
 
 def _offset(surface, kin, x, reach):
-    """Return the largest component of the way to the nearest place, `reach` if it is far."""
+    """Return the largest component of the way to the nearest face, at most `reach`."""
     far = reach * sqrt(kin.dimension)
     if distance(surface, kin, x, far) >= far:
         return reach
@@ -312,7 +312,7 @@ class Common(NamedTuple):
 
 
 class Outside(NamedTuple):
-    part: NamedTuple
+    inner: NamedTuple
 
 
 @point_function()
@@ -382,14 +382,14 @@ def _depth_in_convex(shape, kin, x, reach):
 def _depth_in_parts(shape, kin, x, reach):
     choose = max if isinstance(shape, Joined) else min
     combined = depth(shape.parts[0], kin, x, reach)
-    for part in shape.parts[1:]:
-        combined = choose(combined, depth(part, kin, x, reach))
+    for member in shape.parts[1:]:
+        combined = choose(combined, depth(member, kin, x, reach))
     return combined
 
 
 @depth.on(Outside)
 def _depth_outside(shape, kin, x, reach):
-    return -depth(shape.part, kin, x, reach)
+    return -depth(shape.inner, kin, x, reach)
 
 
 def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], np.ndarray]:
@@ -397,14 +397,14 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     def measure_some(shape, x, reach, out, n):
         kin, surface = at_hand(shape)
         for p in range(n * CHUNK, min((n + 1) * CHUNK, x.shape[0])):
-            place = kin.Vector._make([x[p, c] for c in range(kin.dimension)])
-            out[p] = measure(surface, kin, place, reach)
+            position = kin.Vector._make([x[p, c] for c in range(kin.dimension)])
+            out[p] = measure(surface, kin, position, reach)
 
     def measure_all(surface, x, reach):
         d = surface.low.shape[1]
-        places, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
+        positions, out = np.ascontiguousarray(x[:, :d], float), np.empty(len(x))
         shape = KINEMATICS[d](), surface
-        measure_some(Serial(), -(-len(x) // CHUNK), shape, places, float(reach), out)
+        measure_some(Serial(), -(-len(x) // CHUNK), shape, positions, float(reach), out)
         return out
 
     return measure_all

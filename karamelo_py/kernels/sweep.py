@@ -22,7 +22,7 @@ from karamelo_py.compiler.fields import load, load_vector, store
 from karamelo_py.compiler.lanes import first_false_lane, largest, room_for
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.compiler.tuples import flat, nested_as, record
-from karamelo_py.kernels.arrays import Block, Index, Nodes, Number, Places, Points, Setup, Tag
+from karamelo_py.kernels.arrays import Block, Index, Locations, Nodes, Number, Points, Setup, Tag
 from karamelo_py.kernels.clock import common_velocity
 from karamelo_py.kernels.equations import empty_all, load_all, updated_all
 from karamelo_py.kernels.equations.node_updates import at_node
@@ -36,7 +36,7 @@ from karamelo_py.kernels.lanes import (
 from karamelo_py.kernels.stencils import gathered_by, scatter_nodes
 from karamelo_py.kernels.sums import adds, sum_shares
 from karamelo_py.kernels.totals import take_over
-from karamelo_py.kernels.views import PointView, Work, ask_ahead, place_at
+from karamelo_py.kernels.views import PointView, Work, ask_ahead, location_at
 from karamelo_py.points.basis import locate
 from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
@@ -58,7 +58,7 @@ class Extent(NamedTuple):
     dt: Number
     gathers: bool
     scatters: bool
-    moves: bool  # new places go to the other array
+    moves: bool  # new locations go to the other array
 
 
 class Context(NamedTuple):
@@ -76,7 +76,7 @@ class Context(NamedTuple):
     room: Number  # cells that points may still move within their tile's box
     stride: Number  # cells that they may move at all
     common: tuple  # (d,) reference velocity for speeds
-    then: int  # index of the array of new places
+    then: int  # index of the array of new locations
     gathers: bool  # whether tasks are done
     scatters: bool  # whether quantities are scattered
     dt: Number
@@ -91,17 +91,17 @@ class PresentWeights(NamedTuple):
     pass
 
 
-def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, places: Places) -> Work:
+def work_of(s: Context, grid: Grid, nodes: Nodes, block: Block, locations: Locations) -> Work:
     return Work(
         s.frame, s.kin, s.basis, grid, s.transfer, s.averaging, nodes, block.points, block.laws,
-        places, s.common, s.kick,
+        locations, s.common, s.kick,
     )  # fmt: skip
 
 
 def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
     if isinstance(weights, OldWeights) or not w.frame.moves:
         return stencil
-    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.y, p))
+    return locate(w.basis, w.kin, w.grid, location_at(w.basis, w.kin, w.locations.y, p))
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
@@ -109,17 +109,17 @@ def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
-def places_of(frame: Tag, points: Points, now: int, then: int) -> Places:
+def locations_of(frame: Tag, points: Points, now: int, then: int) -> Locations:
     weighed: Any = points.x[now] if frame.moves else points.home
-    return Places(weighed, points.x[now], points.x[then])
+    return Locations(weighed, points.x[now], points.x[then])
 
 
 def position_of(w: Work, p: Index) -> tuple:
-    return load_vector(w.kin, w.places.x, p)
+    return load_vector(w.kin, w.locations.x, p)
 
 
 def stencil_of(w: Work, p: Index) -> tuple:
-    return locate(w.basis, w.kin, w.grid, place_at(w.basis, w.kin, w.places.where, p))
+    return locate(w.basis, w.kin, w.grid, location_at(w.basis, w.kin, w.locations.where, p))
 
 
 def scatter_point(visit: Visit, lanes: Tag, pt: PointView, out: Work) -> None:
@@ -143,11 +143,11 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
-    places = places_of(s.frame, points, s.now, s.then)
-    w = hold(work_of(s, grid, s.nodes, block, places))
+    locations = locations_of(s.frame, points, s.now, s.then)
+    w = hold(work_of(s, grid, s.nodes, block, locations))
     box = tiling.buffer
     numbered = renumbered(grid, box[t, 2], box[t, 3], box[t, 4])
-    out = work_of(s, numbered, s.buffers, block, places)
+    out = work_of(s, numbered, s.buffers, block, locations)
     parts = (*visit.tasks, *visit.quantities, s.basis, s.transfer, s.averaging)
     lanes = lanes_with(parts, block.laws, points.mass)
     tile = TileVisit(visit, s, lanes, w, out, tiling.range[t, 0], tiling.range[t, 1])
@@ -204,8 +204,8 @@ def _visit_in_stretches(tile):
     """Gather, update and scatter a stretch of points in a loop each (`one_loop_each`)."""
     visit, s, lanes, w, out, begin, end = tile
     dt, wide = s.dt, lanes_of_update(lanes, visit)
-    like = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
-    room = room_for(STRETCH, flat(like))
+    template = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
+    room = room_for(STRETCH, flat(template))
     furthest = fastest = zero_of(wide, dt)
     wrong = 0
     for first in range(begin, end, STRETCH):
@@ -222,8 +222,8 @@ def _visit_in_stretches(tile):
             moved = zero_of(wide, dt)
             rate = fastest
             if s.gathers:
-                numbers = load(room, points_from(wide, q - first, last - first), flat(like))
-                totals = nested_as(like, numbers)
+                numbers = load(room, points_from(wide, q - first, last - first), flat(template))
+                totals = nested_as(template, numbers)
                 moved, rate = updated_all(visit.tasks, PointView(w, (), p, dt), totals, fastest)
             else:
                 moved = _without_gather(tile, p, moved)

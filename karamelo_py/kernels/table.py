@@ -259,8 +259,8 @@ _SAYS: dict[type, Any] = {
 
 def says(row: Any, setup: Any) -> str | None:
     """Describe a row with what joins it in a scene; None if it does nothing there."""
-    told = [row] if isinstance(row, SceneTask) else in_scene.find((type(row),))(row, setup)
-    texts = [_SAYS[type(one)](one, setup) for one in told if type(one) in _SAYS]
+    rows = [row] if isinstance(row, SceneTask) else in_scene.find((type(row),))(row, setup)
+    texts = [_SAYS[type(one)](one, setup) for one in rows if type(one) in _SAYS]
     return "; ".join(text for text in texts if text) or None
 
 

@@ -17,9 +17,9 @@ from karamelo_py.compiler.threads import many_threads
 from karamelo_py.compiler.tuples import count_in, record
 from karamelo_py.kernels.arrays import (
     Index,
+    Locations,
     Nodes,
     Number,
-    Places,
     Points,
     Tag,
     of_change,
@@ -47,7 +47,7 @@ class Work(NamedTuple):
     nodes: Nodes
     points: Points
     laws: NamedTuple  # parameters of materials, (m,) each
-    places: Places
+    locations: Locations
     common: tuple  # (d,) velocity that speeds are measured from
     kick: Number  # time that forces act
 
@@ -73,17 +73,17 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         w = self.w
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 
-    def v_star(self, like):
-        """v* and v* - v, in the type of `like`; one record in 2D, two in 3D."""
+    def v_star(self, template):
+        """v* and v* - v, in the type of `template`; one record in 2D, two in 3D."""
         kin, records, i = self.w.kin, self.w.nodes.update, self.i
         first, d = of_change(kin), kin.dimension
         if many_threads() and not isinstance(i, Weighted):  # adjacent records
             both = aligned_record(records, i, 2 * first)
             return vector(kin, both[:d]), vector(kin, both[first : first + d])
         if d == 2:
-            both = row(records, i, 0, (*like, *like))
+            both = row(records, i, 0, (*template, *template))
             return vector(kin, both[:2]), vector(kin, both[2:])
-        return vector_at(kin, records, i, 0, like), vector_at(kin, records, i, first, like)
+        return vector_at(kin, records, i, 0, template), vector_at(kin, records, i, first, template)
 
     @property
     def v(self):
@@ -104,8 +104,8 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
     __slots__ = ()
     kin = property(lambda pt: pt.w.kin)
     v = property(lambda pt: load_vector(pt.w.kin, pt.w.points.v, pt.p))
-    x = property(lambda pt: load_vector(pt.w.kin, pt.w.places.x, pt.p))
-    y = property(lambda pt: load_vector(pt.w.kin, pt.w.places.y, pt.p))
+    x = property(lambda pt: load_vector(pt.w.kin, pt.w.locations.x, pt.p))
+    y = property(lambda pt: load_vector(pt.w.kin, pt.w.locations.y, pt.p))
     law_and_state = property(lambda pt: state_at(pt.w.kin, pt.w.points, pt.w.laws, pt.p))
 
     @property
@@ -123,13 +123,13 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
         """The array of a field of points, or None."""
         return field(self.w.points.fields, kind)
 
-    def load(self, kind, like):
-        """Load as many components of a field as `like` has; () if absent."""
-        return load(self.of(kind), self.p, like)
+    def load(self, kind, template):
+        """Load as many components of a field as `template` has; () if absent."""
+        return load(self.of(kind), self.p, template)
 
 
-def place_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
-    """Load a place (w,): position, and domain shape."""
+def location_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
+    """Load a location (w,): position, and domain shape."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
@@ -159,16 +159,16 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
     return f if len(f) else deformation(law, kin, state)
 
 
-def ask_ahead(w: Work, p: Index, like: Number, apart: bool) -> None:
+def ask_ahead(w: Work, p: Index, template: Number, apart: bool) -> None:
     """Prefetch the next points in 3D, if more arrays than hardware prefetchers follow."""
     d, fields = w.kin.dimension, w.points.fields
-    moment = len(zero_moment(w.transfer, w.kin, like))
+    moment = len(zero_moment(w.transfer, w.kin, template))
     if d == 3 and (apart or moment):
-        state = count_in(initial_state(law_at(w.points, w.laws, p), w.kin, like))
+        state = count_in(initial_state(law_at(w.points, w.laws, p), w.kin, template))
         more = (field(fields, Moment), moment)
         if apart:
             more = (field(fields, DeformationGradient), w.kin.tensor_size)
-        for array, rows in ((w.places.x, d), (w.points.v, d), more, (w.points.state, state)):
+        for array, rows in ((w.locations.x, d), (w.points.v, d), more, (w.points.state, state)):
             if array is not None:
                 for k in range(rows):
                     prefetch(array, (k, p))

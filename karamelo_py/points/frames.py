@@ -65,6 +65,6 @@ def scaled_increment(frame, kin, dl, f, ratio):
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
-def inverse_stretch_squared(frame, kin, f, like):
+def inverse_stretch_squared(frame, kin, f, template):
     """Return a bound of (h / size of the deformed cell)^2."""
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

@@ -189,7 +189,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
         quotient, rest = builder.udiv(x, y), builder.urem(x, y)
     if safe:
         return quotient, rest
-    return tuple(builder.select(bad, zero, part) for part in (quotient, rest))
+    return tuple(builder.select(bad, zero, result) for result in (quotient, rest))
 
 
 def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: ir.Value, y: ir.Value) -> tuple:

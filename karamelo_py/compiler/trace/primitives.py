@@ -89,9 +89,9 @@ def point_function(
     return declare
 
 
-def real(value: float, like: Any) -> Any:
-    """Convert a literal to the number type of `like`."""
-    return type(like)(value)
+def real(value: float, template: Any) -> Any:
+    """Convert a literal to the number type of `template`."""
+    return type(template)(value)
 
 
 def lanes_of(numba_type: Any) -> int:
@@ -110,10 +110,10 @@ def _of_width(width: int, scalar: types.Type) -> types.Type:
 
 @implements(real)
 @intrinsic
-def _real(value, like):
-    scalar = scalar_of(like) if isinstance(like, Lanes | types.Float) else types.float64
-    made = _of_width(lanes_of((value, like)), scalar)
-    return made(value, like), lambda builder, number, _: llvm.cast(builder, number, value, made)
+def _real(value, template):
+    scalar = scalar_of(template) if isinstance(template, Lanes | types.Float) else types.float64
+    made = _of_width(lanes_of((value, template)), scalar)
+    return made(value, template), lambda builder, number, _: llvm.cast(builder, number, value, made)
 
 
 @implements(int, Lanes)
@@ -125,22 +125,22 @@ def _truncated(a):
     return whole(a), lambda builder, number: llvm.cast(builder, number, a, whole)
 
 
-def round_off(like: Any) -> Any:
-    """Return the relative round-off in the type of `like`."""
-    return type(like)(2.0**-23 if type(like).__name__ == "float32" else 2.0**-52)
+def round_off(template: Any) -> Any:
+    """Return the relative round-off in the type of `template`."""
+    return type(template)(2.0**-23 if type(template).__name__ == "float32" else 2.0**-52)
 
 
 @implements(round_off)
 @intrinsic
-def _round_off(like):
-    scalar = types.float32 if scalar_of(like) == types.float32 else types.float64
-    made = _of_width(lanes_of(like), scalar)
+def _round_off(template):
+    scalar = types.float32 if scalar_of(template) == types.float32 else types.float64
+    made = _of_width(lanes_of(template), scalar)
 
     def codegen(builder, _):
         error = llvm.constant(builder, scalar, 2.0**-23 if scalar == types.float32 else 2.0**-52)
         return llvm.cast(builder, error, scalar, made)
 
-    return made(like), codegen
+    return made(template), codegen
 
 
 def index(i: int) -> int:

@@ -166,9 +166,9 @@ def _register(kind: Any) -> None:
             return ()
         array, sums = present[0]
         parts = [one.affine(load, w) for one in sums]
-        if not all(len(part) for part in parts):
+        if not all(len(term) for term in parts):
             return ()
-        at_first = [_at_first(w, stencil, *part) for part in parts]
+        at_first = [_at_first(w, stencil, *term) for term in parts]
         return node_array(w.nodes, array), sums[0].into.first(w.kin), *_joined(at_first)
 
 

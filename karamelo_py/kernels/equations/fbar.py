@@ -128,8 +128,8 @@ class SetMeanStress(eq.Task):
         return eq.Report(real(0, pt.dt), fastest)
 
 
-def no_ratio(w, like):
-    return (real(0, like),) if isinstance(w.averaging, FBar) else ()
+def no_ratio(w, template):
+    return (real(0, template),) if isinstance(w.averaging, FBar) else ()
 
 
 def gathered_ratio(node, total):

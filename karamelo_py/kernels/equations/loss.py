@@ -83,13 +83,13 @@ def warm_node(rubbed, n, heat):
 def warm_by_friction(pt):
     rubbed = field(pt.w.nodes.fields, FrictionalHeat)
     if rubbed is not None:
-        (law, state), like = pt.law_and_state, pt.v[0]
-        heat = like - like
+        (law, state), template = pt.law_and_state, pt.v[0]
+        heat = template - template
         for node in pt.nodes:
             heat += node.N * rubbed[node.i, 0]
-        capacity = laws.heat_capacity(law, like)
+        capacity = laws.heat_capacity(law, template)
         warms = capacity > 0
-        rise = where(warms, heat, like - like) / where(warms, capacity, real(1, like))
+        rise = where(warms, heat, template - template) / where(warms, capacity, real(1, template))
         T = laws.temperature(law, pt.kin, state) + rise
         store(pt.w.points.state, pt.p, laws.with_temperature(law, pt.kin, state, T))
 
@@ -142,9 +142,9 @@ def reflect(pt, term, k):
     reflected = pt.of(Reflected)
     if reflected is not None:
         v = pt.v
-        like = v[0]
-        none, half, one = real(0, like), real(0.5, like), real(1, like)
-        before = load(reflected, pt.p, (like, *v))
+        template = v[0]
+        none, half, one = real(0, template), real(0.5, template), real(1, template)
+        before = load(reflected, pt.p, (template, *v))
         order = pt.w.transfer.order
         rest = v._make(where(k == 0, (*v,), before[1:])) - term
         gone = where(k == 0, none, before[0])
@@ -161,12 +161,12 @@ def _spread(pt, term):
     return spread
 
 
-def term_at(node, like):
-    return vector_at(node.kin, node.of(Series), node.i, 0, like)
+def term_at(node, template):
+    return vector_at(node.kin, node.of(Series), node.i, 0, template)
 
 
-def _before(node, like):
-    v, dv = node.v_star(like)
+def _before(node, template):
+    v, dv = node.v_star(template)
     return v - dv
 
 

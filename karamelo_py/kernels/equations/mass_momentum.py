@@ -28,7 +28,7 @@ def rigid_mass(pt):
 
 
 @eq.reads()
-def place(pt):
+def position(pt):
     """Return the position (d,) after the move if centres are needed, else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
@@ -53,7 +53,7 @@ class MassMomentum(eq.NodalQuantity):
     records = "sums"
     says = "p2g mass and momentum"
     also_reads = ("x moved",)
-    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=eq.moment, rigid=rigid_mass, x=place)
+    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=eq.moment, rigid=rigid_mass, x=position)
     gives = (
         eq.Sum(eq.MASS, lambda pt, node: (node.N * pt.mass,), lambda pt, w: (pt.mass, ())),
         eq.Sum(eq.MOMENTUM, momentum, affine_momentum),

@@ -9,7 +9,7 @@ from karamelo_py.kernels.equations import Report, Task
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.equations.loss import in_company, warm, warm_by_friction
 from karamelo_py.kernels.equations.strain import further_reach
-from karamelo_py.kernels.views import place_at
+from karamelo_py.kernels.views import location_at
 from karamelo_py.points import kinematics, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry
 from karamelo_py.points.basis.cpdi import AtCorners
@@ -65,14 +65,14 @@ class Move(Task):
         forget(pt.of(VelocityBefore), pt.p, hits)  # beyond the edge
         store(w.points.v, pt.p, v)
         store(pt.of(transfers.Moment), pt.p, moment)
-        store(w.places.y, pt.p, y)
+        store(w.locations.y, pt.p, y)
         moved = (y - x).largest() * w.grid.inv_h
         if not w.frame.moves:
             return Report(moved, fastest)
         if carried(w.basis, w.kin) > 0:
-            before = place_at(w.basis, w.kin, w.places.x, pt.p)
+            before = location_at(w.basis, w.kin, w.locations.x, pt.p)
             new = _corners_carried(pt, (*(x + step), *before[len(x) :]), corners)
-            store(w.places.y, pt.p, new)
+            store(w.locations.y, pt.p, new)
             moved += further_reach(w.basis, w.kin, w.grid, before, new)
         return Report(where(inside(w.grid, w.kin, y), moved, inf), fastest)
 
@@ -82,7 +82,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the place `new` with moved corners, by gathered velocities if known."""
+    """Return the location `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

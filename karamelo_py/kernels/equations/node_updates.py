@@ -19,10 +19,10 @@ def node_task(tag: type) -> type:
     return tag
 
 
-def per_mass(nodes: Nodes, n: Index, like: Number) -> Number:
+def per_mass(nodes: Nodes, n: Index, template: Number) -> Number:
     """Return 1 / mass of a node, or 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
-    return real(1, like) / mass if mass > 0 else real(0, like)
+    return real(1, template) / mass if mass > 0 else real(0, template)
 
 
 def unlimited(seen, n, mass, light):

@@ -38,8 +38,8 @@ def _counts_seam(ranks, n):
     """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
-        place = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
-        counted = counted & (place >= 0) & (place < axis.period)
+        position = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
+        counted = counted & (position >= 0) & (position < axis.period)
     return counted
 
 
@@ -76,19 +76,19 @@ def _is_lowest(axis, nodes, n):
     """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    place = (int(n) - axis.first) // axis.stride % axis.count
-    lowest = place >= 0
-    for k in range(1, int(place // axis.period) + 1):
+    position = (int(n) - axis.first) // axis.stride % axis.count
+    lowest = position >= 0
+    for k in range(1, int(position // axis.period) + 1):
         if used[index(int(n - k * step)), 0] > 0:
-            lowest = place < 0
+            lowest = position < 0
     return lowest
 
 
 def _join(axis, nodes, array, n):
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    place = (int(n) - axis.first) // axis.stride % axis.count
-    more = int((axis.count - 1 - place) // axis.period)
+    position = (int(n) - axis.first) // axis.stride % axis.count
+    more = int((axis.count - 1 - position) // axis.period)
     for c in range(int(array.shape[1])):
         total = array[n, c]
         for k in range(1, more + 1):

@@ -254,8 +254,8 @@ def _is_rim(nodes, kin, n, rim):
 
 
 def _is_closed(nodes, kin, n, rim):
-    given = field(nodes.fields, GivenPressure)[n, 0]
-    return given != given and _is_rim(nodes, kin, n, rim)
+    prescribed = field(nodes.fields, GivenPressure)[n, 0]
+    return prescribed != prescribed and _is_rim(nodes, kin, n, rim)
 
 
 def _is_wet_node(nodes, n):
@@ -278,12 +278,12 @@ class ShareForces(NamedTuple):
             return
         water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
         force, area = field(nodes.fields, PoreForce), field(nodes.fields, PoreArea)
-        given = field(nodes.fields, GivenPressure)[n, 0]
+        prescribed = field(nodes.fields, GivenPressure)[n, 0]
         m, m_s = water[n, arrays.MASS], nodes.sums[n, arrays.MASS]
         V, D = sums[n, 0], sums[n, 4]
         p = along = real(0, m)
-        if given == given:
-            p = given
+        if prescribed == prescribed:
+            p = prescribed
         elif _is_closed(nodes, kin, n, task.rim):
             p = sums[n, 2] / V
         if _is_closed(nodes, kin, n, task.surface):
@@ -441,8 +441,8 @@ class Seep(eq.Task):
         grown = det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
         pores = old.pores * grown + (1 - law.n) * (grown - 1)
         if not isinstance(pt.w.basis, Linear):
-            part = real(SMOOTHING, mean) / law.K
-            pores = pores * (1 + part * (pt.of(UnseenPressure)[0, pt.p] - again))
+            factor = real(SMOOTHING, mean) / law.K
+            pores = pores * (1 + factor * (pt.of(UnseenPressure)[0, pt.p] - again))
             store(pt.of(UnseenPressure), pt.p, (pore_pressure(law, kin, old) - mean,))
         new = old._replace(content=content, pores=pores)
         store(pt.w.points.state, pt.p, new)

@@ -5,7 +5,7 @@ from math import inf, sqrt
 from karamelo_py.compiler import all_lanes, real, where
 from karamelo_py.compiler.fields import store, store_from
 from karamelo_py.kernels.equations import Report, Task, fbar
-from karamelo_py.kernels.views import place_at
+from karamelo_py.kernels.views import location_at
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, deformed, extent
 from karamelo_py.points.kinematics import I, det, large, outer, zero
@@ -117,10 +117,10 @@ def increment(dt, grad_v):
 
 def _deform_domain(task, pt, growth):
     w = pt.w
-    x = w.places.y if isinstance(task, SecondStrain) else w.places.x
-    before = place_at(w.basis, w.kin, x, pt.p)
+    x = w.locations.y if isinstance(task, SecondStrain) else w.locations.x
+    before = location_at(w.basis, w.kin, x, pt.p)
     after = deformed(w.basis, w.kin, before, growth)
-    store_from(w.places.y, pt.p, w.kin.dimension, after)
+    store_from(w.locations.y, pt.p, w.kin.dimension, after)
     return further_reach(w.basis, w.kin, w.grid, before, after)
 
 

@@ -1,7 +1,7 @@
 """Bases: the nodes in a point's stencil, with weights and gradients. One file each.
 
 A basis is a NamedTuple of parameters with `traits` and the point functions declared here. `grid` is
-the point's :class:`~karamelo_py.points.grid.Grid`, `place` a flat tuple of its position and the
+the point's :class:`~karamelo_py.points.grid.Grid`, `location` a flat tuple of its position and the
 stored shape of its domain, `stencil` the result of `locate`. A product of one function per
 direction needs only `along` and :func:`karamelo_py.points.basis.product.register`; a basis with
 corners needs an `element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
@@ -42,7 +42,7 @@ class BasisTraits(NamedTuple):
 
 
 @point_function()
-def locate(basis, kin, grid, place):
+def locate(basis, kin, grid, location):
     """Return the stencil of a point, which the functions below share."""
 
 
@@ -91,17 +91,17 @@ def without_moment(basis, grid, moment):
 
 
 @point_function(otherwise=True)
-def first_node(basis, like):
+def first_node(basis, template):
     """Return the offset of a position in cells whose integer part is the first node."""
     return 0
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Return the number of components of a place after the position, in `d` dimensions."""
+    """Return the number of components of a location after the position, in `d` dimensions."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
-    return sum(sizes[part] for part in shape)
+    return sum(sizes[name] for name in shape)
 
 
 def blank(basis, kin, x):
@@ -109,13 +109,13 @@ def blank(basis, kin, x):
 
 
 @point_function(otherwise=True)
-def deformed(basis, kin, place, dl):
-    """Return `place` with its shape deformed by dl = dt grad v."""
-    return place
+def deformed(basis, kin, location, dl):
+    """Return `location` with its shape deformed by dl = dt grad v."""
+    return location
 
 
 @point_function(otherwise=True)
-def extent(basis, kin, grid, place):
+def extent(basis, kin, grid, location):
     """Return the cells that the domain's corners, or the nodes they scatter to, may reach."""
     return grid.h - grid.h
 
@@ -139,6 +139,6 @@ def carrier(basis, kin, grid, stencil, corner):
 
 
 @point_function(otherwise=True)
-def carry(basis, kin, place, corner, displacement):
-    """Return `place` with one corner of the domain displaced."""
-    return place
+def carry(basis, kin, location, corner, displacement):
+    """Return `location` with one corner of the domain displaced."""
+    return location

@@ -41,8 +41,8 @@ known_failure(
 
 
 @along.on(BernsteinQuadratic)
-def _along_bernstein_quadratic(basis, kin, grid, place, direction):
-    a = in_cells(grid, direction, place[direction])
+def _along_bernstein_quadratic(basis, kin, grid, location, direction):
+    a = in_cells(grid, direction, location[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     s = a - i
     t = 1 - s

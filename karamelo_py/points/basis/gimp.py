@@ -143,10 +143,10 @@ class CPGIMP(_Box):
     default_variant = "stretch"
 
 
-def box(grid, kin, place, direction, halves):
+def box(grid, kin, location, direction, halves):
     """Return an uncut box in one direction: centre and ends in cells; `halves` bound it."""
-    a = in_cells(grid, direction, place[direction])
-    half = place[kin.dimension + direction] * grid.inv_h
+    a = in_cells(grid, direction, location[direction])
+    half = location[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
     return a, a - half, a + half
 
@@ -162,7 +162,7 @@ def in_cell(lo, hi, j):
 def averaged_hats(cells, grid, first, lo, hi):
     """Average hats from node `first` over [lo, hi], in cells from that node."""
     lengths, ahead = zip(*[in_cell(lo, hi, j) for j in range(cells)], strict=True)
-    behind = [length - part for length, part in zip(lengths, ahead, strict=True)]
+    behind = [length - weight for length, weight in zip(lengths, ahead, strict=True)]
     between = [a + b for a, b in zip(ahead[:-1], behind[1:], strict=True)]
     falls = [lengths[j] - lengths[j + 1] for j in range(cells - 1)]
     k = 1 / total(lengths)
@@ -177,8 +177,8 @@ def averaged_hats(cells, grid, first, lo, hi):
 
 
 @along.on(UGIMP)
-def _along_ugimp(basis, kin, grid, place, direction):
-    _, lo, hi = box(grid, kin, place, direction, (LEAST, 0.5))
+def _along_ugimp(basis, kin, grid, location, direction):
+    _, lo, hi = box(grid, kin, location, direction, (LEAST, 0.5))
     last = cells_along(grid, direction)
     lo, hi = max(lo, 0), min(hi, last)
     first = max(min(int(lo), last - 2), 0)
@@ -186,17 +186,17 @@ def _along_ugimp(basis, kin, grid, place, direction):
 
 
 @along.on(_Following)
-def _along_box(basis, kin, grid, place, direction):
-    a, lo, hi = box(grid, kin, place, direction, (LEAST, MOST))
+def _along_box(basis, kin, grid, location, direction):
+    a, lo, hi = box(grid, kin, location, direction, (LEAST, MOST))
     last = cells_along(grid, direction)
     first = max(min(min(int(a), last - 1) - 1, last - 3), 0)
     return averaged_hats(3, grid, first, max(lo, 0) - first, min(hi, last) - first)
 
 
 @along.on(CPGIMPCorners)
-def _along_cpgimp_corners(basis, kin, grid, place, direction):
-    line = _along_box(basis, kin, grid, place, direction)
-    _, lo, hi = box(grid, kin, place, direction, (LEAST, MOST))
+def _along_cpgimp_corners(basis, kin, grid, location, direction):
+    line = _along_box(basis, kin, grid, location, direction)
+    _, lo, hi = box(grid, kin, location, direction, (LEAST, MOST))
     top = cells_along(grid, direction) - 1 - line.first
     return line._replace(ends=tuple([_end(at, line.first, top) for at in (lo, hi)]))
 
@@ -216,20 +216,20 @@ bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
 @bases.deformed.on(CPGIMPDet)
-def _deformed_cpgimp_det(basis, kin, place, dl):
+def _deformed_cpgimp_det(basis, kin, location, dl):
     factor = power(det(I + dl), 1 / len(dl.axes))
     d = kin.dimension
-    return (*place[:d], *[factor * half for half in place[d : 2 * d]])
+    return (*location[:d], *[factor * half for half in location[d : 2 * d]])
 
 
 @bases.deformed.on(CPGIMPDiagonal)
 @bases.deformed.on(CPGIMPStretch)
-def _deformed_cpgimp_stretch(basis, kin, place, dl):
+def _deformed_cpgimp_stretch(basis, kin, location, dl):
     d = kin.dimension
-    start, F = place[2 * d : 3 * d], tensor(planar(kin), place[3 * d :]).after(dl.planar())
+    start, F = location[2 * d : 3 * d], tensor(planar(kin), location[3 * d :]).after(dl.planar())
     stretches = F.diagonal() if isinstance(basis, CPGIMPDiagonal) else F.stretch()
     half = [size * abs(factor) for size, factor in zip(start, stretches[:d], strict=True)]
-    return (*place[:d], *half, *start, *F)
+    return (*location[:d], *half, *start, *F)
 
 
 # Bit k of a corner's number is its side in direction k; of a node's number, its side of the cell.
@@ -258,11 +258,11 @@ def _carrier_cpgimp_corners(basis, kin, grid, stencil, corner):
 
 
 @bases.carry.on(CPGIMPCorners)
-def _carry_cpgimp_corners(basis, kin, place, corner, displacement):
+def _carry_cpgimp_corners(basis, kin, location, corner, displacement):
     d = kin.dimension
-    moves = enumerate(zip(place[d : 2 * d], displacement, strict=True))
+    moves = enumerate(zip(location[d : 2 * d], displacement, strict=True))
     half = [size + 0.5**d * (u if corner & (1 << i) else -u) for i, (size, u) in moves]
-    return (*place[:d], *half)
+    return (*location[:d], *half)
 
 
 register(UGIMP, 3)

@@ -133,8 +133,8 @@ known_failure(
 
 
 @along.on(Linear)
-def _along_linear(basis, kin, grid, place, direction):
-    a = in_cells(grid, direction, place[direction])
+def _along_linear(basis, kin, grid, location, direction):
+    a = in_cells(grid, direction, location[direction])
     i = min(int(a), cells_along(grid, direction) - 1)  # the last face belongs to the last cell
     r = a - i
     gradients = (-grid.inv_h, grid.inv_h)

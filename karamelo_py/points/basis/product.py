@@ -37,7 +37,7 @@ def with_one_node(stencil):
 
 
 @point_function()
-def along(basis, kin, grid, place, direction):
+def along(basis, kin, grid, location, direction):
     pass
 
 
@@ -92,11 +92,11 @@ def node_number(grid, first, steps):
     return first + last
 
 
-def cell_number(kin, grid, place):
+def cell_number(kin, grid, location):
     number = 0
     for k in range(kin.dimension):
         count = cells_along(grid, k)
-        number = number * count + max(min(int(in_cells(grid, k, place[k])), count - 1), 0)
+        number = number * count + max(min(int(in_cells(grid, k, location[k])), count - 1), 0)
     return number + grid.first_cell
 
 
@@ -126,8 +126,8 @@ def weights_of(stencil, at):
     return [item(line.weights, n) for line, n in zip(stencil.lines, at, strict=True)]
 
 
-def _locate_product(basis, kin, grid, place):
-    lines = tuple([along(basis, kin, grid, place, i) for i in range(kin.dimension)])
+def _locate_product(basis, kin, grid, location):
+    lines = tuple([along(basis, kin, grid, location, i) for i in range(kin.dimension)])
     return Stencil(lines, inverse_radius(radius(basis, grid, lines[0])) if kin.hoops else 0)
 
 

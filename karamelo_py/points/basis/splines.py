@@ -22,13 +22,13 @@ class AtWalls(NamedTuple):
 
 
 @point_function(otherwise=True)
-def walls_of_cell(basis, kin, grid, place, direction):
+def walls_of_cell(basis, kin, grid, location, direction):
     """Return (whether the lower face of the point's cell is a wall, the upper face), or ()."""
     return ()
 
 
-def _walls_of_cell_at_walls(basis, kin, grid, place, direction):
-    wall = basis.faces[product.cell_number(kin, grid, place), direction]
+def _walls_of_cell_at_walls(basis, kin, grid, location, direction):
+    wall = basis.faces[product.cell_number(kin, grid, location), direction]
     return (wall == BELOW) | (wall == BETWEEN), wall >= ABOVE
 
 
@@ -66,14 +66,14 @@ class QuadraticSpline(NamedTuple):
 
 
 @product.along.on(QuadraticSpline)
-def _along_quadratic_spline(basis, kin, grid, place, direction):
-    a = in_cells(grid, direction, place[direction])
+def _along_quadratic_spline(basis, kin, grid, location, direction):
+    a = in_cells(grid, direction, location[direction])
     last = cells_along(grid, direction)
     nearest = int(a + 0.5)
     bulk = (nearest >= 1) & (nearest < last)
     cell = min(int(a), last - 1)
     behind = nearest > cell
-    walls = walls_of_cell(basis, kin, grid, place, direction)
+    walls = walls_of_cell(basis, kin, grid, location, direction)
     if len(walls):
         bulk = where(where(behind, walls[1], walls[0]), False, bulk)
     t = a - nearest
@@ -116,7 +116,7 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 
 @first_node.on(QuadraticSpline)
-def _first_node_quadratic_spline(basis, like):
+def _first_node_quadratic_spline(basis, template):
     return 0.5
 
 
@@ -181,8 +181,8 @@ class CubicSpline(NamedTuple):
 
 
 @product.along.on(CubicSpline)
-def _along_cubic_spline(basis, kin, grid, place, direction):
-    a = in_cells(grid, direction, place[direction])
+def _along_cubic_spline(basis, kin, grid, location, direction):
+    a = in_cells(grid, direction, location[direction])
     last = cells_along(grid, direction)
     cell = int(a)
     t = a - cell
@@ -209,7 +209,7 @@ def _along_cubic_spline(basis, kin, grid, place, direction):
     cell = min(cell, last - 1)
     bulk = (cell >= 1) & (cell < last - 1)
     below, above = cell == 0, cell == last - 1
-    walls = walls_of_cell(basis, kin, grid, place, direction)
+    walls = walls_of_cell(basis, kin, grid, location, direction)
     if len(walls):
         below, above = below | walls[0], above | walls[1]
         bulk = where(below | above, False, bulk)

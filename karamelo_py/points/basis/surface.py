@@ -24,8 +24,8 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
         0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0, 0
     )  # fmt: skip
     weights = np.zeros(len(x))
-    for q, place in enumerate(x):
-        stencil = locate(basis, Line(), line, (middle + float(place),))
+    for q, position in enumerate(x):
+        stencil = locate(basis, Line(), line, (middle + float(position),))
         for k in range(support(basis, Line())):
             node, weight, _ = entry(basis, Line(), line, stencil, k)
             weights[q] += weight if node == middle else 0
@@ -47,10 +47,10 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
     layers = np.arange(half, 8, 2 * half)
-    places = surfaces[:, None] - layers
-    seen = np.interp(places, x, weights)
+    positions = surfaces[:, None] - layers
+    seen = np.interp(positions, x, weights)
     near = seen.sum(axis=1) > 0
-    mean = (seen * places).sum(axis=1)[near] / seen.sum(axis=1)[near]
+    mean = (seen * positions).sum(axis=1)[near] / seen.sum(axis=1)[near]
     mean = np.maximum.accumulate(mean)
     # The mean is constant once a body fills a node's support: take the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)

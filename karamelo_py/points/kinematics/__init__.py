@@ -485,7 +485,7 @@ class SymmetricTensor(Matrix):
         """Return max_i sum_j |s_ij|, a bound of the largest eigenvalue (Gershgorin)."""
         a = self.at()
         rows = [[(i, i), *[(i, j) for j in range(3) if j != i]] for i in range(3)]
-        return max(*[total([abs(a[place]) for place in row if place in a]) for row in rows])
+        return max(*[total([abs(a[pair]) for pair in row if pair in a]) for row in rows])
 
     def smallest_row_difference(self):
         """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest (Gershgorin)."""
@@ -526,7 +526,7 @@ def _rows(one: type, whole: type) -> None:
     d = one.kin.dimension
     one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
     number = {(j, i): k for k, (i, j) in enumerate(one.places)}
-    number |= {place: k for k, place in enumerate(one.places)}
+    number |= {index: k for k, index in enumerate(one.places)}
     acting = [(i if i < d else 0, number[i, j], j) for i, j in reversed(whole.places)]
     one.rows = tuple(tuple((k, j) for i, k, j in acting if i == n) for n in range(d))
 
@@ -574,12 +574,12 @@ def nothing(kin):
     return kin.Symmetric._make([0 for _ in kin.Symmetric.places])
 
 
-def zero(kin, like):
-    return kin.Tensor._make([real(0, like) for _ in kin.Tensor.places])
+def zero(kin, template):
+    return kin.Tensor._make([real(0, template) for _ in kin.Tensor.places])
 
 
-def zero_vector(kin, like):
-    return kin.Vector._make([real(0, like) for _ in kin.Vector.places])
+def zero_vector(kin, template):
+    return kin.Vector._make([real(0, template) for _ in kin.Vector.places])
 
 
 def det(f):

@@ -31,12 +31,12 @@ class LawTraits(NamedTuple):
     wraps: bool = False  # supports what the wrapped law does
 
 
-def law_traits(part: Any) -> LawTraits:
-    return getattr(part, "traits", LawTraits())
+def law_traits(component: Any) -> LawTraits:
+    return getattr(component, "traits", LawTraits())
 
 
-def parameter(part: Any, name: str, otherwise: Any = 0.0) -> Any:
-    return part._asdict().get(name, otherwise) if isinstance(part, tuple) else otherwise
+def parameter(component: Any, name: str, otherwise: Any = 0.0) -> Any:
+    return component._asdict().get(name, otherwise) if isinstance(component, tuple) else otherwise
 
 
 class Absent(NamedTuple):
@@ -45,15 +45,15 @@ class Absent(NamedTuple):
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
     """Return the classes of a law (or table of laws) and its parts; kernels depend on them."""
-    parts = [law_kind(part) for part in law if isinstance(part, tuple)]
-    return type(law), *(kind for part in parts for kind in part)
+    parts = [law_kind(component) for component in law if isinstance(component, tuple)]
+    return type(law), *(kind for component in parts for kind in component)
 
 
 def law_parts(law: tuple) -> Iterator[tuple]:
     yield law
-    for part in law:
-        if isinstance(part, tuple):
-            yield from law_parts(part)
+    for component in law:
+        if isinstance(component, tuple):
+            yield from law_parts(component)
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
@@ -62,16 +62,16 @@ def can(law: NamedTuple, function: Callable) -> bool:
     return any(function.defined(kind) for kind in kinds)
 
 
-def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Let the law in the field `part` of `outer`, with the state `kept`, answer `functions`.
+def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
+    """Let the law in the field `component` of `outer`, with the state `kept`, answer `functions`.
 
-    These take (law), (law, like), or law, kinematics (replaced by `kin`), state and more.
+    These take (law), (law, template), or law, kinematics (replaced by `kin`), state and more.
     """
 
     def register(function: Callable, changes: bool) -> None:
         @function.on(outer)
         def _of_law_within(law, *arguments):
-            within = getattr(law, part)
+            within = getattr(law, component)
             if len(arguments) < 2:
                 return function(within, *arguments)
             kinematics, state, *others = arguments
@@ -91,9 +91,9 @@ def hand_on(outer: type, part: str, kept: str, functions: tuple, kin: Any = None
 _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
-def column(part: type, name: str, source: Callable | NamedTuple) -> None:
+def column(component: type, name: str, source: Callable | NamedTuple) -> None:
     """Declare an output column by a `number` or a tag of `shown`."""
-    _columns.setdefault(part, {})[name] = source if isinstance(source, tuple) else source.tag
+    _columns.setdefault(component, {})[name] = source if isinstance(source, tuple) else source.tag
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
@@ -145,7 +145,7 @@ def number(function: Callable) -> Callable:
 
 
 @point_function()
-def initial_state(law, kin, like):
+def initial_state(law, kin, template):
     pass
 
 
@@ -267,9 +267,9 @@ def with_temperature(law, kin, state, T):
 
 
 @point_function(otherwise=True)
-def heat_capacity(law, like):
+def heat_capacity(law, template):
     """Return the heat capacity per mass and kelvin; 0 for laws without temperature."""
-    return real(0, like)
+    return real(0, template)
 
 
 @point_function(otherwise=True)
@@ -285,8 +285,8 @@ def warmed(law, kin, state, heat):
 
 
 @point_function(otherwise=True)
-def conductivity(law, like):
-    return real(0, like)
+def conductivity(law, template):
+    return real(0, template)
 
 
 @point_function()

@@ -125,7 +125,7 @@ def pressure(law, e):
 
 
 @laws.initial_state.on(CamClay)
-def _initial_state_cam_clay(law, kin, like):
+def _initial_state_cam_clay(law, kin, template):
     return State(1, nothing(kin), law.pc, 0, 0)
 
 

@@ -15,7 +15,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 @point_function(otherwise=True)
-def initial_damage(damage, like):
+def initial_damage(damage, template):
     return ()
 
 
@@ -117,7 +117,7 @@ class Accumulated(NamedTuple):
 
 
 @initial_damage.on(JohnsonCookDamage)
-def _initial_damage_johnson_cook_damage(damage, like):
+def _initial_damage_johnson_cook_damage(damage, template):
     return Accumulated(0.0)
 
 

@@ -127,13 +127,13 @@ def reference_temperatures(law: Any) -> dict[str, float]:
     if not hasattr(heat, "T0"):
         return {}
     temperatures = {"T0 of the temperature": heat.T0}
-    for name, part, counts in (
+    for name, component, counts in (
         ("Tr of the strength", parameter(softening, "softening"), 1.0),
         ("Tr of the damage", law.damage, parameter(law.damage, "d5")),
         ("Tr of the eos", law.eos, parameter(law.eos, "thermal")),
     ):
-        if hasattr(part, "Tr") and counts:
-            temperatures[name] = part.Tr
+        if hasattr(component, "Tr") and counts:
+            temperatures[name] = component.Tr
     return temperatures
 
 

@@ -46,7 +46,7 @@ class State(NamedTuple):
 
 
 @laws.initial_state.on(OfDeformation)
-def _initial_state_of_deformation(law, kin, like):
+def _initial_state_of_deformation(law, kin, template):
     return State(unit(kin))
 
 

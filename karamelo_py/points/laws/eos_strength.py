@@ -77,7 +77,7 @@ class Option:
         optional = {
             kind: named for kind, named in hub.parts.items() if kind not in ("eos", "strength")
         }
-        parts = {ID: part for named in optional.values() for ID, part in named.items()}
+        parts = {ID: component for named in optional.values() for ID, component in named.items()}
         several = [kind for kind, named in optional.items() if word in named]
         if len(several) > 1:
             raise ScriptError(
@@ -148,15 +148,18 @@ class EosStrength(NamedTuple):
         strain: Literal["rate", "logarithmic"] = "rate",
     ):
         kinds: dict[str, Any] = {}
-        for part in parts:
-            if part.kind in kinds:
+        for component in parts:
+            if component.kind in kinds:
                 raise ScriptError(
-                    f"'{kinds[part.kind].id}' and '{part.id}' are both a {part.kind}",
-                    argument=2 + parts.index(part),
+                    f"'{kinds[component.kind].id}' and '{component.id}' are both a "
+                    f"{component.kind}",
+                    argument=2 + parts.index(component),
                     expected="one damage and one temperature at most",
                 )
-            kinds[part.kind] = part
-        laws = {k: law for part in (eos, strength, *parts) for k, law in part.laws.items()}
+            kinds[component.kind] = component
+        laws = {
+            k: law for component in (eos, strength, *parts) for k, law in component.laws.items()
+        }
         further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
         elastic = Absent() if strain == "rate" else Logarithmic()
         return cls(**laws, strain=elastic, further=chained(further))
@@ -289,17 +292,19 @@ class State(NamedTuple):
 
 
 @laws.initial_state.on(EosStrength)
-def _initial_state_eos_strength(law, kin, like):
+def _initial_state_eos_strength(law, kin, template):
     viscous = () if isinstance(law.viscosity, Absent) else (0.0,)
     m = Memory(
-        eos.initial_energy(law.eos, like),
+        eos.initial_energy(law.eos, template),
         viscous,
-        initial_damage(law.damage, like),
-        initial_heat(law.temperature, like),
+        initial_damage(law.damage, template),
+        initial_heat(law.temperature, template),
         # (0,) where a part dissipates
-        strengths.initial_loss(law.strength, like) or viscous or eos.initial_loss(law.eos, like),
-        strengths.initial_memory(law.strength, like),
-        initial_further(law.further, like),
+        strengths.initial_loss(law.strength, template)
+        or viscous
+        or eos.initial_loss(law.eos, template),
+        strengths.initial_memory(law.strength, template),
+        initial_further(law.further, template),
     )
     return State(1, nothing(kin), m)
 

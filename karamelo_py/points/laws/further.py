@@ -17,43 +17,43 @@ from karamelo_py.points.laws.strengths import equivalent_plastic_strain
 class Further(NamedTuple):
     in_lanes = True
 
-    part: Any
+    component: Any
     rest: Any
 
 
 def chained(parts: list) -> NamedTuple:
     none: Any = Absent()
-    return reduce(lambda rest, part: Further(part, rest), reversed(parts), none)
+    return reduce(lambda rest, component: Further(component, rest), reversed(parts), none)
 
 
 @point_function(otherwise=True)
-def initial_part(part, like):
+def initial_part(component, template):
     return ()
 
 
 @point_function(otherwise=True)
-def part_after(part, memory, law, step, memories):
+def part_after(component, memory, law, step, memories):
     """Return the memory after a `StrainStep` with new s; `memories` are the other parts'."""
     return memory
 
 
 @point_function(otherwise=True)
-def part_pressure(part, memory):
+def part_pressure(component, memory):
     """Return (p,), the added pressure, or ()."""
     return ()
 
 
-def initial_further(parts, like):
+def initial_further(parts, template):
     if isinstance(parts, Absent):
         return ()
-    return initial_part(parts.part, like), initial_further(parts.rest, like)
+    return initial_part(parts.component, template), initial_further(parts.rest, template)
 
 
 def further_after(parts, memory, law, step, memories):
     if isinstance(parts, Absent):
         return ()
     first, rest = memory
-    after = part_after(parts.part, first, law, step, memories)
+    after = part_after(parts.component, first, law, step, memories)
     return after, further_after(parts.rest, rest, law, step, memories)
 
 
@@ -61,7 +61,7 @@ def further_pressure(parts, memory, p):
     if isinstance(parts, Absent):
         return p
     first, rest = memory
-    return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.part, first)))
+    return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.component, first)))
 
 
 # Karamelo smooths the rate over the sound crossing time of this many cells.
@@ -87,15 +87,15 @@ class RateMemory(NamedTuple):
 
 
 @initial_part.on(PlasticRate)
-def _initial_part_plastic_rate(part, like):
+def _initial_part_plastic_rate(component, template):
     return RateMemory(0.0, -1.0)
 
 
 @part_after.on(PlasticRate)
-def _part_after_plastic_rate(part, memory, law, step, memories):
+def _part_after_plastic_rate(component, memory, law, step, memories):
     ep = equivalent_plastic_strain(law.strength, memories.strength)
     before = where(memory.ep < 0, ep, memory.ep)
-    change = (ep - before - step.dt * memory.rate) / part.time
+    change = (ep - before - step.dt * memory.rate) / component.time
     return RateMemory(max(memory.rate + change, 0), ep)
 
 
@@ -128,7 +128,7 @@ def without_rate(kinds: tuple[type, ...]) -> tuple[type, ...]:
     return kinds[: k - 1] + kinds[k + 1 :]
 
 
-def _appended(parts: NamedTuple, part: NamedTuple) -> NamedTuple:
+def _appended(parts: NamedTuple, component: NamedTuple) -> NamedTuple:
     if isinstance(parts, Absent):
-        return Further(part, parts)
-    return parts._replace(rest=_appended(parts.rest, part))
+        return Further(component, parts)
+    return parts._replace(rest=_appended(parts.rest, component))

@@ -91,7 +91,7 @@ gain(
 
 
 @laws.initial_state.on(LinearElastic)
-def _initial_state_linear_elastic(law, kin, like):
+def _initial_state_linear_elastic(law, kin, template):
     return State(1, nothing(kin))
 
 

@@ -121,8 +121,8 @@ def _softened_mullins(law, W, peak):
 
 
 @laws.initial_state.on(Mullins)
-def _initial_state_mullins(law, kin, like):
-    return State(laws.initial_state(law.elastic, kin, like), 0.0, 1)
+def _initial_state_mullins(law, kin, template):
+    return State(laws.initial_state(law.elastic, kin, template), 0.0, 1)
 
 
 @laws.advance.on(Mullins)

@@ -33,8 +33,8 @@ class State(NamedTuple):
 
 
 @laws.initial_state.on(Saturated)
-def _initial_state_saturated(law, kin, like):
-    return State(laws.initial_state(law.law, kin, like), law.n, law.n)
+def _initial_state_saturated(law, kin, template):
+    return State(laws.initial_state(law.law, kin, template), law.n, law.n)
 
 
 @laws.advance.on(Saturated)

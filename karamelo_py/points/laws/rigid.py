@@ -47,7 +47,7 @@ class Rigid(NamedTuple):
 
 
 @laws.initial_state.on(Rigid)
-def _initial_state_rigid(law, kin, like):
+def _initial_state_rigid(law, kin, template):
     return ()
 
 

@@ -65,7 +65,7 @@ class Pulled(NamedTuple):
 
 
 @initial_damage.on(TulerButcher)
-def _initial_damage_tuler_butcher(damage, like):
+def _initial_damage_tuler_butcher(damage, template):
     return Pulled(0.0)
 
 

@@ -16,7 +16,7 @@ class Warm(NamedTuple):
 
 
 @point_function(otherwise=True)
-def initial_heat(temperature, like):
+def initial_heat(temperature, template):
     return ()
 
 
@@ -94,17 +94,17 @@ column(PlasticWork, "T", temperature)
 
 
 @initial_heat.on(PlasticWork)
-def _initial_heat_plastic_work(temperature, like):
+def _initial_heat_plastic_work(temperature, template):
     return Warm(temperature.T0)
 
 
 @heat_capacity.on(PlasticWork)
-def _heat_capacity_plastic_work(law, like):
+def _heat_capacity_plastic_work(law, template):
     return law.cp
 
 
 @conductivity.on(PlasticWork)
-def _conductivity_plastic_work(law, like):
+def _conductivity_plastic_work(law, template):
     return law.kappa
 
 

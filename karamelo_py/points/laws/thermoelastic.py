@@ -63,7 +63,7 @@ laws.column(Expansion, "T", laws.temperature)
 
 
 @initial_heat.on(Expansion)
-def _initial_heat_expansion(heat, like):
+def _initial_heat_expansion(heat, template):
     return Warm(heat.initial_temperature)
 
 
@@ -104,8 +104,8 @@ def of_elastic(function, law, kin, state, *more):
 
 
 @laws.initial_state.on(Thermoelastic)
-def _initial_state_thermoelastic(law, kin, like):
-    return State(laws.initial_state(law.elastic, kin, like), initial_heat(law.heat, like).T)
+def _initial_state_thermoelastic(law, kin, template):
+    return State(laws.initial_state(law.elastic, kin, template), initial_heat(law.heat, template).T)
 
 
 @laws.advance.on(Thermoelastic)
@@ -166,12 +166,12 @@ def _temperature_thermoelastic(law, kin, state):
 
 
 @laws.heat_capacity.on(Thermoelastic)
-def _heat_capacity_thermoelastic(law, like):
+def _heat_capacity_thermoelastic(law, template):
     return law.heat.cp
 
 
 @laws.conductivity.on(Thermoelastic)
-def _conductivity_thermoelastic(law, like):
+def _conductivity_thermoelastic(law, template):
     return law.heat.kappa
 
 

@@ -49,8 +49,8 @@ def with_strain_across(law, kin, dl, q):
 
 
 @laws.initial_state.on(Thin)
-def _initial_state_thin(law, kin, like):
-    return State(laws.initial_state(law.law, WHOLE, like), 1)
+def _initial_state_thin(law, kin, template):
+    return State(laws.initial_state(law.law, WHOLE, template), 1)
 
 
 @laws.advance.on(Thin)

@@ -240,8 +240,10 @@ def strain_of(dl):
 
 
 @laws.initial_state.on(Viscoelastic)
-def _initial_state_viscoelastic(law, kin, like):
-    return State(laws.initial_state(law.elastic, kin, like), at_rest(law.branches, kin), 0.0, 0.0)
+def _initial_state_viscoelastic(law, kin, template):
+    return State(
+        laws.initial_state(law.elastic, kin, template), at_rest(law.branches, kin), 0.0, 0.0
+    )
 
 
 @laws.advance.on(Viscoelastic)

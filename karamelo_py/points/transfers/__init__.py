@@ -50,7 +50,7 @@ def in_step(transfer, kept):
 
 
 @point_function()
-def lost_fractions(transfer, like):
+def lost_fractions(transfer, template):
     """Return the lost fractions (2,) of the energy removed by mapping to the nodes and back.
 
     The rest returns with the data stored by points. If undefined, the loss is not recorded.
@@ -85,7 +85,7 @@ def affine_velocity(transfer, moment, inverse_d):
 
 
 @point_function(otherwise=True)
-def zero_moment(transfer, kin, like):
+def zero_moment(transfer, kin, template):
     return ()
 
 

@@ -130,8 +130,8 @@ def affine_velocity_of_moment(transfer, B, inverse_d):
     return inverse_d[0] * B if len(inverse_d) else ()
 
 
-def zero_planar(transfer, kin, like):
-    return zero(planar(kin), like)
+def zero_planar(transfer, kin, template):
+    return zero(planar(kin), template)
 
 
 def by_arms_alone(transfer, inverse_d):

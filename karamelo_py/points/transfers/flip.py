@@ -94,7 +94,7 @@ def take_nodal_velocity(transfer: type) -> None:
     updated_velocity.on(transfer)(_updated_velocity_pic)
 
 
-def _lost_fractions_pic(transfer, like):
+def _lost_fractions_pic(transfer, template):
     return 1.0, 1.0
 
 
@@ -112,7 +112,7 @@ def _updated_velocity_flip(transfer, v, v_pic, dv):
     return (1 - alpha) * v_pic + alpha * (v + dv)
 
 
-def _lost_fractions_flip(transfer, like):
+def _lost_fractions_flip(transfer, template):
     # With P = S S+ from points to points, v becomes alpha v + (1 - alpha) P v + S dv.
     alpha = transfer.alpha
     return (1 - alpha) * (1 + alpha), (1 - alpha) * (1 - alpha)

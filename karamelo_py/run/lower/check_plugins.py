@@ -10,7 +10,7 @@ from karamelo_py.kernels.arrays import Nodes, Number, Points, Setup, Tag
 from karamelo_py.kernels.hook_loop import WholeNodes, WholePoints
 from karamelo_py.kernels.hooks import CompiledHook, Member, results
 from karamelo_py.kernels.laws import law_in, law_on
-from karamelo_py.kernels.views import place_at, state_at
+from karamelo_py.kernels.views import location_at, state_at
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error, fault, place_of
 from karamelo_py.points import laws
@@ -206,7 +206,7 @@ def _try_basis(hub: Hub, setup: Setup) -> None:
 def _try_functions(plugin: PartInUse, setup: Setup, points: Points, p: int) -> None:
     basis, kin, one = setup.basis, setup.kin, _one(setup)
     grid = record(setup.grids, points.grid[p])
-    at = place_at(basis, kin, points.x[0] if points.home is None else points.home, p)
+    at = location_at(basis, kin, points.x[0] if points.home is None else points.home, p)
     line = along(basis, kin, grid, at, 0) if along.defined(type(basis)) else None
     if line is not None:
         if not all(hasattr(line, name) for name in Along._fields):

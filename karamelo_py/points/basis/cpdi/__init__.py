@@ -84,12 +84,12 @@ CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
 
 @point_function()
-def domain(basis, kin, place):
+def domain(basis, kin, location):
     """Return corners x_c, weights w_c and gradients g_c."""
 
 
 @point_function()
-def upright(basis, kin, place):
+def upright(basis, kin, location):
     """Return True if the Jacobian is positive at every corner: the domain is not folded."""
 
 
@@ -164,10 +164,10 @@ def spread_of(kin, grid, weight, corner, centre):
     away, r = corner.at - centre, corner.fractions
     parts: list = []
     for i, j in pairs_of_spread(kin):
-        part = away[i] * away[j]
+        term = away[i] * away[j]
         if i == j:
-            part = part + r[i] * (1 - r[i])
-        parts = [*parts, weight * (grid.h * grid.h) * part]
+            term = term + r[i] * (1 - r[i])
+        parts = [*parts, weight * (grid.h * grid.h) * term]
     return parts
 
 
@@ -181,16 +181,16 @@ def solve(kin, spread, a):
 
 
 @bases.locate.on(ConvectedDomain)
-def _locate_corners(basis, kin, grid, place):
-    x, weights, gradients = domain(basis, kin, place)
+def _locate_corners(basis, kin, grid, location):
+    x, weights, gradients = domain(basis, kin, location)
     corners = tuple([corner_at(kin, grid, corner) for corner in x])
     centre = weights[0] * corners[0].at
     for weight, corner in zip(weights[1:], corners[1:], strict=True):
         centre = centre + weight * corner.at
     pairs = zip(weights, corners, strict=True)
     parts = zip(*[spread_of(kin, grid, w, corner, centre) for w, corner in pairs], strict=True)
-    spread = tuple([total(part) for part in parts])
-    point = tuple([in_cells(grid, i, place[i]) for i in range(kin.dimension)])
+    spread = tuple([total(term) for term in parts])
+    point = tuple([in_cells(grid, i, location[i]) for i in range(kin.dimension)])
     inv_r = inverse_radius(grid.x0 + centre[0] * grid.h)
     return CornerStencil(corners, weights, gradients, point, centre, spread, inv_r)
 
@@ -203,8 +203,8 @@ def seen_at_corner(kin, stencil, c):
 def of_corner(stencil, c):
     parts = list(zip(stencil.corners, stencil.weights, stencil.gradients, strict=True))
     numbers = flat(parts[0])
-    for k, part in enumerate(parts):
-        numbers = tuple([where(c == k, a, b) for a, b in zip(flat(part), numbers, strict=True)])
+    for k, term in enumerate(parts):
+        numbers = tuple([where(c == k, a, b) for a, b in zip(flat(term), numbers, strict=True)])
     corner, weight, slopes = nested_as(parts[0], numbers)
     return stencil._replace(corners=(corner,), weights=(weight,), gradients=(slopes,))
 
@@ -240,7 +240,7 @@ def _support_corners(basis, kin):
 
 
 @bases.first_node.on(ConvectedDomain)
-def _first_node_convected_domain(basis, like):
+def _first_node_convected_domain(basis, template):
     return 0.5
 
 
@@ -261,20 +261,20 @@ def _carrier_corners(basis, kin, grid, stencil, corner):
 
 
 @bases.carry.on(CarriedDomain)
-def _carry_corners(basis, kin, place, corner, displacement):
+def _carry_corners(basis, kin, location, corner, displacement):
     first = kin.dimension * (1 + corner)
     last = first + kin.dimension
-    moves = zip(place[first:last], displacement, strict=True)
-    return (*place[:first], *[a + u for a, u in moves], *place[last:])
+    moves = zip(location[first:last], displacement, strict=True)
+    return (*location[:first], *[a + u for a, u in moves], *location[last:])
 
 
 @bases.extent.on(CarriedDomain)
-def _extent_corners(basis, kin, grid, place):
+def _extent_corners(basis, kin, grid, location):
     d = kin.dimension  # NaN if any corner is
-    far = abs(place[d] - place[0])
+    far = abs(location[d] - location[0])
     for k in range(d + 1, d + d * basis.element.corners):
-        far = max(abs(place[k] - place[k % d]), far)
-    return where(upright(basis, kin, place), max(far * grid.inv_h, LEAST[d]), inf)
+        far = max(abs(location[k] - location[k % d]), far)
+    return where(upright(basis, kin, location), max(far * grid.inv_h, LEAST[d]), inf)
 
 
 @bases.support.on(AtCorners)

@@ -75,7 +75,7 @@ def _spread_out(hats: Iterable, values: Iterable) -> tuple:
         if len(totals):
             totals = tuple([fma(*pair, total) for pair, total in zip(pairs, totals, strict=True)])
         else:
-            totals = tuple([part * hat for part, hat in pairs])
+            totals = tuple([factor * hat for factor, hat in pairs])
     return totals
 
 
@@ -94,8 +94,8 @@ def _entry_in_block(basis, kin, grid, stencil, k):
 
 @reach.on(InBlock)
 def _reach_in_block(basis, kin, grid, stencil, k):
-    places = zip(stencil.first, digits(k, WIDTH, kin.dimension), stencil.seen.centre, strict=True)
-    return vector(kin, [arm(grid, *place) for place in places])
+    lines = zip(stencil.first, digits(k, WIDTH, kin.dimension), stencil.seen.centre, strict=True)
+    return vector(kin, [arm(grid, *line) for line in lines])
 
 
 @affine_weight.on(InBlock)

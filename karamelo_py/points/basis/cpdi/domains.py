@@ -38,9 +38,9 @@ class R8(_Parallel):
     dimension = 3
 
 
-def half_edges(kin, place):
+def half_edges(kin, location):
     d = kin.dimension
-    return [vector(kin, place[d * e : d * e + d]) for e in range(1, d + 1)]
+    return [vector(kin, location[d * e : d * e + d]) for e in range(1, d + 1)]
 
 
 def reciprocals(kin, edges, factor):
@@ -54,10 +54,10 @@ def signed(sign, a, b):
 
 
 @cpdi.domain.on(_Parallel)
-def _domain_parallel(basis, kin, place):
+def _domain_parallel(basis, kin, location):
     d = kin.dimension
-    x, edges = vector(kin, place[:d]), half_edges(kin, place)
-    weight = real(0.5**d, place[0])
+    x, edges = vector(kin, location[:d]), half_edges(kin, location)
+    weight = real(0.5**d, location[0])
     k = weight / determinant({(e, i): edges[e][i] for e in range(d) for i in range(d)}, d)
     corners: list = []
     gradients: list = []
@@ -77,15 +77,17 @@ def _domain_parallel(basis, kin, place):
 
 
 @bases.deformed.on(_Parallel)
-def _deformed_parallel(basis, kin, place, dl):
+def _deformed_parallel(basis, kin, location, dl):
     dl = dl.planar()  # r <- (I + dl) r
-    edges = [r + dl @ r for r in half_edges(kin, place)]
-    return (*place[: kin.dimension], *[a for edge in edges for a in edge])
+    edges = [r + dl @ r for r in half_edges(kin, location)]
+    return (*location[: kin.dimension], *[a for edge in edges for a in edge])
 
 
 @bases.extent.on(_Parallel)
-def _extent_parallel(basis, kin, grid, place):
-    away = [total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, place), strict=True)]
+def _extent_parallel(basis, kin, grid, location):
+    away = [
+        total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, location), strict=True)
+    ]
     far = away[0]
     for other in away[1:]:  # this form passes NaN on
         far = far + max(other - far, 0)
@@ -122,17 +124,17 @@ class Tet4(_Simplex):
     element = cpdi.Element("tetra", 4, ((0, 1), (0, 2), (0, 3)), (0, 2, 1, 3))
 
 
-def corners_and_edges(kin, place):
+def corners_and_edges(kin, location):
     d = kin.dimension
-    corners = [vector(kin, place[d * c : d * c + d]) for c in range(1, d + 2)]
+    corners = [vector(kin, location[d * c : d * c + d]) for c in range(1, d + 2)]
     edges = [corner - corners[0] for corner in corners[1:]]
     return corners, {(e, i): edges[e][i] for e in range(d) for i in range(d)}
 
 
 @cpdi.domain.on(_Simplex)
-def _domain_simplex(basis, kin, place):
+def _domain_simplex(basis, kin, location):
     d = kin.dimension
-    corners, edges = corners_and_edges(kin, place)
+    corners, edges = corners_and_edges(kin, location)
     k = 1 / determinant(edges, d)
     # Reciprocal vectors of the edges; the gradients sum to zero.
     others = [vector(kin, [k * cofactor(edges, d, e, i) for i in range(d)]) for e in range(d)]
@@ -144,8 +146,8 @@ def _domain_simplex(basis, kin, place):
 
 
 @cpdi.upright.on(_Simplex)
-def _upright_simplex(basis, kin, place):
-    return determinant(corners_and_edges(kin, place)[1], kin.dimension) > 0
+def _upright_simplex(basis, kin, location):
+    return determinant(corners_and_edges(kin, location)[1], kin.dimension) > 0
 
 
 class Q4(cpdi.CarriedDomain):
@@ -165,8 +167,8 @@ class Q4(cpdi.CarriedDomain):
 
 
 @cpdi.domain.on(Q4)
-def _domain_q4(basis, kin, place):
-    x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
+def _domain_q4(basis, kin, location):
+    x1, y1, x2, y2, x3, y3, x4, y4 = location[2:]
     # diagonals, whose cross product is twice the area V
     px, py = x3 - x1, y3 - y1
     qx, qy = x4 - x2, y4 - y2
@@ -186,8 +188,8 @@ def _domain_q4(basis, kin, place):
 
 
 @cpdi.upright.on(Q4)
-def _upright_q4(basis, kin, place):
-    x1, y1, x2, y2, x3, y3, x4, y4 = place[2:]
+def _upright_q4(basis, kin, location):
+    x1, y1, x2, y2, x3, y3, x4, y4 = location[2:]
     ax, ay, bx, by = x2 - x1, y2 - y1, x3 - x2, y3 - y2
     cx, cy, dx, dy = x4 - x3, y4 - y3, x1 - x4, y1 - y4
     least = min(
@@ -248,9 +250,9 @@ def _across(e: int, a: int, b: int, s: int) -> tuple[int, ...]:
     return (*others[:e], s, *others[e:])
 
 
-def _edges(place):
+def _edges(location):
     """Return half edges in each direction, ordered in the other two as in `_at_gauss`."""
-    at = {signs: [place[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
+    at = {signs: [location[3 * c + 3 + i] for i in range(3)] for c, signs in enumerate(cpdi.CUBE)}
 
     def half(e, a, b):
         lower, upper = at[_across(e, a, b, -1)], at[_across(e, a, b, 1)]
@@ -260,10 +262,10 @@ def _edges(place):
 
 
 @cpdi.domain.on(H8)
-def _domain_h8(basis, kin, place):
+def _domain_h8(basis, kin, location):
     # Rows of the Jacobian: u does not depend on xi, v on eta, w on zeta; keys are Gauss points of
     # the other two directions.
-    u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(place)]
+    u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(location)]
     # Cofactors along xi by xi, eta, zeta, summed over the Gauss points of xi, and so on.
     first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}
     p = _at_gauss(*[_add(first[0, b, c], first[1, b, c]) for b, c in PAIRS])
@@ -271,20 +273,20 @@ def _domain_h8(basis, kin, place):
     r = _at_gauss(*[_add(_cross(u[b, 0], v[a, 0]), _cross(u[b, 1], v[a, 1])) for a, b in PAIRS])
     # det J, two Gauss points of xi per tuple, distributed to the corners.
     d = _at_gauss(*[tuple([dot(u[b, c], first[a, b, c]) for a in (0, 1)]) for b, c in PAIRS])
-    return _means(place, d, p, q, r)
+    return _means(location, d, p, q, r)
 
 
 def _at(a: int, b: int) -> int:
     return (a > 0) + 2 * (b > 0)
 
 
-def _means(place, d, p, q, r):
+def _means(location, d, p, q, r):
     sums = [(d[0][n] + d[1][n]) + (d[2][n] + d[3][n]) for n in range(2)]
     k = 1 / (sums[0] + sums[1])
     near, far, half = k * NEAR, k * FAR, k * 0.5
     corners, weights, gradients = [], [], []
     for c, (x, y, z) in enumerate(cpdi.CUBE):
-        corners.append(Space.Vector._make(place[3 * c + 3 : 3 * c + 6]))
+        corners.append(Space.Vector._make(location[3 * c + 3 : 3 * c + 6]))
         first, second = (near, far) if x < 0 else (far, near)
         at = d[_at(y, z)]
         weights.append(first * at[0] + second * at[1])
@@ -296,7 +298,7 @@ def _means(place, d, p, q, r):
 
 
 @cpdi.upright.on(H8)
-def _upright_h8(basis, kin, place):
-    u, v, w = _edges(place)
+def _upright_h8(basis, kin, location):
+    u, v, w = _edges(location)
     met = [(u[_at(y, z)], v[_at(x, z)], w[_at(x, y)]) for x, y, z in cpdi.CUBE]
     return min(*[dot(a, _cross(b, c)) for a, b, c in met]) > 0

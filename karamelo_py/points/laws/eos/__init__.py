@@ -12,7 +12,7 @@ from karamelo_py.points.laws.parameters import AboveZero
 
 
 @point_function(otherwise=True)
-def initial_energy(eos, like):
+def initial_energy(eos, template):
     return ()
 
 
@@ -29,7 +29,7 @@ def compressed(eos, memory, step, heating):
 
 
 @point_function(otherwise=True)
-def initial_loss(eos, like):
+def initial_loss(eos, template):
     """Return (0,) if the equation of state dissipates energy, else ()."""
     return ()
 

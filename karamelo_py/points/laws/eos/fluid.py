@@ -253,7 +253,7 @@ class InternalEnergy(NamedTuple):
 
 
 @initial_energy.on(IdealGas)
-def _initial_energy_ideal_gas(eos, like):
+def _initial_energy_ideal_gas(eos, template):
     return InternalEnergy(eos.energy)
 
 
@@ -380,14 +380,14 @@ def cold(eos, j):
     """Return the pressure of the products without energy, and its slope by J."""
     p = slope = 0
     for C, R in ((eos.A, eos.R1), (eos.B, eos.R2)):
-        part, ratio = C * exponential(-R * j), eos.omega / (R * j)
-        p += part * (1 - ratio)
-        slope += part * (ratio / j - R * (1 - ratio))
+        term, ratio = C * exponential(-R * j), eos.omega / (R * j)
+        p += term * (1 - ratio)
+        slope += term * (ratio / j - R * (1 - ratio))
     return p, slope
 
 
 @initial_energy.on(Jwl)
-def _initial_energy_jwl(eos, like):
+def _initial_energy_jwl(eos, template):
     return Burning(eos.energy, -1e30)
 
 

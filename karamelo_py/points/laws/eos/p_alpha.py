@@ -110,12 +110,12 @@ def _shown_distension(tag, law, kin, state):
 
 
 @initial_loss.on(PAlpha)
-def _initial_loss_p_alpha(eos, like):
+def _initial_loss_p_alpha(eos, template):
     return (0.0,)
 
 
 @initial_energy.on(PAlpha)
-def _initial_energy_p_alpha(eos, like):
+def _initial_energy_p_alpha(eos, template):
     return Pores(eos.alpha0)
 
 

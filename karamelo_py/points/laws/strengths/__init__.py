@@ -45,7 +45,7 @@ def remembers(strength: type, **numbers: float | str) -> None:
     parameters = tuple(start if isinstance(start, str) else "" for start in starts)
 
     @initial_memory.on(strength)
-    def _initial_memory_strength(strength, like):
+    def _initial_memory_strength(strength, template):
         pairs = zip(parameters, starts, strict=True)
         return memory_class(*[getattr(strength, name) if name else start for name, start in pairs])
 
@@ -57,7 +57,7 @@ def remembers(strength: type, **numbers: float | str) -> None:
 
 
 @point_function(otherwise=True)
-def initial_memory(strength, like):
+def initial_memory(strength, template):
     return ()
 
 
@@ -89,12 +89,12 @@ def fbar_fraction(strength, memory):
 
 
 @point_function(otherwise=True)
-def initial_loss(strength, like):
+def initial_loss(strength, template):
     """Return (0,) if the strength dissipates energy, else ()."""
     return ()
 
 
-def no_loss_yet(strength, like):
+def no_loss_yet(strength, template):
     return (0.0,)
 
 

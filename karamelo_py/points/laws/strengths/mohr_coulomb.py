@@ -157,7 +157,7 @@ def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
         return s, p
     new = returned_to_plane(ordered, yield_surface, strength.G, K)
     mean = (new[0] + new[1] + new[2]) / 3
-    shear = tuple([of_three(new, place) - mean for place in (at_a, at_b, at_c)])
+    shear = tuple([of_three(new, rank) - mean for rank in (at_a, at_b, at_c)])
     return from_principal(s, shear, directions), -mean
 
 

@@ -47,7 +47,7 @@ class FluidState(NamedTuple):
 
 
 @initial_state.on(ElasticFluid)
-def _initial_state_elastic_fluid(law, kin, like):
+def _initial_state_elastic_fluid(law, kin, template):
     return FluidState(1)
 
 

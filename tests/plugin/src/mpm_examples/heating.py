@@ -30,7 +30,7 @@ column(Heating, "T", temperature)
 
 
 @initial_heat.on(Heating)
-def _initial_heat_heating(temperature, like):
+def _initial_heat_heating(temperature, template):
     return Warm(temperature.T0)
 
 

@@ -27,8 +27,8 @@ class Smooth(NamedTuple):
 
 
 @along.on(Smooth)
-def _along_smooth(basis, kin, grid, place, direction):
-    hat = along(Linear(), kin, grid, place, direction)
+def _along_smooth(basis, kin, grid, location, direction):
+    hat = along(Linear(), kin, grid, location, direction)
     r = hat.r
     right = r + basis.share * r * (1 - r) * (2 * r - 1)
     slope = 1 + basis.share * (6 * r * (1 - r) - 1)

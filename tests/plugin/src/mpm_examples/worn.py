@@ -27,7 +27,7 @@ column(Worn, "damage", damage)
 
 
 @initial_damage.on(Worn)
-def _initial_damage_worn(damage, like):
+def _initial_damage_worn(damage, template):
     return (0.0,)
 
 
