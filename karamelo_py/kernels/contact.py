@@ -5,9 +5,9 @@ velocity, after Bardenhagen et al. 2001 ("An improved contact algorithm for the 
 method and application to stress propagation in granular material", CMES 2(4)). Coulomb friction
 adds a tangential impulse, at most mu times as large. Momentum is conserved to round-off.
 
-Where more than two fields meet, all pairs compute impulses from the same velocities: the order of
-the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its bodies'
-numbers of pairs, so that energy does not grow. Further iterations remove the remainder.
+Where more than two fields meet, all pairs compute impulses from the same velocities, so the order
+of the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its
+bodies' numbers of pairs, so that energy does not grow. Further iterations remove the rest.
 
 Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap is
 measured from the mean positions of each body's points around a node
@@ -15,12 +15,12 @@ measured from the mean positions of each body's points around a node
 step. Convex bodies are apart if they are apart along one direction: the grid axes are tried too,
 since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or granular material: points would sink into a
-wall, a little for each gap that it seems to leave. So bodies may separate but not approach where
-contact with a body of prescribed velocity acted in the last step. For bodies that hold no shape
-this lasts 100 steps, as their points leave a wall for some steps at a time, and includes nodes that
-a moving wall reaches. Such a wall may be one cell thick and have corners that other bodies fill:
-only its faces towards the other body count, and none in a hollow corner may be entered.
+The mean position is not the lowest point of a liquid or granular material, whose points would
+slowly sink into a wall. So where contact with a body of prescribed velocity acted in the last step,
+bodies may separate but not approach. For bodies that hold no shape this lasts 100 steps, as their
+points leave a wall for some steps at a time, and includes nodes that a moving wall reaches. Such a
+wall may be one cell thick and have corners that other bodies fill: only its faces towards the other
+body count, and none in a hollow corner may be entered.
 """
 
 from math import sqrt
@@ -51,12 +51,12 @@ from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
-# Squared sines of angles about the mean direction out of a body:
+# squared sines of angles about the mean direction out of a body:
 SCATTER = 0.003  # accuracy for a plane face
-EDGE = 0.03  # above it, a face ends or is round
+EDGE = 0.03  # above it a face ends or is round
 FACING = 0.3  # cosine of the angle at which two faces face each other
 MEMORY = 100  # steps after a contact in which shapeless bodies may not approach a wall
-REPEATS = 16  # iterations where more than two fields meet; each at least halves the remainder
+REPEATS = 16  # iterations where more than two fields meet; each at least halves the rest
 
 
 class SeparateFields(NamedTuple):
@@ -66,10 +66,10 @@ class SeparateFields(NamedTuple):
     looks_beyond = 1  # cells beyond the points' nodes whose sums are read
 
     stride: int  # to the same position in the next field
-    beside: np.ndarray  # (d, 2) stride to the next node and number of nodes, along each axis
+    beside: np.ndarray  # (d, 2) stride to the next node, and nodes, along each axis
     per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
-    friction: np.ndarray  # (F, F) coefficient of each pair of fields; infinite: no slip
-    warmth: np.ndarray  # (F, F) fraction of the frictional heat to the first of two fields
+    friction: np.ndarray  # (F, F) coefficient; infinite: no slip
+    warmth: np.ndarray  # (F, F) fraction of frictional heat to the first of two fields
     pair: np.ndarray  # (F, F) slot of the force of a pair on its first field, or -1
     slot: np.ndarray  # (F,) slot of the force on each field
     copies: np.ndarray  # (k, 2) slots: from a field to other solids with that field
@@ -82,8 +82,8 @@ class SeparateFields(NamedTuple):
     torque: np.ndarray  # (F,) slot of the torque on each field
     memory: np.ndarray  # (F,) see MEMORY
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
-    meeting: np.ndarray  # (F,) int64 scratch: the fields that meet at a position
-    partners: np.ndarray  # (F,) int64 scratch: number of contacts of each
+    meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
+    partners: np.ndarray  # (F,) int64 scratch: contacts of each
     change: np.ndarray  # (F, d) scratch: velocity change of each
 
 
@@ -97,17 +97,15 @@ class Bodies(NamedTuple):
 
 
 class Where(NamedTuple):
-    """A position where fields meet, in a step."""
-
     node: int  # its node in the first field
     x: tuple  # (d,)
     h: float
     dt: float
-    step: int  # its number, from 1
+    step: int  # from 1
 
 
 class Touched(NamedTuple):
-    """Selects pairs that were in contact in a step, instead of `Where`."""
+    """Selects pairs that were in contact in a step."""
 
     step: int
 
@@ -115,14 +113,12 @@ class Touched(NamedTuple):
 class Side(NamedTuple):
     field: int
     i: int  # index among those that meet
-    n: int  # its node
+    n: int
     per_mass: float
-    x: tuple  # (d,) position
+    x: tuple  # (d,)
 
 
 class NodePair(NamedTuple):
-    """Two bodies at a position."""
-
     n: int
     m: int
     per_n: float  # 1 / mass
@@ -146,7 +142,7 @@ def _yielding(contact, n, k, per_mass):
 
 @noinline
 def _led(contact, kin, n):
-    """Return True if the velocity is prescribed: faces retain their directions."""
+    """Return True if the velocity is prescribed, so that faces retain their directions."""
     led = False
     for k in range(kin.dimension):
         led = led or _immovable(contact, n, k)
@@ -165,7 +161,6 @@ def _kept(contact, n, k):
 
 @noinline
 def _beside(contact, kin, n, which):
-    """Return one of the 3^d nodes around `n`, and whether it is on the grid."""
     beside, inside = n, True
     for k in range(kin.dimension):
         way = which // 3**k % 3 - 1
@@ -176,7 +171,6 @@ def _beside(contact, kin, n, which):
 
 @noinline
 def _face(bodies, n):
-    """Return the nodal sum of m grad N, pointing out of the body."""
     contact, kin, nodes = bodies
     gradient = vector_at(kin, field(nodes.fields, Normal), n, 0, zero_vector(kin, 0.0))
     return vector(kin, [_kept(contact, n, k) * of_axis for k, of_axis in enumerate(gradient)])
@@ -191,9 +185,9 @@ def _normal(bodies, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
     The mean of the sums of m grad N over the nodes around `n`, with weights 1/4, 1/2, 1/4 along
-    each axis: a plane face is accurate to two degrees, the sum of one node rotates by tens as rows
-    of points inclined to the grid pass it. Nodes whose sum points the same way as `other`, the
-    outward direction of the other body, are omitted: of a thin wall only one face counts.
+    each axis, is accurate to two degrees for a plane face; the sum of one node rotates by tens as
+    rows of points inclined to the grid pass it. Nodes whose sum points the same way as `other`, the
+    outward direction of the other body, are omitted, so that only one face of a thin wall counts.
 
     The length weighs it against the other body's direction: more with the surface around the nodes,
     less where their directions differ, as at edges. (Lemiale, Nairn & Hurmane 2010 take the larger
@@ -257,7 +251,7 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity to remove so that no face of a hollow corner is entered.
 
-    The remainder slides along one face, along the edge of two, or is 0. It is perpendicular to the
+    The rest slides along one face, along the edge of two, or is 0. It is perpendicular to the
     removed part, so one impulse removes all of that.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
@@ -316,7 +310,7 @@ def _left(pair, push):
 
 @noinline
 def _reach(bodies, outward, n, where, side):
-    """Return the distance from node `n` to its surface along the normal; `side`: 1 or -1."""
+    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
     contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
@@ -381,7 +375,7 @@ def _excess_of(bodies, pair, where):
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
     last = _last_contact(bodies, pair, memory > 1)
-    # With three bodies, a pair may already have touched in this step.
+    # with three bodies, a pair may already have touched in this step
     lasts = pair.wall and last > 0 and last >= where.step - memory
     if lasts and memory > 1:
         return approach / size
@@ -499,7 +493,7 @@ def _touch_pair(bodies, control, i, j, where):
         return  # both prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # No friction on the remaining approach: separate bodies may still meet.
+    # No friction on the remaining approach, because separate bodies may still meet.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -507,7 +501,7 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Dissipation: impulse times the mean of the sliding speeds at both ends of the step. In
+        # Dissipation is impulse times the mean of the sliding speeds at both ends of the step; in
         # between, internal forces undo their change.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
@@ -554,7 +548,6 @@ def _touch_place(bodies, control, count, where):
 
 @noinline
 def touch_node(bodies, grids, control, n):
-    """Resolve contact at the position of node `n`, if its field is the first there."""
     contact = bodies.contact
     count = _meet(contact, bodies.nodes, n)
     if count > 1:
@@ -608,7 +601,7 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
 
 class ListedPairs(NamedTuple):
     nodes: np.ndarray  # (n, 2)
-    normals: np.ndarray  # (n, d) unit normals from the first to the second body
+    normals: np.ndarray  # (n, d) unit, from the first to the second body
     gaps: np.ndarray  # (n,) remaining distances
 
 
@@ -701,7 +694,7 @@ def _stay(steps):
 
     Mapped separately from v*, it would move surfaces that are pressed together, and stress would do
     spurious work: a collision of bars quadruples their energy, or doubles it if only approach is
-    removed. `steps` is 1 if v* of this step is known, else 0: then the last step's contacts count.
+    removed. `steps` is 1 if v* of this step is known, else 0, when the last step's contacts count.
     """
 
     def stay(s, n):
