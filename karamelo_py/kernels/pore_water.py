@@ -1,4 +1,4 @@
-"""Rows of pore water, and how its quantities join those of the soil."""
+"""Rows of pore water, and how its quantities join the soil's."""
 
 from typing import NamedTuple
 

@@ -73,7 +73,7 @@ class Module:
         return self._seen(getattr(self._module, name))
 
 
-_NO_TYPES = "a kernel cannot ask for the type of a number: ask for that of a tag"
+_NO_TYPES = "a kernel cannot ask for the type of a number: ask for the type of a tag"
 
 
 def _class_of(thing: Any) -> type:

@@ -47,7 +47,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatters mass and momentum; those of rigid points go to separate sums."""
+    """Scatters mass and momentum, of rigid points to separate sums."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"

@@ -43,7 +43,7 @@ class BasisTraits(NamedTuple):
 
 @point_function()
 def locate(basis, kin, grid, location):
-    """Return the stencil of a point, which the functions below share."""
+    """Return the stencil of a point, for all functions below."""
 
 
 @point_function()
