@@ -35,13 +35,13 @@ class StoreAcceleration(NamedTuple):
     goes_through = ("sums", "held", "acceleration")
 
     def at_node(task, kin, nodes, n, dt):
-        held, rigid = field(nodes.fields, Held), field(nodes.fields, RigidSums)
+        fixed, rigid = field(nodes.fields, Held), field(nodes.fields, RigidSums)
         factor = dt * per_mass(nodes, n, dt)
         if rigid is not None:
             factor = real(0, dt) if rigid[n, MASS] > 0 else factor
         for k in range(kin.dimension):
             change = factor * nodes.sums[n, arrays.of_force(kin) + k]
-            field(nodes.fields, Acceleration)[n, k] = real(0, dt) if held[n, k] > 0 else change
+            field(nodes.fields, Acceleration)[n, k] = real(0, dt) if fixed[n, k] > 0 else change
 
 
 @node_task
@@ -83,13 +83,13 @@ def _beside(task, nodes, n, axis, way):
     local = int(n) - grids.first[g]
     step_x, step_y = grids.step_x[g], grids.step_y[g]
     if axis == 0:
-        place, count, step = local // step_x, (end - grids.first[g]) // step_x, step_x
+        position, count, step = local // step_x, (end - grids.first[g]) // step_x, step_x
     elif axis == 1:
-        place, count, step = local % step_x // step_y, step_x // step_y, step_y
+        position, count, step = local % step_x // step_y, step_x // step_y, step_y
     else:
-        place, count, step = local % step_y, step_y, 1
-    there = 0 <= place + way < count
-    m = int(n) + way * step if there else int(n)
+        position, count, step = local % step_y, step_y, 1
+    inside = 0 <= position + way < count
+    m = int(n) + way * step if inside else int(n)
     return index(m)
 
 

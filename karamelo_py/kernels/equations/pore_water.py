@@ -105,8 +105,8 @@ class WaterUpdate(StepField):
 class Flux(Field):
     """Mass flux per area (d,); two outflows; two pressures.
 
-    The outflow through a closed node, per volume, stays in the points; the outflow through an
-    open node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
+    The outflow through a closed node, per volume, stays in the points; the outflow through an open
+    node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
     """
 
     @staticmethod

@@ -33,10 +33,10 @@ Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of
 
 
 class FormulaOf:
-    """Script argument: a formula of `names` for the quantity `what`."""
+    """Script argument: a formula of `names` for a `quantity`."""
 
     names: ClassVar[tuple[str, ...]]
-    what: ClassVar[str]
+    quantity: ClassVar[str]
     expected: ClassVar[str]
 
     @classmethod
@@ -49,7 +49,7 @@ class FormulaOf:
         formula = Expression(value)
         if others := formula.names.difference(cls.names):
             raise ScriptError(
-                f"{cls.what} cannot depend on {min(others)}",
+                f"{cls.quantity} cannot depend on {min(others)}",
                 mark=argument.mark,
                 expected=cls.expected,
             )
@@ -78,12 +78,12 @@ def with_numbers(formula: str, **numbers: float) -> Expression:
     return Expression(evaluation.evaluate(node, raw, Constants(numbers)))
 
 
-def check_operations(formula: Term, argument: str, known: set[str] = KNOWN) -> None:
+def check_operations(formula: Term, argument: str, allowed: set[str] = KNOWN) -> None:
     for one in terms.in_order(formula):
-        if one.operation not in known:
+        if one.operation not in allowed:
             raise ScriptError(
                 f"{one.operation} has no derivative that a stress could come from"
-                if known is not KNOWN
+                if allowed is not KNOWN
                 else f"{one.operation} is not possible in a law",
                 argument=argument,
                 expected=f"a formula with + - * / ^ and {', '.join(sorted({*OF_ONE} - {'neg'}))}",

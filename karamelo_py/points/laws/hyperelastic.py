@@ -44,7 +44,7 @@ class EnergyFormula(FormulaOf):
 
     script_kind: ClassVar[str] = "a formula of I1, I2, I3, J, I4, I6 and T, or of l1, l2, l3 and J"
     names = SEEDS
-    what = "the energy"
+    quantity = "the energy"
     expected = "a formula of I1, I2 and J, or of l1, l2 and l3"
 
     @classmethod

@@ -135,7 +135,7 @@ class Opened(NamedTuple):
 
 
 @initial_damage.on(CochranBanner)
-def _initial_damage_cochran_banner(damage, like):
+def _initial_damage_cochran_banner(damage, template):
     return Opened(0.0, 1.0)
 
 
@@ -171,7 +171,7 @@ class RateFormula(FormulaOf):
 
     script_kind: ClassVar[str] = "a formula of s1, p, q, t, epdot, T and w"
     names = ("s1", "p", "q", "t", "epdot", "T", "w")
-    what = "the growth of damage"
+    quantity = "the growth of damage"
     expected = script_kind
 
 
@@ -236,7 +236,7 @@ class DamageFormula(ByRate, DamageFields):
 
 
 @initial_damage.on(ByRate)
-def _initial_damage_by_rate(damage, like):
+def _initial_damage_by_rate(damage, template):
     return Pulled(0.0)
 
 

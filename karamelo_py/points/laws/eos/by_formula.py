@@ -41,7 +41,7 @@ class PressureFormula(FormulaOf):
 
     script_kind: ClassVar[str] = "a formula of J and E"
     names = NAMES
-    what = "the pressure"
+    quantity = "the pressure"
     expected = "a formula of J and E, the volume ratio and the internal energy per initial volume"
 
 
@@ -228,7 +228,7 @@ class EnergyAndHeat(NamedTuple):
 
 
 @initial_energy.on(ByPressure)
-def _initial_energy_by_pressure(eos, like):
+def _initial_energy_by_pressure(eos, template):
     return EnergyAndHeat(eos.initial, 0.0)
 
 
@@ -239,11 +239,11 @@ def values(eos, j, E):
 @compressed.on(ByPressure)
 def _compressed_by_pressure(eos, memory, step, heating):
     half = 0.5 * (step.j - step.before)
-    known = memory.E + heating - half * evaluated(eos.p, eos, (step.before, memory.E))
+    fixed = memory.E + heating - half * evaluated(eos.p, eos, (step.before, memory.E))
     E = memory.E + heating
     for _ in range(1 if eos.linear else SOLUTIONS):
         p, _, slope = values(eos, step.j, E)
-        E = E - (E + half * p - known) / (1 + half * slope)
+        E = E - (E + half * p - fixed) / (1 + half * slope)
     return EnergyAndHeat(E, memory.heat + heating)
 
 

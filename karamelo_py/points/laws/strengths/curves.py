@@ -135,7 +135,7 @@ class FlowFormula(FormulaOf):
 
     script_kind: ClassVar[str] = "a formula of ep, epdot, T, p and J"
     names = SEEDS
-    what = "the flow stress"
+    quantity = "the flow stress"
     expected = (
         "a formula of ep, epdot, T, p and J: plastic strain, its rate, temperature, "
         "pressure, volume ratio"

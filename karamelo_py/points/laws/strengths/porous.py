@@ -192,9 +192,9 @@ def foam_flow(strength, ep):
     """Return the flow stress and its slope."""
     some = ep > 0
     ratio = min(where(some, ep, 1) / strength.e, DENSE)
-    part = where(some, power(ratio, strength.beta), 0)
-    room = 1 - min(part, DENSE)
-    slope = strength.a * strength.beta * part / (room * where(some, ep, 1))
+    pores = where(some, power(ratio, strength.beta), 0)
+    room = 1 - min(pores, DENSE)
+    slope = strength.a * strength.beta * pores / (room * where(some, ep, 1))
     return strength.Y + strength.H * ep - strength.a * logarithm(room), strength.H + slope
 
 
