@@ -240,11 +240,8 @@ def make_array(
     builder: ir.IRBuilder, kind: types.Array, data: Any, shape: Sequence, strides: Sequence
 ) -> ir.Value:
     made = register_type(kind)
-    parts = [
-        data,
-        *(make_struct(builder, made.elements[1], numbers) for numbers in (shape, strides)),
-    ]
-    return make_struct(builder, made, parts)
+    sizes = [make_struct(builder, made.elements[1], numbers) for numbers in (shape, strides)]
+    return make_struct(builder, made, [data, *sizes])
 
 
 class ArrayParts:

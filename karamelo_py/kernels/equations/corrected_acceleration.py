@@ -1,8 +1,8 @@
 """Nodal accelerations with the error of the lumped mass removed.
 
-A lumped mass matrix m_I averages what the transfer maps to a node: a wave of wave number k loses
-the fraction kappa (k h)^2 of its acceleration, kappa = D / h^2 being the spread of the basis. The
-next nodes along the axes give it back, in pairs, so that momentum is conserved to round-off::
+The lumped mass matrix m_I averages what the transfer maps to a node: a wave of wave number k loses
+the fraction kappa (k h)^2 of its acceleration, with kappa = D / h^2. Adjacent nodes along the axes
+return it in pairs, which conserves momentum to round-off::
 
     a_I + kappa / m_I sum_J min(m_I, m_J) (a_I - a_J)
 """
@@ -19,13 +19,13 @@ from karamelo_py.points.grid import Grid
 
 
 class Acceleration(StepField):
-    """Change of a node's velocity in the step, by the forces; 0 where the velocity is given."""
+    """Change of a node's velocity by the forces of a step; 0 where the velocity is prescribed."""
 
     shape = vector
 
 
 class Held(StepField):
-    """1 where a fix gives the velocity of a node, else 0, in each direction."""
+    """1 where a fix prescribes the velocity of a node, else 0, per direction."""
 
     shape = vector
 
@@ -46,7 +46,7 @@ class StoreAcceleration(NamedTuple):
 
 @node_task
 class CorrectAcceleration(NamedTuple):
-    """Add to v* and its change what the next nodes along the axes say of the lumped mass."""
+    """Corrects v* and its change by the adjacent nodes along the axes."""
 
     spread: Any  # kappa
     grids: Grid
@@ -75,7 +75,6 @@ def _give_back(kin, nodes, n, m, factor):
 
 
 def _beside(task, nodes, n, axis, way):
-    """Return the next node along an axis; `n` itself at an edge."""
     grids, g = task.grids, 0
     while g + 1 < grids.first.size and int(n) >= grids.first[g + 1]:
         g += 1

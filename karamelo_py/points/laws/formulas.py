@@ -1,6 +1,6 @@
 """Formulas in laws: read from a script, differentiated, and code of a class.
 
-The structure of a formula is in the class of the law, so kernels contain it as code; its numbers
+The class of the law holds the structure of a formula, so kernels contain it as code; its numbers
 are parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
 whole exponents.
 """
@@ -57,8 +57,6 @@ class FormulaOf:
 
 
 class Constants:
-    """Names in a ready formula: constants, or else seeds."""
-
     def __init__(self, numbers: dict[str, float]):
         self.numbers = numbers
 
@@ -98,7 +96,6 @@ class ProgramWriter:
         self.numbers: dict[Any, int] = {}
 
     def code(self, root: Term) -> Code:
-        """Return a formula's stack program; () for 0."""
         if is_number(root, 0):
             return ()
         made: list[tuple[str, Any]] = []
@@ -170,7 +167,6 @@ def whole_power(a, n):
 
 
 def evaluated(code, law, arguments):
-    """Value at `arguments`; 0 without a program."""
     if not len(code):
         return 0
     stack = ()

@@ -1,4 +1,4 @@
-"""Material mullins: a rubber that is softer below the largest strain it has had."""
+"""Material mullins."""
 
 from math import erf, pi, sqrt
 from typing import Any, NamedTuple
@@ -32,14 +32,14 @@ class HyperelasticMaterial(ElasticMaterial):
 
 
 class Mullins(NamedTuple):
-    """Filled rubber that softens: the Mullins effect of Ogden and Roxburgh.
+    """Filled rubber that softens below its largest strain (Mullins effect, Ogden and Roxburgh).
 
     Parameters
     ----------
     elastic
         ID of an isotropic hyperelastic material: the response to the first loading.
     r
-        Bound of the softening: the stress falls at most to 1 - 1/r of the first loading's.
+        Limit of the softening: the stress falls at most to 1 - 1/r of the first loading's.
     m
         Energy per volume that scales the softening.
     beta
@@ -90,7 +90,7 @@ class State(NamedTuple):
 
 
 def swollen(law, kin, state):
-    """State of the elastic law at the same volume and temperature, without distortion."""
+    """Return the state at the same volume and temperature without distortion."""
     size = power(laws.jacobian(law, kin, state), 1 / 3) - 1
     start = laws.initial_state(law, SPACE, size)
     start = laws.with_temperature(law, SPACE, start, laws.temperature(law, kin, state))
@@ -107,7 +107,7 @@ def distortional_energy(law, kin, state):
 
 @point_function()
 def softened(law, W, peak):
-    """eta, its slope by W, and the energy phi of Ogden and Roxburgh."""
+    """Return eta, its slope by W, and the energy phi of Ogden and Roxburgh."""
 
 
 @softened.on(Mullins)
@@ -167,7 +167,7 @@ def _energy_density_mullins(law, kin, state):
 def _stiffened(function):
     @function.on(Mullins)
     def _speed_mullins(law, kin, state):
-        # Unloading from the peak also changes eta.
+        # unloading from the peak also changes eta
         s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic)).largest_row_sum()
         _, slope, _ = softened(law, state.peak, state.peak)
         elastic = function(law.elastic, kin, state.elastic)

@@ -1,4 +1,4 @@
-"""Equations of state by a formula of volume and internal energy: formula, and ready ones."""
+"""Eos formula, stiffened-gas and mie-grueneisen: pressure by volume and internal energy."""
 
 from collections import namedtuple
 from math import isfinite
@@ -32,7 +32,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
 NAMES = ("J", "E")
-SOLUTIONS = 3  # passes for the energy of a step; one where the pressure is linear in it
+SOLUTIONS = 3  # passes for the energy of a step; one if the pressure is linear in it
 MOST_PASSES = 60
 
 
@@ -55,8 +55,6 @@ class ByPressure:
 
 
 class GasByPressure(ByPressure):
-    """With an initial energy."""
-
     __slots__ = ()
     traits = LawTraits(any_speed=True, least_density=1e-3)
 
@@ -86,8 +84,8 @@ class EosFormula(ByPressure, EosFields):
 
     Notes
     -----
-    dE = -p dJ, by the mean pressure of the step; plastic and viscous work heat the material. The
-    strain energy is E less the initial energy and the heat. Wave speeds follow from the slope at
+    dE = -p dJ with the mean pressure of the step; plastic and viscous work heat the material. The
+    strain energy is E minus the initial energy and the heat. Wave speeds follow from the slope at
     constant entropy, -J (p_J - p p_E).
 
     See Also
@@ -224,7 +222,7 @@ class MieGrueneisen(ByPressure, EosFields):
 
 class EnergyAndHeat(NamedTuple):
     E: Any  # per reference volume
-    heat: Any  # part of E that was not work of the pressure
+    heat: Any  # part of E that is not work of the pressure
 
 
 @initial_energy.on(ByPressure)

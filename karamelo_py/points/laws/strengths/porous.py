@@ -1,4 +1,4 @@
-"""Strengths of porous solids: crushable-foam, gurson."""
+"""Strengths crushable-foam and gurson."""
 
 from math import pi, sqrt
 from typing import NamedTuple
@@ -18,7 +18,7 @@ DENSE = 0.999999  # of the strain of densification
 
 
 class CrushableFoam(NamedTuple):
-    """Foam of metal or polymer, crushed by pressure and shear.
+    """Metal or polymer foam, crushed by pressure and shear.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Gurson(NamedTuple):
     G
         Shear modulus.
     Y, e, n
-        PlasticStep stress of the matrix, Y (1 + em/e)^n.
+        Flow stress of the matrix, Y (1 + em/e)^n.
     f0
         Initial void fraction.
     q1, q2
@@ -156,7 +156,7 @@ def returned(strength, memory, trial):
 
 @point_function()
 def grown(strength, memory, flow):
-    """Return the memory after a `PlasticStep`, but for the plastic volume ratio."""
+    """Return the memory after a `PlasticStep`, except the plastic volume ratio."""
 
 
 @elastic_ratio.on(CrushableFoam)
@@ -189,7 +189,6 @@ def _respond_porous(strength, law, kin, step, memories):
 
 
 def foam_flow(strength, ep):
-    """Return the flow stress and its slope."""
     some = ep > 0
     ratio = min(where(some, ep, 1) / strength.e, DENSE)
     pores = where(some, power(ratio, strength.beta), 0)

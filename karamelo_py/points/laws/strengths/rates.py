@@ -1,4 +1,4 @@
-"""Strengths of high and low rates: steinberg-guinan, mts, norton, perzyna."""
+"""Strengths steinberg-guinan, mts, norton and perzyna."""
 
 from math import inf, tanh
 from typing import NamedTuple
@@ -146,7 +146,6 @@ shear_response.on(Norton)(radial_return)
 
 
 def power_of_rate(rate, factor, n, increment):
-    """Return factor rate^(1/n), with its slope by the increment."""
     some = increment > 0
     value = where(some, factor * power(where(some, rate, 1), 1 / n), 0)
     return value, value / (n * where(some, increment, 1))
@@ -293,7 +292,6 @@ remembers(Mts, ep=0.0, threshold="s0")
 
 
 def threshold_after(strength, before, increment, dt):
-    """Return the threshold after the increment, and its slope."""
     x, s = max(increment, LEAST), before.memory.threshold
     T = temperature_or(before.heat, strength.initial_temperature)
     exponent = strength.k * T / (strength.gs * strength.G)
