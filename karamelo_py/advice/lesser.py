@@ -91,7 +91,7 @@ def _flat(hub: Hub) -> Words:
 
 def _thin(hub: Hub) -> Words:
     domain = hub.domain
-    laws = [part for solid in hub.solids.values() for part in law_parts(solid.material.whole)]
+    laws = [law for solid in hub.solids.values() for law in law_parts(solid.material.whole)]
     if domain.dimension < 3 or len(hub.lattices) > 1 or any(law_traits(p).flows for p in laws):
         return
     for k in range(3):

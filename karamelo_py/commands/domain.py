@@ -136,13 +136,12 @@ def boundary(
     A reflected point retains its stress and tangential velocity. Neighbours may push it back to the
     edge. A body that hits the edge as a whole loses most of its normal velocity.
 
-    In a periodic direction the domain is one cell of an endless row of equal ones: what leaves at
-    one end comes in at the other, and bodies at both ends touch. Its length is a multiple of the
-    cell size. Formulas of nodes should be equal a period apart. Points are moved back into the
-    domain every 10 steps: until then, dumps may show them outside it. For method ulmpm with linear
-    or splines, scheme musl, any transfer but XPIC, on one process without a GPU; not with the other
-    styles of boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies,
-    pore_water.
+    In a periodic direction the domain repeats endlessly: points that leave at one end enter at the
+    other, and bodies at both ends touch. Its length is a multiple of the cell size. Formulas of
+    nodes should be equal a period apart. Points return to the domain every 10 steps; until then,
+    dumps may show them outside. Supported are method ulmpm with linear or splines, scheme musl and
+    any transfer but XPIC, on one process without a GPU; not the other styles of boundary,
+    axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, or pore_water.
 
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 

@@ -268,15 +268,15 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     this length; so is a longer ``run_time(T)``, if the file was written before the last two steps
     of the shorter run, which are shortened.
 
-    A file (HDF5) holds all fields of points and nodes, the state of fixes, computes, dumps and
+    A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and values that the script has read. A run killed while writing leaves the previous file.
-    The last state of each run is written too; a failed run writes last_good.<step>.h5 instead: if
+    The last state of each run is written too. A failed run writes last_good.<step>.h5 instead: if
     its energy has grown, the last state before the growth, to within ten steps; if its step was
-    above the stable limit from the start, the state before the first step; none with
-    boundary(delete), or if the run was resumed from a file at that step.
+    above the stable limit from the start, the state before the first step. There is no such file
+    with boundary(delete), or if the run was resumed from a file at that step.
 
-    Dumps include the state of an interruption or failure. A resumed run removes it from files with
-    several snapshots, not separate files.
+    Dumps include the state of an interruption or failure; a resumed run removes it from files with
+    several snapshots, but not separate files.
 
     Example
     -------

@@ -106,7 +106,7 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
     if hub.domain is None or not hub.domain.thin or is_rigid(material.whole):
         return
     parts = law_parts(material.whole)
-    if any(law_traits(part).flows and not parameter(part, "cohesion") > 0 for part in parts):
+    if any(law_traits(law).flows and not parameter(law, "cohesion") > 0 for law in parts):
         message = "without stress across the body this material has no strength"
         expected = "a solid that sustains tension, or plane strain"
         raise ScriptError(message, argument="style", expected=expected)

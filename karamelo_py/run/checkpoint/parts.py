@@ -178,7 +178,7 @@ def _random_state(state: dict) -> np.random.RandomState:
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
-    dict: (lambda found: [list(item) for item in found.items()], lambda *items: dict(items)),
+    dict: (lambda items: [list(item) for item in items.items()], lambda *items: dict(items)),
     complex: (lambda z: [z.real, z.imag], complex),
     bytes: (lambda text: [np.frombuffer(text, np.uint8)], np.ndarray.tobytes),
     bytearray: (lambda text: [np.array(text)], bytearray),

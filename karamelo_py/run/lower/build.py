@@ -261,8 +261,8 @@ def fixes_of_bodies(hub: Hub) -> tuple:
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:
     alike: dict[tuple, list] = {}
     for solid in hub.solids.values():
-        part = solid if ids is None else part_of(solid, *ids)
-        alike.setdefault(laws.law_kind(solid.material.law), []).append(part)
+        points = solid if ids is None else part_of(solid, *ids)
+        alike.setdefault(laws.law_kind(solid.material.law), []).append(points)
     return alike.values()
 
 
@@ -364,7 +364,7 @@ def lower_points(
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
     elastic = elastic_law(used)
-    own = [kind for kind in kinds if kind.needed(elastic)]
+    stored = [kind for kind in kinds if kind.needed(elastic)]
     points = arrays.Points(
         x=x, home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
@@ -372,7 +372,7 @@ def lower_points(
         material=joined((laws_of_solids.index(law) for law in law_of_solids), np.int32),
         grid=joined((method.lattice_of(hub, s) for s in solids), np.int32),
         id=joined((np.arange(s.first_id, s.first_id + s.count) for s in solids), np.int64),
-        fields=tuple(fields.at_points(kind, kin, count, real) for kind in own),
+        fields=tuple(fields.at_points(kind, kin, count, real) for kind in stored),
     )  # fmt: skip
     return points, used
 

@@ -65,10 +65,10 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
 
 def mark_held(hub: Hub, s: Setup) -> None:
     """Mark the nodes and directions that fixes hold in this run (`Held`)."""
-    held = field(s.nodes.fields, Held)
-    if held.any():  # pages that are never written take no memory
-        held[:] = 0
+    fixed = field(s.nodes.fields, Held)
+    if fixed.any():  # pages that are never written take no memory
+        fixed[:] = 0
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas if fix.prescribes_velocity else ()):
             if formula is not None:
-                held[slice(None) if fix.group.all else fix.nodes, k] = 1
+                fixed[slice(None) if fix.group.all else fix.nodes, k] = 1

@@ -228,8 +228,8 @@ class Merged:
         for name, faces in body.part.faces.items():
             for nodes in faces:
                 of_mesh = table.of(nodes.ravel()).reshape(nodes.shape)
-                known = of_mesh[(of_mesh >= 0).all(axis=1)]
-                self.faces[name].append(CellBlock(FACE_TYPES[nodes.shape[1]], known))
+                complete = of_mesh[(of_mesh >= 0).all(axis=1)]
+                self.faces[name].append(CellBlock(FACE_TYPES[nodes.shape[1]], complete))
 
     def add_surfaces(self, body: DeckBody) -> None:
         for name, items in body.part.sides.items():

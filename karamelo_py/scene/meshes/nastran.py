@@ -144,8 +144,8 @@ class _Systems:
                 node = of.whole(first + k)
                 if node not in self.nodes:
                     raise of.wrong(f"has the node {node}, which is not defined")
-                at, system, place = self.nodes[node]
-                three.append(self.places(at, system, np.array([place]), above)[0])
+                at, system, point = self.nodes[node]
+                three.append(self.places(at, system, np.array([point]), above)[0])
             origin, on_z, in_xz = three
         else:
             points = np.array([of.real(k) for k in range(2, 11)]).reshape(3, 3)

@@ -87,20 +87,20 @@ class ULMPMContacts(Method):
     all corners of the cells of the base. With splines it should be three cells thick: the surface
     of a thinner base appears higher by up to a quarter of a cell.
 
-    Walls of one cell contain liquids and granular materials, also in corners, inclined, and moving.
-    In 1e5 steps the centres of points of water and sand reached at most 10 % of a cell into walls
-    at rest, of gel 15 %, and 26 % into moving walls. Within 100 steps after a contact at a node,
-    they may leave a wall there but not approach it.
+    Walls one cell thick hold liquids and granular materials, also in corners, inclined and moving:
+    in 1e5 steps points of water and sand penetrated walls at rest by at most 10 % of a cell, gel by
+    15 %, and moving walls by 26 %. For 100 steps after a contact at a node, points may leave the
+    wall there but not approach it.
 
     Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
     grad N of both, averaged over the neighbouring nodes with the weights 1/4, 1/2, 1/4 along each
-    axis. The solid whose sums scatter less has more weight: the face where a corner lies on a face.
-    For a solid with a prescribed velocity, only its normal counts, except at the end of its face.
-    Solids that are apart along a grid axis are not in contact.
+    axis. The solid whose sums scatter less has more weight, so a face outweighs a corner. Of a
+    solid with a prescribed velocity only its own normal counts, except at the end of its face.
+    Solids separated along a grid axis are not in contact.
 
-    At a node of more than two solids, every approaching pair computes its impulse from the same
-    velocities, less for solids in several pairs; the rest is removed in up to 16 passes. The order
-    of the solids has no effect. Contact does not move nodes held by fix velocity_nodes: their
+    At a node of more than two solids, the impulses of all approaching pairs follow from the same
+    velocities, reduced for solids in several pairs; the rest is removed in up to 16 passes. The
+    order of the solids has no effect. Contact does not move nodes held by fix velocity_nodes: their
     impulse is added to the reaction of that fix.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
