@@ -177,7 +177,7 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array[..., points])
 
 
-def at_points(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
+def at_points(kind: type, kin: Any, count: int, real: type) -> Any:
     """Make a field (components, count) with initial values."""
     array = rows_of_points((kind.shape(kin), count), real)
     array[:] = _start(kind, kin, real)[:, None]

@@ -251,7 +251,7 @@ def _kinetic(s: Setup, block: Block) -> np.ndarray:
     return 0.5 * points.mass.astype(float) * (v**2).sum(axis=0)
 
 
-def _of_law(density: Callable) -> Callable:
+def _of_law(density: Any) -> Callable:
     def energies(s: Setup, block: Block) -> np.ndarray | None:
         if not can(block.laws, density):
             return None

@@ -229,8 +229,8 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
     return [*owners, hub.domain, *hub.fixes.values(), update, update.scheme, *others, *laws]
 
 
-def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type, int]]:
-    columns: dict[str, tuple[type, int]] = {}
+def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.Field], int]]:
+    columns: dict[str, tuple[type[fields.Field], int]] = {}
     for kind in fields.declared(owners_of_fields(hub), attribute):
         for k, column in enumerate(fields.columns_of(kind)):
             columns.setdefault(column, (kind, k))

@@ -157,7 +157,7 @@ class Near(Region):
 
     def __init__(self, region: MeshRegion):
         d = region.dimension
-        self.reach = require_grid(region.hub).h / 2 - region.tolerance
+        self.reach = require_grid(region.hub).lattice.h / 2 - region.tolerance
         lo, hi = region.box_lo[:d] - self.reach, region.box_hi[:d] + self.reach
         super().__init__(region.hub, lo, hi, parts=(region,))
         (self.surface,) = region.skin.surfaces

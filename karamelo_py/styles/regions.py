@@ -187,8 +187,9 @@ class Sphere(Primitive):
         d = hub.require_domain().dimension
         *centre, self.radius = self.forms.read(hub, numbers, d).values()
         region.check_radius(self.radius, argument=len(centre))
-        self.across, self.centre = range(len(centre)), np.array(centre)
-        lo, hi = self.centre - self.radius, self.centre + self.radius
+        middle = np.array(centre)
+        self.across, self.centre = range(len(centre)), middle
+        lo, hi = middle - self.radius, middle + self.radius
         super().__init__(hub, lo, hi, exterior=exterior)
 
 

@@ -125,9 +125,8 @@ class LoadSteps:
             control.values[TIMESTEP] = step
             self.parts, iterations = self.parts + 1, iterations + taken
             if left > 1e-9:
-                fraction = (
-                    min(2 * fraction, most) if taken <= self.scheme.iterations // 2 else fraction
-                )
+                if taken <= self.scheme.iterations // 2:
+                    fraction = min(2 * fraction, most)
                 if control.motion[0].drift > control.motion[0].drift_limit:
                     self.simulation.sort_if_due()
         for name, value in zip(PUBLISHED, (iterations, residual, self.parts), strict=True):
@@ -184,19 +183,15 @@ class LoadSteps:
         try:
             # Heat flows by these masses, and changes the stress that is summed after it.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
-            simulation_hooks = simulation.hooks
-            loads = (
-                simulation_hooks.loads.copy()
-                if self.dynamic and isinstance(simulation_hooks, Hooks)
-                else None
-            )
+            loaded = simulation.hooks if self.dynamic else None
+            loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
             control.values[TIME] = time + dt
             if heated:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
                 # Their work uses the mean of both, like Newmark's velocities.
-                simulation_hooks.loads[:] = 0.5 * (loads + simulation_hooks.loads)
+                loaded.loads[:] = 0.5 * (loads + loaded.loads)
             equilibrium = self._equilibrium(dt, before if self.dynamic else None, after)
             self._tell_of_long_way(equilibrium)
             self._publish(equilibrium, hooks, dt)

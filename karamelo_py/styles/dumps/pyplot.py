@@ -285,10 +285,11 @@ def look_of(
     **look: Any,
 ) -> dict[str, Any]:
     """Check the keywords of a script or a command line, and return the settings of a picture."""
-    for ends, low, high in (((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)):
-        if None not in ends and ends[0] >= ends[1]:
+    ranges = ((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)
+    for (first, last), low, high in ranges:
+        if first is not None and last is not None and first >= last:
             range_of = "colours" if low == "vmin" else "picture"
-            message = f"the {range_of} cannot go from {ends[0]:g} to {ends[1]:g}"
+            message = f"the {range_of} cannot go from {first:g} to {last:g}"
             raise ScriptError(message, argument=high, expected=f"a number above {low}")
     if outlines and dimension == 1:
         message = "outlines are drawn in 2D and 3D, and this scene is 1D"

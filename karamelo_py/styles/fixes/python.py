@@ -138,7 +138,7 @@ class Python(Fix):
             expected = "a function of one argument, the points or nodes of the group"
             raise ScriptError(message, argument="function", expected=expected)
         super().__init__(hub, group)
-        self.function = function
+        self.function: Any = function
         self.keeper = Keeper(function)
         self.point_by_point = getattr(function, "point_by_point", False)
         self.point_fields = () if on_nodes else (Force,)

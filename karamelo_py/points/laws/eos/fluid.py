@@ -204,7 +204,7 @@ class IdealGas(NamedTuple):
                 else "pressure and energy at the start are given; one follows from the other",
                 expected="p=pressure or e=energy per mass",
             )
-        energy = rho0 * e if p is None else p / (gamma - 1)
+        energy = rho0 * (e or 0.0) if p is None else p / (gamma - 1)
         return {"eos": cls(1 / rho0, gamma, energy), **artificial_viscosity(Q1, Q2)}
 
 
