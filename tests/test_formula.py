@@ -7,16 +7,15 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
+from karamelo_py.compiler.programs import BLOCK, ROWS
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.formula import (
-    BLOCK,
     CONSTANT,
     KEEP,
     KEPT,
     POINT,
-    ROWS,
     SPREAD,
     UNIFORM,
     Program,

@@ -9,7 +9,7 @@ import pytest
 from conftest import INPUTS
 from going_on import goes_on, same_files, with_files
 
-from karamelo_py.kernels import free_bodies as kernel
+from karamelo_py.kernels import rigid_motion as motion
 
 pytestmark = pytest.mark.xdist_group("rigid body")
 ALONE = """
@@ -318,13 +318,12 @@ def test_rigid_bodies_that_pass_through_each_other_are_reported(run_interpreted)
 
 def body_among(contacts, velocity, mass, dofs):
     """What Newton's method reads of a body at the origin with some contacts."""
-    vectors = np.zeros((kernel.ROWS, 6))
-    vectors[kernel.START_P], vectors[kernel.U] = mass * velocity, velocity
-    matrices = np.zeros((2, 6, 7))
-    matrices[0, :, :6] = np.diag(mass)
+    solution = motion.new_solution()
+    solution.momentum[:], solution.u[:] = mass * velocity, velocity
+    solution.mass[:] = np.diag(mass)
     return SimpleNamespace(
-        contacts=contacts, vectors=vectors, matrices=matrices, lever=np.eye(3, 6),
-        state=np.zeros(kernel.STATE), dofs=np.array(dofs),
+        contacts=contacts, count=[len(contacts)], solution=solution,
+        state=motion.records(motion.STATE), dofs=np.array(dofs),
     )  # fmt: skip
 
 
@@ -333,24 +332,23 @@ def test_impulses_are_found_for_light_bodies_with_much_friction():
     random = np.random.default_rng(1)
     for case in range(60):
         count, d, mu = (2, 6, 20)[case % 3], 2 + case % 2, (0.3, 0.6, 1.0)[case % 3]
-        c = np.zeros((count, kernel.COLUMNS))
+        c = motion.records(motion.CONTACT, count)
         normal = random.normal(size=(count, 3)) - (0, 1, 0)
         normal[:, d:] = 0
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        c[:, kernel.AT : kernel.AT + 3] = c[:, kernel.NORMAL : kernel.NORMAL + 3] = normal
-        c[:, kernel.SOFT_V : kernel.SOFT_V + d] = random.normal(0, 0.3, (count, d))
-        c[:, kernel.SOFT_MASS], c[:, kernel.MU] = random.uniform(0.1, 1, count), mu
-        c[:, kernel.SHARE] = 0.1
-        mass = np.repeat([2.0, 1.0], 3) * c[:, kernel.SOFT_MASS].sum() * 10.0 ** -(case % 4)
+        c.at = c.normal = normal
+        c.v[:, :d] = random.normal(0, 0.3, (count, d))
+        c.mass, c.mu, c.share = random.uniform(0.1, 1, count), mu, 0.1
+        mass = np.repeat([2.0, 1.0], 3) * c.mass.sum() * 10.0 ** -(case % 4)
         dofs = [1] * 6 if d == 3 else [1, 1, 0, 0, 0, 1]
         start = (random.normal(size=6) - (0, 1, 0, 0, 0, 0)) * dofs
         body = body_among(c, start, mass, dofs)
-        kernel._solve(body, count, 1e-3)
-        assert body.state[kernel.FAILED] == 0
+        motion.solve(body, 1e-3)
+        assert body.state.failed == 0
         # M (U - U*) and the impulses at the places, about the centre, add up to nothing.
-        p = c[:, kernel.IMPULSE : kernel.IMPULSE + 3]
+        p = c.impulse
         total = np.concatenate([p.sum(axis=0), np.cross(normal, p).sum(axis=0)])
-        rest = mass * (body.vectors[kernel.U] - start) + total
+        rest = mass * (body.solution.u - start) + total
         assert rest[np.array(dofs) > 0] == pytest.approx(0, abs=1e-9 * np.abs(mass * start).max())
         push = (p * normal).sum(axis=1)
         assert (push >= 0).all()

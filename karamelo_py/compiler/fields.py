@@ -69,6 +69,11 @@ def planar(kin: Any) -> int:
     return kin.dimension**2
 
 
+def numbers(count: int, per_direction: int = 0) -> Any:
+    """Make the shape of ``count + per_direction * d`` numbers."""
+    return staticmethod(lambda kin: count + per_direction * kin.dimension)
+
+
 class Field(NamedTuple):
     """Base of fields: numbers of each point or node."""
 

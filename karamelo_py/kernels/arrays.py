@@ -384,6 +384,7 @@ class Setup(NamedTuple):
     contact: Tag
     bodies: Tag  # freely moving rigid bodies, or none
     heat: Tag  # conduction and its nodes, or none
+    water: Tag  # in the pores, or none
     grids: Grid  # an array (g,) for each number
     nodes: Nodes
     buffers: Buffers

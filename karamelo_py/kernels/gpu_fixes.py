@@ -13,6 +13,7 @@ from karamelo_py.compiler import index
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import counted, raise_to
 from karamelo_py.compiler.lanes import room_for
+from karamelo_py.compiler.programs import ROWS, STACK
 from karamelo_py.kernels import arrays, hook_loop, totals, watch
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
@@ -21,7 +22,6 @@ from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
-from karamelo_py.script.formula import ROWS, STACK
 
 
 def _hooks_with_room(hooks):

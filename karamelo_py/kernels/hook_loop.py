@@ -10,6 +10,7 @@ import numpy as np
 
 from karamelo_py.compiler import caller_of, hold, kernel, noinline, point_function
 from karamelo_py.compiler.fields import field, load_vector
+from karamelo_py.compiler.programs import BLOCK, ROWS, STACK, call_evaluate
 from karamelo_py.compiler.threads import Threaded, shared_out
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, totals
@@ -27,7 +28,6 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.formula import BLOCK, ROWS, STACK, call_evaluate
 
 # each bare number would be a type
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)

@@ -1,5 +1,6 @@
 """Rows of pore water, and how its quantities join the soil's."""
 
+from types import MappingProxyType
 from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
@@ -13,7 +14,7 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import NoCompany, NodeTask, Processor, company_of, take
+from karamelo_py.kernels.table import Company, NodeTask, Processor, take
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -63,43 +64,22 @@ for _function, _task in ((share_forces, pores.ShareForces), (make_flux, pores.Ma
     _function.goes_through, _function.says = _task.goes_through, _task.says  # type: ignore[attr-defined]
 
 
-class WithMomentum(NoCompany):
-    then = (pores.WaterMomentum(),)
+COMPANY = {
+    MassMomentum: Company(then=(pores.WaterMomentum(),)),
+    InternalForce: Company(then=(pores.WaterForce(),)),
+    MomentumAgain: Company(then=(pores.WaterMomentumAgain(),)),
+    NodalUpdate: Company(before=(AtWater(), NodeTask(share_forces))),
+    Move: Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),)),
+    Strain: Company(before=(NodeTask(make_flux),), first=(pores.Seep(),)),
+}
 
 
-class WithForce(NoCompany):
-    then = (pores.WaterForce(),)
+class Water(NamedTuple):
+    """Water in the pores: its fields, and what joins tasks and quantities."""
 
+    point_fields = pores.POINT_FIELDS
+    node_fields = pores.NODE_FIELDS
+    company = MappingProxyType(COMPANY)
 
-class WithMomentumAgain(NoCompany):
-    then = (pores.WaterMomentumAgain(),)
-
-
-class WithUpdate(NoCompany):
-    before = (AtWater(), NodeTask(share_forces))
-
-
-class WithMove(NoCompany):
-    before = (NodeTask(pores.DragWater()),)
-    then = (pores.MoveWater(),)
-
-
-class WithStrain(NoCompany):
-    before = (NodeTask(make_flux),)
-    first = (pores.Seep(),)
-
-
-def _accompany(kind: type, company: NoCompany) -> None:
-    @company_of.on(kind)
-    def _with_water(tag, s):
-        return NoCompany() if field(s.nodes.fields, pores.WaterSums) is None else company
-
-
-_accompany(MassMomentum, WithMomentum())
-_accompany(InternalForce, WithForce())
-_accompany(MomentumAgain, WithMomentumAgain())
-_accompany(NodalUpdate, WithUpdate())
-_accompany(Move, WithMove())
-_accompany(Strain, WithStrain())
 
 impose_pore_pressure = imposing(with_pore_pressure)

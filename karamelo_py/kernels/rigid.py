@@ -22,14 +22,6 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws.rigid import Rigid
 
 
-class RigidBodies(NamedTuple):
-    node_fields = (RigidSums,)
-
-    force: np.ndarray  # (n,) slot of the force on each point's solid, by id, or -1
-    torque: np.ndarray  # (n,) slot of the torque
-    slots: np.ndarray  # (r,) slots of forces and torques
-
-
 def _at_nodes(s):
     return s.kin, s.nodes, field(s.nodes.fields, RigidSums)
 
@@ -108,7 +100,13 @@ def _publish_sums(s):
 
 
 PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
-RigidBodies.rows = (each_node(_impose_node), *PUBLISH)  # type: ignore[attr-defined]
-RigidBodies.rows_before = RigidBodies.rows_after = (  # type: ignore[attr-defined]
-    each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),
-)
+
+
+class RigidBodies(NamedTuple):
+    node_fields = (RigidSums,)
+    rows = (each_node(_impose_node), *PUBLISH)
+    rows_before = rows_after = (each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
+
+    force: np.ndarray  # (n,) slot of the force on each point's solid, by id, or -1
+    torque: np.ndarray  # (n,) slot of the torque
+    slots: np.ndarray  # (r,) slots of forces and torques

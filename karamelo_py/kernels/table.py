@@ -7,6 +7,7 @@ memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and
 """
 
 from collections.abc import Iterable, Iterator
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import kernel, point_function, real
@@ -264,18 +265,23 @@ def says(row: Any, setup: Any) -> str | None:
     return "; ".join(text for text in texts if text) or None
 
 
-class NoCompany(NamedTuple):
-    """No company of a task or quantity."""
+class Company(NamedTuple):
+    """Company of a task or quantity in a scene (`Setup.water`)."""
 
-    before = ()  # rows before it
-    first = ()  # tasks or quantities before it in the same visit
-    then = ()  # and after it
+    before: tuple = ()  # rows before it
+    first: tuple = ()  # tasks or quantities in the same visit, before it
+    then: tuple = ()  # and after it
 
 
-@point_function(otherwise=True)
-def company_of(tag: Any, s: Setup) -> Any:
-    """Return what accompanies a task or quantity in this scene, a tag like `NoCompany`."""
-    return NoCompany()
+class Dry(NamedTuple):
+    company = MappingProxyType({})
+
+
+def company_of(tag: Any, s: Setup) -> Company:
+    for kind in type(tag).__mro__:
+        if kind in s.water.company:
+            return s.water.company[kind]
+    return Company()
 
 
 def _joined(tags: tuple, s: Setup) -> tuple:

@@ -225,8 +225,9 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
         of_method = [method.frame, method.averaging(hub), method.basis, method]
     frame, averaging, *others = of_method
     owners = [frame, update.transfer, averaging, contact, heat, grids]
-    laws = (solid.material.law for solid in hub.solids.values())
-    return [*owners, hub.domain, *hub.fixes.values(), update, update.scheme, *others, *laws]
+    materials = [solid.material for solid in hub.solids.values()]
+    owners += [hub.domain, *hub.fixes.values(), update, update.scheme, *others]
+    return [*owners, *(part for one in materials for part in (one.law, one.fluid))]
 
 
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.Field], int]]:

@@ -12,6 +12,7 @@ from numpy.lib.stride_tricks import as_strided
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
+from karamelo_py.compiler.programs import EVALUATE
 from karamelo_py.kernels import arrays, gpu, heat, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
@@ -26,7 +27,7 @@ from karamelo_py.kernels.watch import LOOK
 from karamelo_py.points.basis import support
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
-from karamelo_py.script.formula import EVALUATE, GLOBAL, UNIFORM, evaluate_in_table
+from karamelo_py.script.formula import GLOBAL, UNIFORM, evaluate_in_table
 
 POLL = 64  # steps between reads of `fate`
 FAR = 1.0  # cells that points move before they are reordered

@@ -11,6 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from karamelo_py.compiler.programs import BLOCK, ROWS
 from karamelo_py.script import formula, terms
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.values import Values
@@ -119,7 +120,7 @@ class Expression:
             return np.full(len(x), self.evaluate(values))
 
         out = np.empty(len(x))
-        scratch = np.empty((6 + formula.ROWS, formula.BLOCK))
+        scratch = np.empty((6 + ROWS, BLOCK))
         program = self.program(values)
         # In chunks: three-column copies of millions of points take much memory.
         for first in range(0, len(x), CHUNK):
@@ -142,7 +143,7 @@ class Expression:
         rows = np.zeros((len(columns[names[0]]), len(POINT_SEEDS)))
         for k, name in enumerate(names):
             rows[:, k] = columns[name]
-        out, scratch = np.empty(len(rows)), np.empty((6 + formula.ROWS, formula.BLOCK))
+        out, scratch = np.empty(len(rows)), np.empty((6 + ROWS, BLOCK))
         now, before = (np.ascontiguousarray(block) for block in (rows[:, :3], rows[:, 3:]))
         formula.evaluate_all(terms.program(self, push), values.array, now, before, out, scratch)
         return out

@@ -8,15 +8,11 @@ result to a row. Shared subexpressions are stored in rows after the stack.
 from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
-from karamelo_py.compiler import caller_of, kernel, noinline
+from karamelo_py.compiler import kernel, noinline
+from karamelo_py.compiler.programs import BLOCK, MAX_DEPTH, STACK
 from karamelo_py.script.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
 
-BLOCK = 128
-MAX_DEPTH = 32
-MAX_KEPT = 32
-ROWS = MAX_DEPTH + MAX_KEPT  # rows of the stack, then stored rows
 # Flag: done once for the whole block.
 UNIFORM = 1 << 16
 
@@ -144,17 +140,6 @@ def evaluate(program, globals_, points, count, out, stack):
         _fill(count, out, stack[0, 0])
     else:
         _copy(count, out, stack[0])
-
-
-# Hook kernels call the evaluator by address, so as not to contain it, with whole tables: slices in
-# a kernel are slow to compile.
-_TABLE = types.float64[:, ::1]
-_ROW = types.float64[::1]
-EVALUATE = types.void(
-    types.int64[:, ::1], _ROW, _ROW, _TABLE, *[types.int64] * 6
-)  # fmt: skip
-call_evaluate = caller_of(EVALUATE)
-STACK = 8  # rows of the scratch table: x y z x0 y0 z0, two results, stack
 
 
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):

@@ -6,6 +6,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from karamelo_py.compiler import programs
 from karamelo_py.script import formula
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.functions import compute_quietly
@@ -152,7 +153,7 @@ class _Writer:
 
     def __init__(self, root: Term, push: Callable[[str], tuple[int, int]], depth: int | None):
         self.bare = depth is not None
-        self.depth = depth or formula.MAX_DEPTH
+        self.depth = depth or programs.MAX_DEPTH
         self.push = push
         self.terms: list[tuple[str, tuple[int, ...], Any]] = []
         self.uses: list[int] = []
@@ -160,7 +161,7 @@ class _Writer:
         self.code: list[tuple[int, int]] = []
         self.constants: dict[str, int] = {}  # by hexadecimal text: 0.0 and -0.0 differ
         self.rows: dict[int, int] = {}  # rows of stored terms
-        self.free = list(range(formula.MAX_KEPT))[::-1]
+        self.free = list(range(programs.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()
 
@@ -214,7 +215,7 @@ class _Writer:
                 if not self.free:
                     raise ScriptError(
                         "the formula is too long",
-                        expected=f"at most {formula.MAX_KEPT} results that wait for their use",
+                        expected=f"at most {programs.MAX_KEPT} results that wait for their use",
                     )
                 self.rows[k] = self.free.pop()
                 self._append(formula.KEEP, self.rows[k], self.uniform[k])

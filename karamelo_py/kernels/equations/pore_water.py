@@ -22,7 +22,7 @@ from math import exp, inf
 from typing import NamedTuple
 
 from karamelo_py.compiler import real, where
-from karamelo_py.compiler.fields import Field, StepField, SummedField, field, store, vector
+from karamelo_py.compiler.fields import Field, StepField, SummedField, field, numbers, store, vector
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.node_updates import node_task
@@ -75,9 +75,7 @@ class WaterSums(SummedField):
 class PoreSums(SummedField):
     """Volume, volume of pores, volume times pressure, its unseen part, drag."""
 
-    @staticmethod
-    def shape(kin):
-        return 5
+    shape = numbers(5)
 
 
 class PoreForce(SummedField):
@@ -97,9 +95,7 @@ class WaterAgain(SummedField):
 class WaterUpdate(StepField):
     """w* after the update, w* - w, and the mass of the soil."""
 
-    @staticmethod
-    def shape(kin):
-        return 2 * kin.dimension + 1
+    shape = numbers(1, 2)
 
 
 class Flux(Field):
@@ -109,9 +105,7 @@ class Flux(Field):
     node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
     """
 
-    @staticmethod
-    def shape(kin):
-        return kin.dimension + 4
+    shape = numbers(4, 1)
 
 
 class GivenPressure(StepField):
@@ -120,8 +114,8 @@ class GivenPressure(StepField):
     start = float("nan")
 
 
-Saturated.point_fields = (RelativeVelocity, UnseenPressure)  # type: ignore[attr-defined]
-Saturated.node_fields = (  # type: ignore[attr-defined]
+POINT_FIELDS = RelativeVelocity, UnseenPressure
+NODE_FIELDS = (
     WaterSums, PoreSums, PoreForce, PoreArea, WaterAgain, WaterUpdate, Flux, GivenPressure,
 )  # fmt: skip
 

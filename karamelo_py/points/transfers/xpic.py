@@ -1,8 +1,8 @@
 """XPIC: PIC of higher order, which damps only null-space noise (Hammerquist & Nairn 2017)."""
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from karamelo_py.compiler.fields import StepField, SummedField, vector
+from karamelo_py.compiler.fields import StepField, SummedField, numbers, vector
 from karamelo_py.language.kinds import In
 from karamelo_py.points.laws import can
 from karamelo_py.points.laws.eos import taken_heat
@@ -16,9 +16,7 @@ class TermOfSeries(StepField):
 class Reflected(StepField):
     """Energy per mass that XPIC removes from a point, and velocity not yet in the series."""
 
-    @staticmethod
-    def shape(kin: Any) -> int:
-        return 1 + kin.dimension
+    shape = numbers(1, 1)
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
@@ -28,9 +26,7 @@ class Reflected(StepField):
 class Series(SummedField):
     """Term of the series at a node, and the sum that becomes the next term."""
 
-    @staticmethod
-    def shape(kin: Any) -> int:
-        return 2 * kin.dimension
+    shape = numbers(0, 2)
 
 
 class XPIC(NamedTuple):

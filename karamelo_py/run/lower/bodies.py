@@ -5,16 +5,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from karamelo_py.compiler import address_of, address_of_python
+from karamelo_py.compiler.programs import BLOCK, EVALUATE, ROWS, STACK
 from karamelo_py.kernels import free_bodies as kernel
-from karamelo_py.kernels.arrays import Block
+from karamelo_py.kernels import rigid_motion as motion
+from karamelo_py.kernels.arrays import PROGRAM, Block
 from karamelo_py.kernels.contact import ListedPairs
 from karamelo_py.kernels.touching import CALL
 from karamelo_py.points.laws import can, constrained_velocity, is_rigid
+from karamelo_py.run.lower.hooks import NO_PROGRAM
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.script.formula import evaluate_in_table
 from karamelo_py.styles.fixes.rigid_body import (
     ContactRigidBody,
     RigidBody,
@@ -30,9 +33,8 @@ APART = 1e-3  # cells between a point and its place in a rigid body: round-off i
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
     moving = bodies_of(hub)
     _refuse(hub, moving)
-    fixed = np.zeros(
-        (sum(lattice.node_count for lattice in lattices), hub.domain.dimension), np.bool_
-    )
+    nodes = sum(lattice.node_count for lattice in lattices)
+    fixed = np.zeros((nodes, hub.domain.dimension), np.bool_)
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas) if fix.prescribes_velocity else ():
             if formula is not None:
@@ -41,23 +43,11 @@ def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
     return kind(tuple(_body(hub, fix, len(fixed)) for fix in moving), fixed)
 
 
-def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
+def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     separate = hub.update.method.fields_per_solid
     pairs = nodes if separate else 1
     capacity = (nodes if separate else count * max(1, len(surfaces_of(fix)))) + 1
-    programs, code, numbers = np.full((kernel.FORMULAS, 4), -1), [], [np.empty(0)]
-    lines = values = 0
-    for k, formula in enumerate(fix.formulas_of_body):
-        if formula is None:
-            continue
-        program = formula.program(hub.values) if not formula.is_constant else None
-        constants = np.array([formula.constant]) if program is None else program.constants
-        length = 0 if program is None else len(program.code)
-        programs[k] = lines, lines + length, values, values + len(constants)
-        code += [] if program is None else [program.code]
-        numbers.append(constants)
-        lines, values = lines + length, values + len(constants)
     soft = np.ones(count, np.bool_)
     for solid in hub.solids.values():
         if solid.rigid:
@@ -74,22 +64,39 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> kernel.FreeBody:
     )
     slots = fix.slots()
     if f"{LOADS[0]}_{fix.body.id}_x" in hub.values and not separate:
-        first = zip(slots_of_loads(hub, fix.body), (kernel.FORCE, kernel.ABOUT_ORIGIN), strict=True)
+        first = zip(
+            slots_of_loads(hub, fix.body), (motion.index_of("force"), motion.NUMBERS), strict=True
+        )
         slots = np.concatenate([slots, *([(a + k, b + k) for k in range(3)] for a, b in first)])
     ends = fix.body.first_id, fix.body.first_id + fix.body.count
-    return kernel.FreeBody(
+    return motion.FreeBody(
         field=hub.update.method.lattice_of(hub, fix.body), ids=np.array(ends), dofs=fix.dofs,
-        constants=fix.constants, state=fix.state, slots=slots,
-        evaluate=address_of(evaluate_in_table, EVALUATE), programs=programs,
-        code=np.concatenate([np.empty((0, 2), np.int64), *code]), numbers=np.concatenate(numbers),
-        scratch=np.zeros((STACK + ROWS + 1, BLOCK)), matrices=np.zeros((2, 6, 7)),
-        vectors=np.zeros((kernel.ROWS, 6)), lever=np.eye(3, 6),
-        contacts=np.empty((capacity, kernel.COLUMNS)),  # pages cost nothing until written
-        count=np.zeros(1, np.int64), which=np.empty((capacity, 3), np.int64),
-        pairs=ListedPairs(
-            np.empty((pairs, 2), np.int64), np.empty((pairs, d)), np.empty(pairs)
-        ),
+        constants=fix.constants, state=fix.state, numbers=fix.numbers, slots=slots,
+        formulas=_formulas(hub, fix), solution=motion.new_solution(),
+        contacts=motion.records(motion.CONTACT, capacity), count=np.zeros(1, np.int64),
+        pairs=ListedPairs(np.empty((pairs, 2), np.int64), np.empty((pairs, d)), np.empty(pairs)),
         surfaces=surfaces,
+    )  # fmt: skip
+
+
+def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
+    programs, code, numbers = motion.records(PROGRAM, motion.FORMULAS), [], [np.empty(0)]
+    programs[:] = NO_PROGRAM
+    lines = values = 0
+    for k, formula in enumerate(fix.formulas_of_body):
+        if formula is None:
+            continue
+        program = formula.program(hub.values) if not formula.is_constant else None
+        constants = np.array([formula.constant]) if program is None else program.constants
+        length = 0 if program is None else len(program.code)
+        programs[k] = lines, lines + length, values, values + len(constants)
+        code += [] if program is None else [program.code]
+        numbers.append(constants)
+        lines, values = lines + length, values + len(constants)
+    return motion.Formulas(
+        address_of(evaluate_in_table, EVALUATE), programs,
+        np.concatenate([np.empty((0, 2), np.int64), *code]), np.concatenate(numbers),
+        np.zeros((STACK + ROWS + 1, BLOCK)),
     )  # fmt: skip
 
 
@@ -146,7 +153,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
             raise _error(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
         if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
             raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
-        acts = fix.has_load or np.any(fix.state[kernel.V : kernel.L]) or surfaces_of(fix)
+        acts = fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix)
         if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
             raise _error(fix, f"nothing acts on the body '{body.id}': it stays at rest", hint)

@@ -19,7 +19,7 @@ from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
-from karamelo_py.kernels.table import Insulated
+from karamelo_py.kernels.table import Dry, Insulated
 from karamelo_py.language import registry
 from karamelo_py.language.rules import Feature, Restrictions, compare
 from karamelo_py.language.scene import Scene
@@ -239,10 +239,12 @@ def lower(
         for solids in solids_alike(hub, ids)
     )
     bodies = lower_bodies(hub, lattices) if fixes_of_bodies(hub) else NoBodies()
+    fluids = (solid.material.fluid for solid in hub.solids.values())
+    water = next((fluid.tag for fluid in fluids if fluid is not None), Dry())
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
         averaging=method.averaging(hub), contact=contact, bodies=bodies,
-        heat=heat, grids=grids, nodes=nodes,
+        heat=heat, water=water, grids=grids, nodes=nodes,
         buffers=tiles.empty_buffers(nodes, len(hub.solids)),
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import INTERPRETED, address_of, address_of_python
+from karamelo_py.compiler.programs import BLOCK, EVALUATE, ROWS, STACK
 from karamelo_py.compiler.threads import Serial
 from karamelo_py.kernels import arrays, called
 from karamelo_py.kernels.arrays import INITIAL_INTEGRATE, ON_VELOCITY, SUPPLY_HEAT, Setup, Tag
@@ -22,7 +23,7 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
-from karamelo_py.script.formula import BLOCK, EVALUATE, ROWS, STACK, evaluate_in_table
+from karamelo_py.script.formula import evaluate_in_table
 
 NO_PROGRAM = (-1, -1, -1, -1)
 

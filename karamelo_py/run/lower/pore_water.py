@@ -13,7 +13,6 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 
 UNDRAINED, DRAINED = 3e-4, 2.0  # c_v t / H^2
-ROWS = rows.AtWater  # registers the rows of such scenes
 RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
@@ -26,6 +25,8 @@ RESTRICTIONS = Restrictions(
 
 class PoreWater(NamedTuple):
     restrictions = RESTRICTIONS
+    tag = rows.Water()
+    point_fields, node_fields = rows.Water.point_fields, rows.Water.node_fields
 
     n: float
     drag: float

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from karamelo_py.kernels import free_bodies as kernel
+from karamelo_py.kernels import rigid_motion as kernel
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.language.arguments import NULL
 from karamelo_py.language.rules import Restrictions, known_failure
@@ -21,7 +21,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.tools.base import begin_behind
 
-COLUMNS = kernel.X, kernel.ANGLE, kernel.V, kernel.W, kernel.FORCE, kernel.TORQUE
+FIELDS = {"": "x", "r": "angle", "v": "v", "w": "spin", "f": "force", "t": "torque"}
 WAYS = "x", "y", "z", "rx", "ry", "rz"
 NOT_ROUND = 1e-9  # relative tolerance of moments of inertia
 
@@ -46,6 +46,10 @@ class Components:
                 expected="numbers", hint="motion and turning take formulas of time",
             )  # fmt: skip
         return [float(item.constant) for item in self.items if item is not None]
+
+
+def _wrong(argument: Argument, message: str, expected: str) -> ScriptError:
+    return ScriptError(message, mark=argument.mark, expected=expected)
 
 
 class RigidBody(Fix):
@@ -152,10 +156,9 @@ class RigidBody(Fix):
                 hint=f"material({solid.material.id}, rigid, density)",
             )
         if kin.hoops and d == 1:
-            raise ScriptError(
-                f"a rigid body cannot move in a {kin.word} domain", argument="solid",
-                expected="a domain in 1D, 2D or 3D, or axisymmetric",
-            )  # fmt: skip
+            expected = "a domain in 1D, 2D or 3D, or axisymmetric"
+            message = f"a rigid body cannot move in a {kin.word} domain"
+            raise ScriptError(message, argument="solid", expected=expected)
         spins = {1: (), 2: (5,), 3: (3, 4, 5)}[d] if not kin.hoops else ()
         moves = tuple(range(d)) if not kin.hoops else (1,)
         self.ways = (*moves, *spins)
@@ -169,17 +172,20 @@ class RigidBody(Fix):
         loads = self._spread(force, range(d)) + self._spread(torque, spins, 3)
         self.formulas_of_body = (*self.led, *loads, *self._spread(gravity, range(d)))
         start = self._spread(velocity, range(d)) + self._spread(spin, spins, 3)
-        self.constants = np.zeros(kernel.CONSTANTS)
+        self.constants = kernel.records(kernel.CONSTANTS)
         self._weigh(solid, mass, None if inertia is None else inertia)
-        self.state = np.zeros(kernel.STATE)
-        self.state[kernel.X : kernel.X + 3] = self.constants[kernel.START : kernel.START + 3]
-        self.state[kernel.Q] = 1
-        kernel.set_matrix(self.state)
+        self.state = kernel.records(kernel.STATE)
+        self.numbers = self.state.view(np.float64).view(np.ndarray)
+        state, velocities = self.state[0], np.zeros(6)
+        state.x[:] = self.constants.start
+        state.q[0] = 1
+        kernel.set_matrix(state)
         for k, item in enumerate(start):
             if item is not None:
-                self.state[kernel.V + k] = item.evaluate(hub.values)
+                velocities[k] = item.evaluate(hub.values)
             elif self.led[k] is not None and not hub.rehearsing:
-                self.state[kernel.V + k] = self.led[k].evaluate(hub.values)
+                velocities[k] = self.led[k].evaluate(hub.values)
+        state.v[:], state.spin[:] = velocities[:3], velocities[3:]
         self._spin_up()
         self.published = tuple(name for name in self.published if self._has(name, d))
         self.has_load = any(item is not None for item in self.formulas_of_body)
@@ -188,11 +194,11 @@ class RigidBody(Fix):
 
     @property
     def memory(self) -> np.ndarray:
-        return self.state
+        return self.numbers
 
     @memory.setter
-    def memory(self, state: np.ndarray) -> None:
-        self.state[:] = state
+    def memory(self, numbers: np.ndarray) -> None:
+        self.numbers[:] = numbers
 
     def defined(self) -> None:
         before = self.previous
@@ -214,17 +220,18 @@ class RigidBody(Fix):
                 "replaces it, and the body continues",
             )
         if before is not None and before.pivot != self.pivot:
+            expected = "the same pivot, or none in both"
             raise ScriptError(
-                f"fix '{self.id}' had another pivot", mark=self.mark,
-                expected="the same pivot, or none in both",
-            )  # fmt: skip
+                f"fix '{self.id}' had another pivot", mark=self.mark, expected=expected
+            )
         if before is not None:
             kept, self.previous = before.state.copy(), None
-            for is_set, at in zip(self.is_initial, (kernel.V, kernel.W), strict=True):
-                if is_set:
-                    kept[at : at + 3] = self.state[at : at + 3]
+            if self.is_initial[0]:
+                kept.v = self.state.v
+            if self.is_initial[1]:
+                kept.spin = self.state.spin
             if not self.hub.update.step:  # its points may have been moved
-                kept[kernel.X : kernel.X + 3] = self.state[kernel.X : kernel.X + 3]
+                kept.x = self.state.x
             self.state[:] = kept
             self._spin_up()
         others = [s.id for s in self.hub.solids.values() if s.rigid and s is not self.body]
@@ -234,17 +241,16 @@ class RigidBody(Fix):
                 hint="one of two that may meet deforms: neo-hookean, stiffer than the rest",
             )
         for slot, column in self.slots():
-            self.hub.values.array[slot] = self.state[column]
+            self.hub.values.array[slot] = self.numbers[column]
 
     def rigid_positions(self) -> np.ndarray:
         d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
         arm[:, :d] = self.body.x0
-        arm -= self.constants[kernel.START : kernel.START + 3]
-        R = self.state[kernel.R : kernel.R + 9].reshape(3, 3)
-        return (self.state[kernel.X : kernel.X + 3] + arm @ R.T)[:, :d]
+        arm -= self.constants.start
+        return (self.state.x + arm @ self.state[0].R.T)[:, :d]
 
     def refresh(self) -> None:
-        failed = int(self.state[kernel.FAILED])
+        failed = int(self.state[0].failed)
         if failed > self.reported:
             self.reported = 2 * failed
             self.hub.warn(
@@ -254,8 +260,10 @@ class RigidBody(Fix):
             )
 
     def slots(self) -> np.ndarray:
-        columns = dict(zip(("", "r", "v", "w", "f", "t"), COLUMNS, strict=True))
-        names = [(name, columns[name[:-1]] + "xyz".index(name[-1])) for name in self.published]
+        names = [
+            (name, kernel.index_of(FIELDS[name[:-1]]) + "xyz".index(name[-1]))
+            for name in self.published
+        ]
         return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])
 
     def _has(self, name: str, d: int) -> bool:
@@ -270,40 +278,30 @@ class RigidBody(Fix):
         if components is None:
             return items
         if len(components.items) != len(ways):
-            noun = "formulas" if len(ways) != 1 else "formula"
-            raise ScriptError(
-                f"{len(components.items)} components", mark=components.argument.mark,
-                expected=f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here",
-            )  # fmt: skip
-        for way, item, token in zip(
-            ways, components.items, components.argument.listed(), strict=True
-        ):
+            what = "formulas" if len(ways) != 1 else "formula"
+            expected = f"{len(ways)} {what}" if ways else "nothing: it does not rotate here"
+            raise _wrong(components.argument, f"{len(components.items)} components", expected)
+        parts = components.argument.listed()
+        for way, item, part in zip(ways, components.items, parts, strict=True):
             items[way % 3] = item
             if item is None:
                 continue
             item.evaluate(self.hub.values)
             if way not in self.ways and not (item.is_constant and float(item.constant) == 0):
-                raise ScriptError(
-                    f"the body moves along the axis only, not along {WAYS[way]}", mark=token.mark,
-                    expected="0",
-                )  # fmt: skip
+                message = f"the body moves along the axis only, not along {WAYS[way]}"
+                raise _wrong(part, message, "0")
         return items
 
     def _hold(self, fixed: Argument | None) -> None:
-        directions = [WAYS[k] for k in self.ways]
-        for token in fixed.listed() if fixed else ():
-            name = token.text
-            if name not in directions:
-                raise ScriptError(
-                    f"the body has no direction '{name}'", mark=token.mark,
-                    expected="some of " + ", ".join(directions),
-                )  # fmt: skip
+        known = [WAYS[k] for k in self.ways]
+        for part in fixed.listed() if fixed else ():
+            name = part.text
+            if name not in known:
+                expected = "some of " + ", ".join(known)
+                raise _wrong(part, f"the body has no direction '{name}'", expected)
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
-                raise ScriptError(
-                    f"{name} is fixed, and {word} prescribes it", mark=token.mark,
-                    expected="one of the two",
-                )  # fmt: skip
+                raise _wrong(part, f"{name} is fixed, and {word} prescribes it", "one of the two")
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
@@ -311,18 +309,15 @@ class RigidBody(Fix):
         if pivot is None:
             return []
         if max(self.ways) < 3:
-            raise ScriptError(
-                "a body that does not rotate has no pivot", mark=pivot.argument.mark,
-                expected="fixed=(...), or a domain in 2D or 3D",
-            )  # fmt: skip
+            message = "a body that does not rotate has no pivot"
+            raise _wrong(pivot.argument, message, "fixed=(...), or a domain in 2D or 3D")
         d = self.hub.domain.dimension
         position = self._spread(pivot, range(d)) if pivot.numbers() else []
         if velocity is not None or any(self.led[k] is not None for k in range(d)):
-            raise ScriptError(
-                "the pivot holds the body, and velocity, motion or fixed moves or holds it too",
-                mark=pivot.argument.mark,
-                expected="spin=..., turning=... or fixed=(rx, ...)",
+            message = (
+                "the pivot holds the body, and velocity, motion or fixed moves or holds it too"
             )
+            raise _wrong(pivot.argument, message, "spin=..., turning=... or fixed=(rx, ...)")
         self.led[:d] = [Expression(0.0)] * d
         return [0.0 if item is None else float(item.constant) for item in position]
 
@@ -343,54 +338,45 @@ class RigidBody(Fix):
         if mass is not None:
             tensor *= mass / total
             total = mass
-        c = self.constants
-        c[kernel.OF_MASS], c[kernel.START : kernel.START + 3] = total, centre
-        c[kernel.BOUND] = np.sqrt((arm**2).sum(axis=1).max(initial=0)) + side.max(initial=0)
+        c = self.constants[0]
+        c.mass, c.start[:] = total, centre
+        c.bound = np.sqrt((arm**2).sum(axis=1).max(initial=0)) + side.max(initial=0)
         if inertia is not None:
             numbers = inertia.numbers()
             wanted = {2: 1, 3: 3}.get(d, 0) * bool(len(self.ways) > d)
             if len(numbers) != wanted:
-                raise ScriptError(
-                    f"{len(numbers)} moments of inertia", mark=inertia.argument.mark,
-                    expected=f"{wanted} in {d}D" if wanted else "none: it does not rotate here",
-                )  # fmt: skip
+                expected = f"{wanted} in {d}D" if wanted else "none: it does not rotate here"
+                raise _wrong(inertia.argument, f"{len(numbers)} moments of inertia", expected)
             tensor = np.diag(numbers if d == 3 else [1.0, 1.0, numbers[0]])
             moments = np.array(numbers)
             if moments.min() <= 0 or (
                 d == 3 and 2 * moments.max() > moments.sum() * (1 + NOT_ROUND)
             ):
-                raise ScriptError(
-                    f"no body has the moments of inertia {inertia.argument.text}",
-                    mark=inertia.argument.mark,
-                    expected="moments above 0, each at most the sum of the other two",
-                )
+                message = f"no body has the moments of inertia {inertia.argument.text}"
+                expected = "moments above 0, each at most the sum of the other two"
+                raise _wrong(inertia.argument, message, expected)
         if self.pivot:
-            c[kernel.START : kernel.START + 3] = self.pivot
-            c[kernel.OFFSET : kernel.OFFSET + 3] = away = centre - self.pivot
-            c[kernel.BOUND] += np.linalg.norm(away)
+            c.start[:], away = self.pivot, centre - self.pivot
+            c.offset[:] = away
+            c.bound += np.linalg.norm(away)
             tensor = tensor + total * (away @ away * np.eye(3) - np.outer(away, away))
         if d < 3:
-            moments, axes = (
-                np.array([1.0, 1.0, tensor[2, 2] if d == 2 and not kin.hoops else 1.0]),
-                np.eye(3),
-            )
+            about_z = tensor[2, 2] if d == 2 and not kin.hoops else 1.0
+            moments, axes = np.array([1.0, 1.0, about_z]), np.eye(3)
         else:
             moments, axes = principal(tensor)
-        c[kernel.INERTIA : kernel.INERTIA + 3] = moments
-        c[kernel.AXES : kernel.AXES + 9] = axes.ravel()
+        c.inertia[:], c.axes[:] = moments, axes
 
     def _spin_up(self) -> None:
-        R = self.state[kernel.R : kernel.R + 9].reshape(3, 3)
-        axes = R @ self.constants[kernel.AXES : kernel.AXES + 9].reshape(3, 3)
-        spin = self.state[kernel.W : kernel.W + 3]
-        moments = self.constants[kernel.INERTIA : kernel.INERTIA + 3]
-        self.state[kernel.L : kernel.L + 3] = axes @ (moments * (axes.T @ spin))
+        state, constants = self.state[0], self.constants[0]
+        axes = state.R @ constants.axes
+        state.momentum[:] = axes @ (constants.inertia * (axes.T @ state.spin))
 
     def _begin_points(self, solid: Solid) -> None:
         d, arm = self.hub.domain.dimension, np.zeros((solid.count, 3))
         arm[:, :d] = solid.x0
-        arm -= self.constants[kernel.START : kernel.START + 3]
-        v = self.state[kernel.V : kernel.V + 3] + np.cross(self.state[kernel.W : kernel.W + 3], arm)
+        arm -= self.constants.start
+        v = self.state.v + np.cross(self.state.spin, arm)
         if np.isfinite(v).all():
             solid.initial |= {f"v{axis}": v[:, k].copy() for k, axis in enumerate("xyz"[:d])}
 
@@ -457,15 +443,11 @@ class ContactRigidBody(Fix):
         judge_friction(hub, mu)
         self.mu, self.body, self.region = mu, solid, region or solid.region
         if group.touches(solid) and not group.all:
-            raise ScriptError(
-                f"the group has points of the body '{solid.id}'", argument="group",
-                expected="points of other solids",
-            )  # fmt: skip
+            message = f"the group has points of the body '{solid.id}'"
+            raise ScriptError(message, argument="group", expected="points of other solids")
         if self.region is None:
-            raise ScriptError(
-                f"solid '{solid.id}' fills no region", argument="solid",
-                expected="the region of its surface: region=ID",
-            )  # fmt: skip
+            message, expected = f"solid '{solid.id}' fills no region", "its surface: region=ID"
+            raise ScriptError(message, argument="solid", expected=expected)
         if self.region.flat or self.region.outline() is None:
             raise ScriptError(
                 f"region '{self.region.id}' has no surface that the program can follow",

@@ -1,0 +1,536 @@
+"""Motion of free rigid bodies, and the impulses of their contacts.
+
+A body is its mass, inertia, position, rotation, momentum and surface. A contact is a position x
+with a mass m and velocity v* of the other body, a normal n out of the rigid one, and a gap g. With
+the velocity U = (V, w) of the rigid body at the end of the step, A U = V + w x (x - X), its impulse
+is known in closed form::
+
+    p_n = s m max(n . (A U - v*) - g / dt, 0)
+    p_t = m (A U - v*)_t, but at most mu p_n
+
+so the body's equations alone remain, M (U - U*) + sum A^T p = 0, six at most, solved by Newton's
+method: the mass of what it touches does not limit the step. Contact at points has s = 0.1 (dt /
+dt0)^2 with the whole step dt0: an implicit spring, as stiff in shortened steps. Contact at nodes
+has s = 1.
+
+Forces act over `kick`, motion over dt. Between the forces the angular momentum is constant, and the
+body rotates about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma &
+Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar system"): the energy of a
+free top oscillates by O(dt^2) and does not drift.
+"""
+
+from math import atan2, cos, sin, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler import noinline
+from karamelo_py.compiler.programs import call_evaluate
+from karamelo_py.kernels.arrays import DT
+from karamelo_py.kernels.contact import ListedPairs
+
+_NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
+# Vectors have three components in any dimension. The layout is that of restart files.
+STATE = np.dtype([
+    ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # of the centre
+    ("momentum", *_VECTOR),  # angular
+    ("q", np.float64, 4),  # rotation since the start, a quaternion
+    ("angle", *_VECTOR),  # the same about each axis in 2D; a vector along the axis in 3D
+    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step, about the centre
+    ("R", *_MATRIX),  # rotation matrix of q
+    ("move", *_VECTOR),  # displacement of the centre in this step, over dt
+    ("spread", *_MATRIX),  # of other points: (rotation in this step - 1) / dt
+    ("passes", *_NUMBER),  # of Newton's method, in this step
+    ("failed", *_NUMBER),  # steps without a solution
+])  # fmt: skip
+NUMBERS = STATE.itemsize // 8  # and above: the torque of contact about the origin, for `slots`
+CONSTANTS = np.dtype([
+    ("mass", *_NUMBER), ("inertia", *_VECTOR),  # principal moments
+    ("axes", *_MATRIX),  # principal axes, by columns
+    ("start", *_VECTOR),
+    ("bound", *_NUMBER),  # largest distance of its points from x
+    ("speed", *_NUMBER),  # of a point of the body at most, in this step
+    ("offset", *_VECTOR),  # of the centre of mass from x, in the frame of the start
+])  # fmt: skip
+CONTACT = np.dtype([
+    ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
+    ("mass", *_NUMBER), ("v", *_VECTOR),  # of the other body
+    ("mu", *_NUMBER), ("share", *_NUMBER),  # s
+    ("impulse", *_VECTOR),
+    # In the last pass:
+    ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
+    ("most", *_NUMBER),  # bound of friction
+    ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point, and of its force
+])  # fmt: skip
+PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
+SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the square of the residual at the start
+# Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
+LED, LOADED, FALLS, FORMULAS = 0, 6, 12, 15
+
+
+class Formulas(NamedTuple):
+    evaluate: int  # address of the evaluator
+    programs: np.ndarray  # (FORMULAS,) arrays.PROGRAM; begin -1: none
+    code: np.ndarray
+    numbers: np.ndarray
+    scratch: np.ndarray
+
+
+class Solution(NamedTuple):
+    """Work arrays of a step, (6,): three components of motion, then of rotation."""
+
+    momentum: np.ndarray  # without contact
+    u: np.ndarray  # velocities
+    trial: np.ndarray
+    residual: np.ndarray
+    trial_residual: np.ndarray
+    total: np.ndarray  # of impulses
+    after: np.ndarray  # momentum, with contact
+    before: np.ndarray  # centre before the step, (3,)
+    mass: np.ndarray  # (6, 6)
+    slope: np.ndarray  # (6, 7), with the right-hand side
+    lever: np.ndarray  # (3, 6): A; its first half is the unit matrix
+
+
+class FreeBody(NamedTuple):
+    field: int  # its velocity field, for contact at nodes
+    ids: np.ndarray  # (2,) first id of its points, and the end
+    dofs: np.ndarray  # (6,) int64: 1 if it moves freely, 0 if prescribed
+    constants: np.ndarray  # (1,) CONSTANTS
+    state: np.ndarray  # (1,) STATE
+    numbers: np.ndarray  # (NUMBERS,): the state again
+    slots: np.ndarray  # (k, 2) slots of published values, and their indices in `numbers`
+    formulas: Formulas
+    solution: Solution
+    contacts: np.ndarray  # (n,) CONTACT
+    count: np.ndarray  # (1,) int64: number of contacts
+    pairs: ListedPairs  # scratch, of contact at nodes
+    surfaces: tuple  # of `kernels.free_bodies.TouchingSurface`
+
+
+def index_of(field: str) -> int:
+    """Return the index of a field of STATE in `FreeBody.numbers`."""
+    return STATE.fields[field][1] // 8  # type: ignore[index]
+
+
+def new_solution() -> Solution:
+    arrays = [np.zeros(6) for _ in range(7)]
+    return Solution(*arrays, np.zeros(3), np.zeros((6, 6)), np.zeros((6, 7)), np.eye(3, 6))
+
+
+def records(kind: np.dtype, count: int = 1) -> Any:
+    return np.zeros(count, kind).view(np.recarray)
+
+
+# --- rotation ---------------------------------------------------------------------------------
+
+
+@noinline
+def _turn_about(state, axis, angle):
+    """Rotate by `angle` about a principal axis (3,), in the frame of the start."""
+    q, c, s = state.q, cos(0.5 * angle), sin(0.5 * angle)
+    a, b, d, e = q[0], q[1], q[2], q[3]
+    x, y, z = s * axis[0], s * axis[1], s * axis[2]
+    a, b, d, e = (
+        a * c - b * x - d * y - e * z,
+        a * x + b * c + d * z - e * y,
+        a * y - b * z + d * c + e * x,
+        a * z + b * y - d * x + e * c,
+    )
+    size = 1.0 / sqrt(a * a + b * b + d * d + e * e)
+    q[0], q[1], q[2], q[3] = size * a, size * b, size * d, size * e
+    set_matrix(state)
+
+
+@noinline
+def set_matrix(state):
+    """Set R from q."""
+    q, R = state.q, state.R
+    a, b, c, d = q[0], q[1], q[2], q[3]
+    R[0, 0] = 1 - 2 * (c * c + d * d)
+    R[0, 1] = 2 * (b * c - a * d)
+    R[0, 2] = 2 * (b * d + a * c)
+    R[1, 0] = 2 * (b * c + a * d)
+    R[1, 1] = 1 - 2 * (b * b + d * d)
+    R[1, 2] = 2 * (c * d - a * b)
+    R[2, 0] = 2 * (b * d - a * c)
+    R[2, 1] = 2 * (c * d + a * b)
+    R[2, 2] = 1 - 2 * (b * b + c * c)
+
+
+@noinline
+def _axis(constants, k):
+    return constants.axes[0, k], constants.axes[1, k], constants.axes[2, k]
+
+
+@noinline
+def _along_axis(body, k):
+    """Angular momentum about the `k`-th principal axis."""
+    state, (a, b, c), total = body.state[0], _axis(body.constants[0], k), 0.0
+    R, L = state.R, state.momentum
+    for i in range(3):
+        total += L[i] * (R[i, 0] * a + R[i, 1] * b + R[i, 2] * c)
+    return total
+
+
+@noinline
+def _drift_about(body, k, dt):
+    angle = dt * _along_axis(body, k) / body.constants[0].inertia[k]
+    _turn_about(body.state[0], _axis(body.constants[0], k), angle)
+
+
+@noinline
+def _set_spin(body):
+    """Set the spin from the angular momentum, after a rotation."""
+    state, constants = body.state[0], body.constants[0]
+    state.spin[:] = 0.0
+    for k in range(3):
+        axis, spin = from_start(state, _axis(constants, k)), _along_axis(body, k)
+        for i in range(3):
+            state.spin[i] += axis[i] * spin / constants.inertia[k]
+
+
+@noinline
+def _turn_by_spin(body, dt):
+    """Rotate by the spin of the step: of a body whose rotation is prescribed in part."""
+    state = body.state[0]
+    w = state.spin
+    size = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
+    if size > 0:
+        axis = to_start(state, (w[0] / size, w[1] / size, w[2] / size))
+        _turn_about(state, axis, size * dt)
+
+
+@noinline
+def to_start(state, a):
+    """Rotate a vector back to the frame of the start."""
+    R, (x, y, z) = state.R, a
+    return (
+        R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
+        R[0, 1] * x + R[1, 1] * y + R[2, 1] * z,
+        R[0, 2] * x + R[1, 2] * y + R[2, 2] * z,
+    )
+
+
+@noinline
+def from_start(state, a):
+    R, (x, y, z) = state.R, a
+    return (
+        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
+        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
+        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
+    )
+
+
+@noinline
+def set_mass(body):
+    """Put the mass and the inertia about the present axes into the mass matrix."""
+    M, state, constants = body.solution.mass, body.state[0], body.constants[0]
+    M[:] = 0.0
+    for a in range(3):
+        M[a, a] = constants.mass
+    for k in range(3):
+        axis = from_start(state, _axis(constants, k))
+        for a in range(3):
+            for b in range(3):
+                M[3 + a, 3 + b] += constants.inertia[k] * axis[a] * axis[b]
+
+
+# --- Newton's method --------------------------------------------------------------------------
+
+
+@noinline
+def set_lever(body, x):
+    """Set the matrix A (3, 6) of a position: the velocity of the body there is A U."""
+    A, centre = body.solution.lever, body.state[0].x
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        A[k, 3 + i], A[k, 3 + j] = x[j] - centre[j], centre[i] - x[i]
+
+
+@noinline
+def velocity_there(body, u, k):
+    """Component `k` of A U."""
+    v = 0.0
+    for a in range(6):
+        v += body.solution.lever[k, a] * u[a]
+    return v
+
+
+@noinline
+def _set_impulse(body, u, i, dt, bounded):
+    """Set the impulse of contact `i` at the velocities `u`.
+
+    With `bounded`, friction is limited by the normal impulse of an earlier pass.
+    """
+    c = body.contacts[i]
+    slip, normal = c.slip, c.normal
+    set_lever(body, c.at)
+    along = square = 0.0
+    for k in range(3):
+        slip[k] = velocity_there(body, u, k) - c.v[k]
+        along += normal[k] * slip[k]
+    c.push = c.share * c.mass * max(along - c.gap / dt, 0.0)
+    for k in range(3):
+        slip[k] -= along * normal[k]
+        square += slip[k] ** 2
+    c.speed, c.rub, most = sqrt(square), 0.0, c.most if bounded else c.mu * c.push
+    if c.push > 0 and square > 0:
+        c.rub = min(c.mass, most / c.speed)
+    for k in range(3):
+        c.impulse[k] = c.push * normal[k] + c.rub * slip[k]
+
+
+@noinline
+def _residual(body, dt, u, rest, bounded):
+    """Put M U - P + sum A^T p into `rest`; return its square, in units of energy."""
+    work = body.solution
+    M, total, square = work.mass, work.total, 0.0
+    total[:] = 0.0
+    for i in range(body.count[0]):
+        _set_impulse(body, u, i, dt, bounded)
+        for k in range(3):
+            for a in range(6):
+                total[a] += work.lever[k, a] * body.contacts[i].impulse[k]
+    for a in range(6):
+        rest[a] = total[a] - work.momentum[a]
+        for b in range(6):
+            rest[a] += M[a, b] * u[b]
+        if body.dofs[a]:
+            square += rest[a] * rest[a] / M[a, a]
+    return square
+
+
+@noinline
+def _add_slope(body, i, bounded):
+    """Add A^T (dp/dr) A of contact `i`, whose impulse is known, to the slope."""
+    c, A, J = body.contacts[i], body.solution.lever, body.solution.slope
+    if not c.push > 0:
+        return
+    set_lever(body, c.at)
+    stiff, slips = c.share * c.mass, 0.0 < c.rub < c.mass
+    for k in range(3):
+        for j in range(3):
+            along = c.normal[k] * c.normal[j]
+            part = stiff * along + c.rub * ((1.0 if k == j else 0.0) - along)
+            if slips:
+                way = c.slip[k] / c.speed
+                part -= c.rub * way * c.slip[j] / c.speed
+                part += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
+            for a in range(6):
+                for b in range(6):
+                    J[a, b] += part * A[k, a] * A[j, b]
+
+
+@noinline
+def _solve_system(J):
+    """Solve J (6, 7) by elimination with pivots; the result replaces the last column."""
+    for k in range(6):
+        best = k
+        for a in range(k + 1, 6):
+            if abs(J[a, k]) > abs(J[best, k]):
+                best = a
+        for b in range(7):
+            J[k, b], J[best, b] = J[best, b], J[k, b]
+        for a in range(k + 1, 6):
+            part = J[a, k] / J[k, k]
+            for b in range(k, 7):
+                J[a, b] -= part * J[k, b]
+    for back in range(6):
+        k = 5 - back
+        for b in range(k + 1, 6):
+            J[k, 6] -= J[k, b] * J[b, 6]
+        J[k, 6] /= J[k, k]
+
+
+@noinline
+def _iterate(body, dt, bounded):
+    """Newton's method with halved steps; return whether it has converged."""
+    work = body.solution
+    M, J, energy = work.mass, work.slope, 0.0
+    size = _residual(body, dt, work.u, work.residual, bounded)
+    for a in range(6):
+        energy += work.momentum[a] ** 2 / M[a, a]
+    scale = max(size, GOOD_ENOUGH * energy)
+    for _ in range(PASSES_AT_MOST):
+        if size <= SOLVED * scale:
+            return True
+        body.state[0].passes += 1
+        J[:, :6], J[:, 6] = M, work.residual
+        for i in range(body.count[0]):
+            _add_slope(body, i, bounded)
+        for a in range(6):
+            if not body.dofs[a]:
+                for b in range(6):
+                    J[a, b] = J[b, a] = 0.0
+                J[a, a], J[a, 6] = 1.0, 0.0
+        _solve_system(J)
+        part, better, now = 1.0, False, size
+        for _ in range(HALVINGS):
+            for a in range(6):
+                work.trial[a] = work.u[a] - part * J[a, 6]
+            now = _residual(body, dt, work.trial, work.trial_residual, bounded)
+            if now < size:
+                better = True
+                break
+            part *= 0.5
+        if not better:
+            _residual(body, dt, work.u, work.residual, bounded)
+            return size <= GOOD_ENOUGH * scale
+        work.u[:], work.residual[:] = work.trial, work.trial_residual
+        size = now
+    return False
+
+
+@noinline
+def solve(body, dt):
+    """Find the velocities at the end of the step and the impulses."""
+    state = body.state[0]
+    state.passes = 0
+    if _iterate(body, dt, False):
+        return
+    # Bounds of friction from the last normal impulses: convex, so Newton's method converges.
+    for _ in range(BOUNDS_AT_MOST):
+        change = largest = 0.0
+        for i in range(body.count[0]):
+            c = body.contacts[i]
+            bound = c.mu * c.push
+            change, largest = max(change, abs(bound - c.most)), max(largest, bound)
+            c.most = bound
+        if change <= 1e-10 * largest:
+            return
+        _iterate(body, dt, True)
+    state.failed += 1
+
+
+# --- a step -----------------------------------------------------------------------------------
+
+
+@noinline
+def _value(body, values, k):
+    """Return the value of formula `k` of a body now; 0 if there is none."""
+    evaluate, programs, code, numbers, scratch = body.formulas
+    program = programs[k]
+    if program.begin < 0:
+        return 0.0
+    if program.begin == program.end:
+        return numbers[program.first]
+    call_evaluate(
+        evaluate, code, numbers, values, scratch,
+        program.begin, program.end, program.first, program.last, 1, 6,
+    )  # fmt: skip
+    return scratch[6, 0]
+
+
+@noinline
+def start_step(body, control):
+    """Find momentum and velocities without contact."""
+    state, work, constants = body.state[0], body.solution, body.constants[0]
+    kick, values, mass = control.step[0].kick, control.values, constants.mass
+    set_mass(body)
+    c, load = constants.offset, work.after
+    arm = from_start(state, (c[0], c[1], c[2]))
+    for k in range(3):
+        load[k] = _value(body, values, LOADED + k) + mass * _value(body, values, FALLS + k)
+        moment = _value(body, values, LOADED + 3 + k)
+        work.momentum[3 + k] = state.momentum[k] + kick * moment
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        work.momentum[k] = mass * state.v[k] + kick * load[k]
+        work.momentum[3 + k] += kick * (arm[i] * load[j] - arm[j] * load[i])
+    for a in range(6):
+        work.u[a] = 0.0 if body.dofs[a] else _value(body, values, LED + a)
+    _velocities_of(body, work.momentum)
+    u = work.u
+    speed = sqrt(u[3] ** 2 + u[4] ** 2 + u[5] ** 2) * constants.bound
+    constants.speed = sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2) + speed
+
+
+@noinline
+def _velocities_of(body, momentum):
+    """Solve M U = P for the free components of U; the others are given."""
+    work = body.solution
+    M, J = work.mass, work.slope
+    for a in range(6):
+        for b in range(6):
+            J[a, b] = M[a, b] if body.dofs[a] else (1.0 if a == b else 0.0)
+        J[a, 6] = momentum[a] if body.dofs[a] else work.u[a]
+    _solve_system(J)
+    work.u[:] = J[:, 6]
+
+
+@noinline
+def finish_step(body, control, dimension):
+    """Take the momentum that contact leaves, move the body, and publish.
+
+    `Solution.total`: impulses of the body on others, about its centre. Returns their product with
+    the change of its velocity.
+    """
+    state, work, values = body.state[0], body.solution, control.values
+    kick, dt, total = control.step[0].kick, values[DT], work.total
+    for k in range(3):
+        state.force[k], state.torque[k] = -total[k] / kick, -total[3 + k] / kick
+    for a in range(6):
+        work.after[a] = work.momentum[a] - total[a]
+    _velocities_of(body, work.after)
+    u, M, old, partly, change = work.u, work.mass, work.slope, False, 0.0
+    for k in range(3):
+        change += total[k] * (u[k] - state.v[k]) + total[3 + k] * (u[3 + k] - state.spin[k])
+        state.v[k], state.spin[k] = u[k], u[3 + k]
+        state.move[k] = u[k]
+        state.momentum[k] = M[3 + k, 3] * u[3] + M[3 + k, 4] * u[4] + M[3 + k, 5] * u[5]
+        partly = partly or not body.dofs[3 + k]
+    old[:3, :3] = state.R
+    if partly:
+        _turn_by_spin(body, dt)
+    else:
+        _drift_about(body, 0, 0.5 * dt)
+        _drift_about(body, 1, 0.5 * dt)
+        _drift_about(body, 2, dt)
+        _drift_about(body, 1, 0.5 * dt)
+        _drift_about(body, 0, 0.5 * dt)
+        _set_spin(body)
+    for a in range(3):
+        for b in range(3):
+            part = 0.0
+            for c in range(3):
+                part += state.R[a, c] * old[b, c]
+            state.spread[a, b] = (part - (1.0 if a == b else 0.0)) / dt
+        work.before[a] = state.x[a]
+        state.x[a] += dt * u[a]
+    _set_angle(state, dt, dimension)
+    for k in range(body.slots.shape[0]):
+        column = body.slots[k, 1]
+        about = _about_origin(body, column - NUMBERS) if column >= NUMBERS else body.numbers[column]
+        values[body.slots[k, 0]] = about
+    return change
+
+
+@noinline
+def kinetic_energy(body):
+    """Kinetic energy, with the mass matrix at the start of this step."""
+    u, M, energy = body.solution.u, body.solution.mass, 0.0
+    for a in range(6):
+        for b in range(6):
+            energy += 0.5 * u[a] * M[a, b] * u[b]
+    return energy
+
+
+@noinline
+def _set_angle(state, dt, dimension):
+    if dimension < 3:
+        state.angle[2] += dt * state.spin[2]
+        return
+    q = state.q
+    sign = 1.0 if q[0] >= 0 else -1.0
+    size = sqrt(q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    angle = 2.0 * atan2(size, sign * q[0])
+    for k in range(3):
+        state.angle[k] = sign * q[1 + k] * (angle / size if size > 0 else 2.0)
+
+
+@noinline
+def _about_origin(body, k):
+    """Torque of contact about the origin, from the centre before this step."""
+    state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
+    return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]
