@@ -24,9 +24,10 @@ def beam(E):
 
 def compare(run, axes, full):
     """At rest and in motion."""
-    stiff = run(E=1e9, calm=0.8, T=0.03).log
-    rest = stiff.ux[stiff.Time > 0.024].mean()
-    yield Row("end of a stiff gate (mm)", beam(1e9), rest, 0.25, "Euler & Bernoulli, Timoshenko")
+    stiff = run(E=1e9, calm=0.8, T=0.12).log
+    rest = stiff.ux[stiff.Time > 0.096].mean()
+    # Two cells across its thickness are too stiff.
+    yield Row("end of a stiff gate (mm)", beam(1e9), rest, 0.12, "Euler & Bernoulli, Timoshenko")
     result = run()
     log = result.log
     most = log.ux.argmax()

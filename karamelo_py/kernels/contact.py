@@ -15,12 +15,13 @@ measured from the mean positions of each body's points around a node
 step. Convex bodies are apart if they are apart along one direction: the grid axes are tried too,
 since normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or granular material, whose points would
-slowly sink into a wall. So where contact with a body of prescribed velocity acted in the last step,
-bodies may separate but not approach. For bodies that hold no shape this lasts 100 steps, as their
-points leave a wall for some steps at a time, and includes nodes that a moving wall reaches. Such a
-wall may be one cell thick and have corners that other bodies fill: only its faces towards the other
-body count, and none in a hollow corner may be entered.
+The mean position is not the lowest point of a liquid or granular material: points would sink into a
+wall, a little for each gap that it seems to leave. So bodies that hold no shape may leave a wall,
+but not approach it, for 100 steps after a contact, as their points leave it for some steps at a
+time; contact at nodes that a moving wall comes from counts too. (An elastic disk that may not
+approach either takes 4 % less force: Hertz.) A wall is a body of prescribed velocity. It may be one
+cell thick and have corners that other bodies fill: only its faces towards the other body count, and
+none in a hollow corner may be entered.
 """
 
 from math import sqrt
@@ -80,7 +81,7 @@ class SeparateFields(NamedTuple):
     forces: np.ndarray  # number of slots of forces and torques, then the slots
     rigid: np.ndarray  # (F,) bool: contact does not move the field
     torque: np.ndarray  # (F,) slot of the torque on each field
-    memory: np.ndarray  # (F,) see MEMORY
+    memory: np.ndarray  # (F,) MEMORY for shapeless bodies, else 0
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: contacts of each
@@ -346,10 +347,10 @@ def _directions(bodies, pair):
 
 
 @noinline
-def _last_contact(bodies, pair, spreads):
-    """Return the last step of contact of a pair at its nodes, 0 for none.
+def _last_contact(bodies, pair):
+    """Return the last step of contact at the nodes of a pair, 0 for none.
 
-    If it `spreads`, contact at the nodes that a moving rigid wall comes from counts too.
+    Contact at the nodes that a moving rigid wall comes from counts too.
     """
     contact, kin, nodes = bodies
     other = pair.m // contact.stride
@@ -359,7 +360,7 @@ def _last_contact(bodies, pair, spreads):
         speed = nodes.update[led, k]
         way = -1 if speed > 0 else 1
         inside = 0 <= _place(contact, led, k) + way < contact.beside[k, 1]
-        if spreads and contact.rigid[led // contact.stride] and speed != 0 and inside:
+        if contact.rigid[led // contact.stride] and speed != 0 and inside:
             last = max(last, abs(contact.touched[pair.n + way * contact.beside[k, 0], other]))
     return last
 
@@ -374,19 +375,17 @@ def _excess_of(bodies, pair, where):
     if not approach > 0:
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
-    last = _last_contact(bodies, pair, memory > 1)
-    # with three bodies, a pair may already have touched in this step
-    lasts = pair.wall and last > 0 and last >= where.step - memory
-    if lasts and memory > 1:
-        return approach / size
+    if pair.wall and memory > 0:
+        last = _last_contact(bodies, pair)
+        # With three bodies, a pair may already have touched in this step.
+        if last > 0 and last >= where.step - memory:
+            return approach / size
     for direction in _directions(bodies, pair):
         length = sqrt(dot(direction, direction))
         if length > 0:
             gap = _gap(bodies, direction, pair, where)
             if gap > 0 and dot(direction, pair.relative) * where.dt <= gap * length:
                 return 0.0
-    if lasts:
-        return approach / size
     gap = _gap(bodies, pair.outward, pair, where)
     return approach / size - max(gap, 0.0) / where.dt
 
