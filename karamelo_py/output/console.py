@@ -14,8 +14,8 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms: lines faster than QUICK (seconds) are bundled
-# for LINES seconds after BURST lines.
+# Rich redraws the bar after every line, in 0.25 ms: after BURST lines faster than QUICK (seconds),
+# further ones are written every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05

@@ -17,7 +17,7 @@ from karamelo_py.app.bench.measure import (
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
-MOST = 200  # steps per repetition; five times as many leave the scenes complete
+MOST = 200  # steps per repetition: no point leaves within five repetitions
 SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 
