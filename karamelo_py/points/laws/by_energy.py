@@ -5,7 +5,8 @@ point (`karamelo_py.points.laws.formulas`).
 """
 
 from collections.abc import Sequence
-from itertools import combinations
+from functools import lru_cache
+from itertools import combinations, product
 from math import isfinite, sqrt
 from typing import Any, ClassVar, NamedTuple
 
@@ -194,23 +195,22 @@ PATHS = {
     "uniaxial strain": lambda x: (x, 1.0, 1.0),
     "swelling": lambda x: (x, x, x),
 }
-SCANNED = 0.5, 3.0  # stretches
 
 
+@lru_cache(typed=True)
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
     """Return path and stretch nearest to rest where a principal direction loses its stiffness."""
     unstable = []
-    for path, stretches in PATHS.items():
-        for end in SCANNED:
-            for x in np.geomspace(1, end, 60)[1:]:
-                at = tuple(map(float, stretches(x)))
-                try:
-                    least = min(directional_stiffness(law, at, a) for a in range(3))
-                except (ValueError, ZeroDivisionError, OverflowError):
-                    least = -1.0
-                if not least > 0:
-                    unstable.append((abs(np.log(x)), path, float(x)))
-                    break
+    for (path, stretches), end in product(PATHS.items(), (0.5, 3.0)):
+        for x in np.geomspace(1, end, 60)[1:].tolist():
+            at = stretches(x)
+            try:
+                least = min(directional_stiffness(law, at, a) for a in {*map(at.index, at)})
+            except (ValueError, ZeroDivisionError, OverflowError):
+                least = -1.0
+            if not least > 0:
+                unstable.append((abs(np.log(x)), path, x))
+                break
     return min(unstable)[1:] if unstable else None
 
 
