@@ -1,5 +1,6 @@
 """Distance of a body's surface from a node, from sums over its points."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,9 +21,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
         box = np.ones(max(round(2 * half * ENTRIES), 1) | 1)
         return x, np.convolve(hats, box / len(box), mode="same")
     middle = CELLS // 2
-    line = Grid(
-        0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0, 0
-    )  # fmt: skip
+    line = Grid(0.0, 0.0, 0.0, 1.0, 1.0, 1.0, CELLS, 1, 1, float(CELLS), 0.0, 0.0, 0.0, 1, 1, 0, 0)
     weights = np.zeros(len(x))
     for q, position in enumerate(x):
         stencil = locate(basis, Line(), line, (middle + float(position),))
@@ -32,6 +31,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
     return x, weights
 
 
+@lru_cache(typed=True)
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     """Tabulate the distance of a plane surface from a node over the mean position of the points.
 
