@@ -43,6 +43,15 @@ CUBE = """\
 *ELEMENT, TYPE=C3D8, ELSET=CUBE
 1, 1, 2, 3, 4, 5, 6, 7, 8
 """
+VTU = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">
+<UnstructuredGrid><Piece NumberOfPoints="{n}" NumberOfCells="1">
+<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{x}</DataArray></Points>
+<Cells><DataArray type="Int64" Name="connectivity" format="ascii">{nodes}</DataArray>
+<DataArray type="Int64" Name="offsets" format="ascii">{n}</DataArray>
+<DataArray type="UInt8" Name="types" format="ascii">{type}</DataArray></Cells>
+<CellData><DataArray type="Int64" Name="mat" format="ascii">3</DataArray></CellData>
+</Piece></UnstructuredGrid></VTKFile>
+"""
 PART = "*Part, name=P\n" + CUBE + "*Elset, elset=E, generate\n1, 1, 1\n*End Part\n"
 
 
@@ -211,6 +220,10 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.inp", "*Assembly\n*Instance, name=I, part=N\n", "of the part 'N', which is not"),
         ("a.inp", "*HEADING\nnothing\n", "the mesh a.inp is empty"),
         ("a.inp", SQUARES + "*ELEMENT, TYPE=B31\n1, 1, 2\n", "a.inp is empty but for 1 B31"),
+        ("a.su2", "NZONE= 2\nIZONE= 1\nNDIME= 2\n", "a file of several zones (NZONE)"),
+        ("a.msh", b'(0 "Fluent")\n(2 3)\n(3010 (1 1 1 1 3)(\n' + bytes(24), "within brackets"),
+        ("a.vtu", VTU.format(n=3, x="0 " * 9, nodes="0 1 7", type=5), "a node that is not"),
+        ("a.med", b"\x89HDF\r\n\x1a\n" + bytes(200), "the file is damaged"),
         ("a.mesh", "MFEM NURBS mesh v1.0\n", "it is of MFEM's kind 'MFEM NURBS mesh v1.0'"),
         ("a.mesh", "MFEM mesh v1.0\nvertices\n4\nnodes\n", "its elements have curved edges"),
         ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
@@ -225,7 +238,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
     ],
 )  # fmt: skip
 def test_decks_that_are_refused_name_the_line(name, text, says, tmp_path):
-    (tmp_path / name).write_text(text)
+    (tmp_path / name).write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(ScriptError) as caught:
         volume(tmp_path / name, 2)
     assert says in str(caught.value)
@@ -584,17 +597,6 @@ def test_wedges_and_pyramids(kind, nodes, right, tmp_path):
     assert region.inside(x).mean() == pytest.approx(right, abs=0.01)  # 4 deviations of the count
 
 
-VTU = """<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">
-<UnstructuredGrid><Piece NumberOfPoints="{n}" NumberOfCells="1">
-<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii">{x}</DataArray></Points>
-<Cells><DataArray type="Int64" Name="connectivity" format="ascii">{nodes}</DataArray>
-<DataArray type="Int64" Name="offsets" format="ascii">{n}</DataArray>
-<DataArray type="UInt8" Name="types" format="ascii">{type}</DataArray></Cells>
-<CellData><DataArray type="Int64" Name="mat" format="ascii">3</DataArray></CellData>
-</Piece></UnstructuredGrid></VTKFile>
-"""
-
-
 @pytest.mark.parametrize(("type_", "d"), [(8, 2), (11, 3)])
 def test_pixels_voxels_and_numbers_of_elements(type_, d, tmp_path):
     """Squares and cubes whose nodes go row by row, as ParaView makes of images."""
@@ -735,6 +737,56 @@ def test_edges_of_exodus_are_in_their_order(kind, family, order, tmp_path):
     solid, whole, _ = measured(elements_of(read(tmp_path / "a.e", 3), 3)[0])
     assert whole[0] == pytest.approx({"hexahedron": 8, "wedge": 1}[shape.name], rel=1e-12)
     assert solid.bulge < 1e-12 and len(straight) == solid.corners.shape[1]
+
+
+def test_sides_of_shells_and_lines_in_exodus(tmp_path):
+    """Sides 1 and 2 of a shell are its faces, those from 3 on its edges."""
+    x = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    more = {"ss_prop1": [5, 6], "elem_ss1": [1], "side_ss1": [4], "elem_ss2": [1], "side_ss2": [9]}
+    exodus(tmp_path / "a.e", [("SHELL4", [[0, 1, 2, 3]])], x, more)
+    assert volume(tmp_path / "a.e", 2) == 1
+    assert lines(tmp_path / "a.e", "5") == 1
+    more = {"ss_prop1": [5], "elem_ss1": [1], "side_ss1": [2]}
+    exodus(tmp_path / "b.e", [("EDGE2", [[0, 1]])], x[:2], more)
+    assert volume(tmp_path / "b.e", 1) == 1
+
+
+def test_the_second_node_of_a_truss_is_in_the_middle(tmp_path):
+    (tmp_path / "a.inp").write_text("*NODE\n1, 0\n2, 1\n3, 2\n*ELEMENT, TYPE=T3D3\n1, 1, 2, 3\n")
+    assert volume(tmp_path / "a.inp", 1) == pytest.approx(2, rel=1e-14)
+
+
+def test_few_curved_elements_may_be_folded(tmp_path):
+    """Nodes in the middle of edges that lie too near to a corner: areas stay 1."""
+    x = [(i, j) for j in (0, 1) for i in range(201)]
+    rows = [(i + 1, i + 2, i + 203, i + 202) for i in range(200)]
+    middles = [np.mean([x[n - 1] for n in pair], axis=0)
+               for row in rows for pair in zip(row, [*row[1:], row[0]], strict=True)]  # fmt: skip
+    nodes = [*x, *middles]
+    for dent, ok in ((range(1), True), (range(40), False)):
+        moved = [np.array(p, float) for p in nodes]
+        for k in dent:
+            moved[402 + 4 * k] = np.array([k + 0.9, 0.0])
+        text = "*NODE\n" + "".join(f"{n},{p[0]},{p[1]}\n" for n, p in enumerate(moved, 1))
+        text += "*ELEMENT, TYPE=CPS8\n" + "".join(
+            ",".join(map(str, [k + 1, *row, *range(403 + 4 * k, 407 + 4 * k)])) + "\n"
+            for k, row in enumerate(rows)
+        )
+        (tmp_path / f"{ok}.inp").write_text(text)
+        if ok:
+            assert volume(tmp_path / f"{ok}.inp", 2) == pytest.approx(200, rel=1e-12)
+        else:
+            with pytest.raises(ScriptError, match="is twisted"):
+                volume(tmp_path / f"{ok}.inp", 2)
+
+
+def test_many_sets_and_names_of_all_kinds(tmp_path):
+    sets = "".join(f'*ELSET, ELSET="S\u00e4t {k}"\n1\n' for k in range(5000))
+    (tmp_path / "a.inp").write_text(CUBE + sets, "utf-8")
+    assert volume(tmp_path / "a.inp", 3, "s\u00e4t 4999") == pytest.approx(1)
+    with pytest.raises(ScriptError) as caught:
+        volume(tmp_path / "a.inp", 3, "none")
+    assert caught.value.expected.startswith("one of 5001 groups: CUBE, S\u00c4T 0")
 
 
 def test_gmsh_entities_are_groups_where_there_are_no_others(tmp_path):

@@ -180,7 +180,7 @@ SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
         (SQUARE, {"line": [[0, 1]]}, "does not fit 2D: it has elements of type line"),
         (SQUARE, {"tetra": [[0, 1, 2, 3]]}, "does not fit 2D: it has elements of type tetra"),
         (SQUARE, {"triangle": [[0, 1, 2], [0, 1, 1]]}, "element 2 of the 2 triangles with 3 nodes"),
-        (SQUARE + [0, 0, 0.1], {"triangle": [[0, 1, 2]]}, "not lie in the plane z = 0"),
+        (SQUARE + [0, 0, 0.1], {"triangle": [[0, 1, 2]]}, "not lie at z = 0"),
         (SQUARE[[0, 1, 3, 2]], {"quad": [[0, 1, 2, 3]]}, "has no volume"),
         ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 1, 0]], {"quad": [[0, 1, 2, 3]]}, "is twisted"),
         (SQUARE * [1, np.nan, 1], {"triangle": [[0, 1, 2]]}, "not a number"),

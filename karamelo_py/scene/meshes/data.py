@@ -1,6 +1,7 @@
 """Mesh data, as every reader returns it: nodes, cells by type, named sets."""
 
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -11,6 +12,9 @@ DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
 }  # fmt: skip
+
+
+_MANY = 100  # names, of which a message lists a few
 
 
 class CellBlock(NamedTuple):
@@ -29,11 +33,32 @@ class CellBlock(NamedTuple):
         return DIMENSIONS.get(self.family, -1)
 
 
+Of = TypeVar("Of")
+
+
+class OnDemand(Mapping[str, Of]):
+    """Values by name, computed when asked for."""
+
+    def __init__(self, names: Collection[str], of: Callable[[str], Of]):
+        self.names, self.of = names, of
+
+    def __getitem__(self, name: str) -> Of:
+        if name not in self.names:
+            raise KeyError(name)
+        return self.of(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
 class Mesh(NamedTuple):
     points: np.ndarray  # (N, 3)
     cells: list[CellBlock]
-    sets: dict[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
-    node_sets: dict[str, np.ndarray]  # masks (N,)
+    sets: Mapping[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
+    node_sets: Mapping[str, np.ndarray]  # masks (N,)
     left_out: dict[str, int]  # no solids, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
@@ -60,14 +85,18 @@ class Mesh(NamedTuple):
         if name is None:
             # Gmsh groups have numbers and perhaps names; a number of only one dimension needs no
             # dimension in front.
-            once = [name for name in names if name.rpartition(":")[2] not in {*names} - {name}]
+            known = {*names}
+            once = [n for n in names if n.rpartition(":")[2] not in known or ":" not in n]
             named = [name for name in once if not name.isdigit()] or once
-            error = unknown(message, group, named, argument="group")
+            error = unknown(message, group, named[:_MANY], argument="group")
             error.expected = error.expected if named else "no group: the whole mesh"
+            if len(named) > _MANY:
+                error.expected = f"one of {len(named)} groups: {', '.join(named[:5])}, ..."
             raise error
         masks = self.sets[name] if name in self.sets else [self.node_sets[name]]
         if not any(mask.any() for mask in masks):
-            filled = [n for n, masks in self.sets.items() if any(mask.any() for mask in masks)]
+            some = [*self.sets][:_MANY]
+            filled = [n for n in some if any(mask.any() for mask in self.sets[n])]
             error = unknown(
                 f"the physical group '{name}' of the mesh is empty", group, filled, argument="group"
             )

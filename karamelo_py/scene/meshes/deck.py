@@ -1,7 +1,6 @@
 """Parts of decks: numbered nodes and elements, sets of them, merged to one mesh."""
 
 import itertools
-import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
+from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh, OnDemand
 from karamelo_py.script.errors import ScriptError
 
 _MOST = 2**31  # bytes of an included file
@@ -134,6 +133,14 @@ def into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
         sets.setdefault(name.upper(), []).append(item)
 
 
+def into_by_owner(sets: SetItems, owners: np.ndarray, numbers: np.ndarray) -> None:
+    """Add numbers (n,) to the sets of their owners (n,), such as parts or properties."""
+    order = np.argsort(owners, kind="stable")
+    names, first = np.unique(owners[order], return_index=True)
+    for name, of in zip(names, np.split(numbers[order], first[1:]), strict=True):
+        into(sets, str(name), of)
+
+
 def members(sets: SetItems, name: str) -> np.ndarray:
     if name.lstrip("-").isdigit() and name not in sets:
         return np.array([int(name)])
@@ -168,15 +175,28 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
+    """Sets by name, as functions that list numbers of the mesh: a deck may have many sets."""
+
     def __init__(self) -> None:
-        self.by_name: dict[str, list[np.ndarray]] = defaultdict(list)
+        self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)
         self.numbering: dict[str, Numbering] = {}
+
+    def add(self, name: str, instance: str, items: SetItems | np.ndarray, key: str = "") -> None:
+        """Add items, or the set `key` of items, by numbers of an instance."""
+        numbering = self.numbering.get(instance, NO_NUMBERS)
+
+        def listed() -> np.ndarray:
+            of_deck = members(items, key) if isinstance(items, dict) else items
+            return numbering.listed(of_deck)
+
+        self.by_name[name].append(listed)
 
     def extend(self, name: str, other: str) -> None:
         self.by_name[name] += list(self.by_name.get(other, ()))
 
     def listed(self, name: str) -> np.ndarray:
-        return np.concatenate([np.empty(0, np.int64), *self.by_name.get(name, ())])
+        parts = (listed() for listed in self.by_name.get(name, ()))
+        return np.concatenate([np.empty(0, np.int64), *parts])
 
 
 def _names(body: DeckBody, name: str) -> set[str]:
@@ -218,12 +238,11 @@ class Merged:
         pairs = np.concatenate(numbered, axis=1)
         elements = Numbering(*pairs[:, np.argsort(pairs[0], kind="stable")])
         self.elements.numbering[body.name] = elements
-        self.elements.by_name[body.name].append(elements.mesh)
+        self.elements.add(body.name, body.name, elements.deck)
         for of_part, sets in ((body.part.nodes, self.nodes), (body.part.groups, self.elements)):
             for name in of_part:
-                listed = sets.numbering[body.name].listed(members(of_part, name))
                 for key in _names(body, name):
-                    sets.by_name[key].append(listed)
+                    sets.add(key, body.name, of_part, name)
         self.add_surfaces(body)
         for name, faces in body.part.faces.items():
             for nodes in faces:
@@ -232,18 +251,19 @@ class Merged:
                 self.faces[name].append(CellBlock(FACE_TYPES[nodes.shape[1]], complete))
 
     def add_surfaces(self, body: DeckBody) -> None:
+        numbering = self.elements.numbering.get(body.name, NO_NUMBERS)
         for name, items in body.part.sides.items():
-            for of, face in items:
-                if of.isdigit():
-                    numbering = self.elements.numbering.get(body.name, NO_NUMBERS)
-                    elements = numbering.listed(np.array([int(of)]))
-                else:
+            for side in range(6):
+                owners = [of for of, face in items if face == f"S{side + 1}"]
+                numbers = [int(of) for of in owners if of.isdigit()]
+                elements = [numbering.listed(np.array(numbers, np.int64))]
+                for of in owners:
                     of_body = f"{body.name}.{of}"
-                    in_body = of_body in self.elements.by_name
-                    elements = self.elements.listed(of_body if in_body else of)
-                if re.fullmatch(r"S[1-6]", face):
-                    for key in _names(body, name):
-                        self.surfaces[key].append((int(face[1]) - 1, elements))
+                    if not of.isdigit():
+                        in_body = of_body in self.elements.by_name
+                        elements.append(self.elements.listed(of_body if in_body else of))
+                for key in _names(body, name) if owners else ():
+                    self.surfaces[key].append((side, np.concatenate(elements)))
 
     def mesh(self) -> Mesh:
         cells, numbers = [], []
@@ -262,15 +282,20 @@ class Merged:
                         faces[name].append(CellBlock(kind, nodes[:, corners[side]]))
         every = [*cells, *(cell for parts in faces.values() for cell in parts)]
         none = [np.zeros(len(cell.nodes), bool) for cell in every]
-        sets = {}
-        for name in filter(None, self.elements.by_name):
-            wanted = self.elements.listed(name)
-            sets[name] = [np.isin(of_block, wanted) for of_block in numbers] + none[len(cells) :]
-        for name, of_faces in faces.items():
-            mine = {id(cell) for cell in of_faces}
-            sets[name] = [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
         points = np.concatenate(self.points)
-        node_sets = {name: np.zeros(len(points), bool) for name in self.nodes.by_name}
-        for name, mask in node_sets.items():
+
+        def masks_of(name: str) -> list[np.ndarray]:
+            if name in faces:
+                mine = {id(cell) for cell in faces[name]}
+                return [mask | (id(c) in mine) for mask, c in zip(none, every, strict=True)]
+            wanted = self.elements.listed(name)
+            return [np.isin(of_block, wanted) for of_block in numbers] + none[len(cells) :]
+
+        def mask_of(name: str) -> np.ndarray:
+            mask = np.zeros(len(points), bool)
             mask[self.nodes.listed(name)] = True
-        return Mesh(points, every, sets, node_sets, self.skipped)
+            return mask
+
+        names = dict.fromkeys([*filter(None, self.elements.by_name), *faces])
+        sets = OnDemand(names, masks_of)
+        return Mesh(points, every, sets, OnDemand(self.nodes.by_name, mask_of), self.skipped)

@@ -19,6 +19,7 @@ from karamelo_py.scene.meshes.deck import (
     Merged,
     included,
     into,
+    into_by_owner,
     table_of,
     wrong,
 )
@@ -90,8 +91,7 @@ def _elements(part: DeckPart, keyword: DeckKeyword) -> None:
     numbers, owners, nodes = (of.astype(np.int64) for of in (table[:, 0], table[:, 1], nodes))
     if len(nodes) < len(numbers):
         raise wrong(keyword, "ends in the middle of an element")
-    for owner in np.unique(owners):
-        into(part.groups, str(owner), numbers[owners == owner])
+    into_by_owner(part.groups, owners, numbers)
     label = f"ELEMENT_{kind.partition('_')[0]}"
     if kind.startswith("SHELL"):
         is_triangle = (nodes[:, 3] == nodes[:, 2]) | (nodes[:, 3] == 0)

@@ -20,7 +20,7 @@ from karamelo_py.scene.meshes.deck import (
     Merged,
     cylindrical,
     included,
-    into,
+    into_by_owner,
     wrong,
 )
 
@@ -57,6 +57,15 @@ class _Entry(NamedTuple):
         except ValueError:
             raise self.wrong(f"has '{self.fields[k]}' instead of a whole number") from None
 
+    def wholes(self, count: int) -> list[int]:
+        """Fields from the first on; a second one left out is the first."""
+        try:
+            numbers = list(map(int, self.fields[:count]))
+        except ValueError:
+            numbers = [self.whole(k) for k in range(count)]
+            numbers[1] = numbers[1] or numbers[0]
+        return numbers if len(numbers) == count else [self.whole(k) for k in range(count)]
+
     def real(self, k: int) -> float:
         text = self.fields[k] if k < len(self.fields) else ""
         try:
@@ -73,12 +82,15 @@ class _Entry(NamedTuple):
 
 
 def _entries(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Entry]:
-    lines = path.read_text("latin-1").splitlines()
-    begins = [k for k, line in enumerate(lines) if re.match(r"\s*BEGIN\s+(BULK|SUPER)", line, re.I)]
+    text = path.read_text("latin-1")
+    begin = re.search(r"^\s*BEGIN\s+(BULK|SUPER)", text, re.I | re.M)
+    lines = text.splitlines()
     entry = None
-    for number in range(begins[0] + 1 if begins else 0, len(lines)):
-        line = lines[number].split("$", 1)[0].rstrip().expandtabs(8)
-        if not line:
+    for number in range(text.count("\n", 0, begin.end()) + 1 if begin else 0, len(lines)):
+        line = lines[number]
+        if "$" in line or "\t" in line:
+            line = line.split("$", 1)[0].expandtabs(8)
+        if not line or line.isspace():
             continue
         if "," in line:
             name, *fields = line.split(",")
@@ -177,11 +189,10 @@ def read_nastran(path: Path) -> Mesh:
             raise entry.wrong("is not read", "CORD1 or CORD2")
         elif name in _TYPES:
             family, corners, most = _TYPES[name]
-            nodes = [entry.whole(k) for k in range(2, 2 + most)]
-            count = most if all(nodes) else corners
+            given = entry.fields[2 : 2 + most]
+            count = most if len(given) == most and all(given) and "0" not in given else corners
             of_mesh = family if count == corners else f"{family}{count}"
-            number = entry.whole(0)
-            elements[of_mesh, name].append([number, entry.whole(1) or number, *nodes[:count]])
+            elements[of_mesh, name].append(entry.wholes(2 + count))
         elif _NO_SOLIDS.fullmatch(name):
             part.skipped[name] += 1
     by_system = defaultdict(list)
@@ -195,8 +206,7 @@ def read_nastran(path: Path) -> Mesh:
         table = np.array(rows)
         order = 2 + np.array(_ORDER.get(of_mesh, range(table.shape[1] - 2)))
         part.elements.append(DeckElements(of_mesh, name, table[:, 0], table[:, order]))
-        for owner in np.unique(table[:, 1]):
-            into(part.groups, str(owner), table[table[:, 1] == owner, 0])
+        into_by_owner(part.groups, table[:, 1], table[:, 0])
     merged = Merged(path)
     merged.add(DeckBody("", part))
     return merged.mesh()
