@@ -381,7 +381,7 @@ def test_parts_of_a_law_that_never_act(advice, strength, more, parts, said):
     assert said in found if said else found == ""
 
 
-def test_heat_that_does_not_flow_and_averages_that_change_nothing(advice):
+def test_heat_that_does_not_flow(advice):
     warm = "neo-hookean, 1, 100, 0.3, 2, 3"
     assert "leave cp and kappa out" in advice(plane(law=warm))
     assert advice(plane(law=warm + ", 1e-3")) == ""  # friction may heat it
@@ -389,10 +389,6 @@ def test_heat_that_does_not_flow_and_averages_that_change_nothing(advice):
     assert advice(plane(law=warm, more=read)) == ""
     assert advice(INPUTS / "defaults" / "in.slide") == ""
     assert advice(plane(law=warm, method="ulmpm, FLIP, linear, 1, thermo-mechanical")) == ""
-    for nu, said in ((0.3, "anti_volumetric_locking(true): a visit"), (0.49, "")):
-        text = plane(law=f"neo-hookean, 1, 100, {nu}")
-        found = advice(text.replace("dimension(", "anti_volumetric_locking(true)\ndimension("))
-        assert found.startswith(said) and bool(found) == bool(said)
 
 
 SPACE = """

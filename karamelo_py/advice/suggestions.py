@@ -10,14 +10,12 @@ from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.advice.lesser import lesser_models
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.rhythm import ByTime
-from karamelo_py.points.laws import parameter
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import plural
 
 Words = Iterator[tuple[str, str]]
 
-NEARLY_INCOMPRESSIBLE = 0.4  # Poisson's ratio above which a linear basis locks
 # Core seconds (Intel Xeon): a point per step (linear), log line, picture, first picture, file of
 # points, number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
@@ -29,7 +27,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 
 def suggestions(hub: Hub, simulation: Simulation) -> list[Advice]:
-    rules = _unread, _of_parts, _averaging, lesser_models, _output
+    rules = _unread, _of_parts, lesser_models, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
@@ -49,21 +47,6 @@ def _unread(hub: Hub, simulation: Simulation) -> Words:
                     "nowhere",
                     f"leave it out, or name {names[0]} in log_modify",
                 )
-
-
-def _averaging(hub: Hub, simulation: Simulation) -> Words:
-    if not hub.update.anti_locking:
-        return
-    for solid in hub.solids.values():
-        law = solid.material.whole
-        moduli = (parameter(law, "lam", None), parameter(law, "G", None))
-        if None in moduli or moduli[0] / (2 * sum(moduli)) >= NEARLY_INCOMPRESSIBLE:
-            return
-    yield (
-        "anti_volumetric_locking(true): a visit of the points more, and nothing is nearly "
-        "incompressible or flows",
-        "leave it out",
-    )
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:

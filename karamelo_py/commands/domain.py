@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from karamelo_py.kernels.equations.periodic import InUse
 from karamelo_py.language import registry
@@ -189,7 +189,9 @@ def set_periodic(hub: Hub, directions: list[int]) -> None:
 registry.may_differ(boundary)  # a run that points leave can resume with boundary(delete)
 
 
-def region(hub: Hub, ID: str, style: StyleOf("region"), *arguments: Argument) -> None:
+def region(
+    hub: Hub, ID: str, style: Annotated[str, StyleOf("region")], *arguments: Argument
+) -> None:
     """Name a part of the domain, to fill with a solid or to select the members of a group.
 
     Parameters
@@ -259,7 +261,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
     return domain
 
 
-def solid(hub: Hub, ID: str, kind: StyleOf("solid"), *arguments: Argument) -> None:
+def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments: Argument) -> None:
     """Create a body of material points from a region or a mesh.
 
     Parameters
@@ -340,7 +342,7 @@ def group(
     ID: str,
     kind: Literal["particles", "nodes"],
     by: Literal["region", "mesh"],
-    region: RegionOrFile,
+    region: Annotated[Region | Path, RegionOrFile],
     of: str | int,
     *solids: Solid,
 ) -> None:

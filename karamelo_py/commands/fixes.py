@@ -1,6 +1,6 @@
 """Commands that define loads and measurements: fix, compute, functions of groups."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
@@ -15,7 +15,7 @@ from karamelo_py.styles.computes.means import CenterOfMass
 from karamelo_py.styles.fixes.measuring import Measuring
 
 
-def fix(hub: Hub, ID: str, style: StyleOf("fix"), *arguments: Argument) -> None:
+def fix(hub: Hub, ID: str, style: Annotated[str, StyleOf("fix")], *arguments: Argument) -> None:
     """Define a support, a load or an initial state.
 
     Parameters
@@ -55,7 +55,9 @@ def delete_fix(hub: Hub, ID: str) -> None:
     hub.fixes.remove(ID)
 
 
-def compute(hub: Hub, ID: str, style: StyleOf("compute"), *arguments: Argument) -> None:
+def compute(
+    hub: Hub, ID: str, style: Annotated[str, StyleOf("compute")], *arguments: Argument
+) -> None:
     """Define a quantity to measure whenever the log is written.
 
     Parameters

@@ -22,7 +22,9 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.parser import parse_text
 
 
-def material(hub: Hub, ID: str, style: StyleOf("material"), *arguments: Argument) -> None:
+def material(
+    hub: Hub, ID: str, style: Annotated[str, StyleOf("material")], *arguments: Argument
+) -> None:
     """Define a material.
 
     Parameters
@@ -54,7 +56,9 @@ def judge(hub: Hub, made: Material) -> None:
 
 
 def _part(kind: str, summary: str, example: str, others: str) -> Callable:
-    def command(hub: Hub, ID: str, style: StyleOf(kind), *arguments: Argument) -> None:
+    def command(
+        hub: Hub, ID: str, style: Annotated[str, StyleOf(kind)], *arguments: Argument
+    ) -> None:
         if (kind, style) == ("strength", "JC") and not registry.knows(kind, style):
             message = "unknown strength style 'JC'"
             expected = "the style johnson_cook, with G, A, B, n, epsdot0, C, m, Tr, Tm"

@@ -3,7 +3,7 @@
 from collections.abc import Container, Sequence
 from contextlib import suppress
 from itertools import groupby
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
@@ -16,9 +16,9 @@ from karamelo_py.script.errors import ScriptError, meant
 
 def method(
     hub: Hub,
-    kind: StyleOf("method"),
-    transfer: StyleOf("transfer"),
-    basis: StyleOf("basis"),
+    kind: Annotated[str, StyleOf("method")],
+    transfer: Annotated[str, StyleOf("transfer")],
+    basis: Annotated[str, StyleOf("basis")],
     *options: Argument,
     mass: Literal["lumped", "corrected"] = "lumped",
 ) -> None:
@@ -90,7 +90,7 @@ def method(
 
 def scheme(
     hub: Hub,
-    style: StyleOf("scheme"),
+    style: Annotated[str, StyleOf("scheme")],
     *arguments: Argument,
     start: Literal["full", "half"] = "full",
 ) -> None:

@@ -1,7 +1,8 @@
 """Commands for output: dump, log, plot and their options."""
 
 import re
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.arguments import NUMBER
@@ -10,14 +11,18 @@ from karamelo_py.language.signature import Argument, OutputFile
 from karamelo_py.output.files import picture_format
 from karamelo_py.output.plots import PlottedCurve
 from karamelo_py.output.quantity import Logged, Quantity
-from karamelo_py.output.rhythm import Every
+from karamelo_py.output.rhythm import ByTime, Every
 from karamelo_py.output.units import LENGTHS, MASSES, TIMES, Units
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 
 def dump(
-    hub: Hub, ID: str, group: Literal["all"], style: StyleOf("dump"), *arguments: Argument
+    hub: Hub,
+    ID: str,
+    group: Literal["all"],
+    style: Annotated[str, StyleOf("dump")],
+    *arguments: Argument,
 ) -> None:
     """Write snapshots of points or nodes to files at intervals.
 
@@ -93,7 +98,9 @@ def delete_dump(hub: Hub, ID: str) -> None:
         hub.output.files.pop(old.file, None)
 
 
-def set_output(hub: Hub, every: Every, form: Literal["mpm", "csv"] = "mpm") -> None:
+def set_output(
+    hub: Hub, every: Annotated[int | ByTime, Every], form: Literal["mpm", "csv"] = "mpm"
+) -> None:
     """Set how often a line is logged, and in which format.
 
     Lines go at once to the terminal and to log.mpm in the current folder. The first and last state
@@ -232,7 +239,7 @@ def plot(
     plots.add(ID, curve)
 
 
-def save_plot(hub: Hub, file: OutputFile) -> None:
+def save_plot(hub: Hub, file: Annotated[Path, OutputFile]) -> None:
     """Draw the curves of all plot commands to a file at the end of each run.
 
     Interrupted and failed runs draw them too. After a run, the command draws at once.
@@ -262,9 +269,9 @@ def save_plot(hub: Hub, file: OutputFile) -> None:
 
 def units(
     hub: Hub,
-    length: Literal[*LENGTHS],
-    mass: Literal[*MASSES],
-    time: Literal[*TIMES],
+    length: Annotated[str, Literal[*LENGTHS]],
+    mass: Annotated[str, Literal[*MASSES]],
+    time: Annotated[str, Literal[*TIMES]],
     temperature: Literal["K", "C"] = "K",
 ) -> None:
     """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.

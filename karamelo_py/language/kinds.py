@@ -282,8 +282,11 @@ def kind_of(annotation: Any) -> Kind:
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:
-        base, *constraints = get_args(annotation)
-        return _constrained(kind_of(base), [c for c in constraints if isinstance(c, Constraint)])
+        base, *details = get_args(annotation)
+        named = (d for d in details if hasattr(d, "from_script") or get_origin(d) is Literal)
+        by = next(named, base)
+        constraints = [detail for detail in details if isinstance(detail, Constraint)]
+        return _constrained(kind_of(by), constraints) if constraints else kind_of(by)
     if get_origin(annotation) is Literal:
         words = tuple(str(word) for word in get_args(annotation))
         text = f"the word {words[0]}" if len(words) == 1 else f"one of {', '.join(words)}"

@@ -1,7 +1,7 @@
 """Fix absorbing: edges through which waves leave."""
 
 from math import sqrt
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
@@ -93,7 +93,9 @@ class Absorbing(Fix):
         nodes=True,
     )
 
-    def __init__(self, hub: Hub, group: NodeGroup, material: Material, side: Literal[SIDES]):
+    def __init__(
+        self, hub: Hub, group: NodeGroup, material: Material, side: Annotated[str, Literal[SIDES]]
+    ):
         super().__init__(hub, group)
         axis = SIDES.index(side) // 2
         if axis >= hub.domain.dimension:

@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Literal, NamedTuple, TypeVar
+from typing import Annotated, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -330,7 +330,7 @@ class EdgeTraction(EdgeFix):
         hub: Hub,
         group: ParticleGroup,
         region: Region,
-        side: Literal[*SIDES, "all"],
+        side: Annotated[str, Literal[*SIDES, "all"]],
         *traction: Expression | None,
     ):
         super().__init__(hub, group, region)

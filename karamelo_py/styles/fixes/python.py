@@ -6,7 +6,7 @@ import sys
 import zlib
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -118,7 +118,7 @@ class Python(Fix):
         hub: Hub,
         group: AnyGroup,
         function: PythonFunction,
-        moment: Literal[MOMENTS] | None = None,
+        moment: Annotated[str, Literal[MOMENTS]] | None = None,
     ):
         on_nodes = isinstance(group, NodeGroup)
         if moment is None:
