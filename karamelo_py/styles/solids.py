@@ -67,6 +67,7 @@ class RegionSolid(Solid):
     mesh, region, material
     """
 
+    region: Region
     syntax = "regionID, ppc, material, h[, T0][, points=regular|gauss|cut][, GlueToSolid=solidID]"
 
     def __init__(

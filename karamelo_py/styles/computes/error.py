@@ -193,7 +193,7 @@ class Error(Compared, Compute):
                 expected=f"an expression for {'each of ' * (len(field.columns) > 1)}{wanted}",
             )
         pairs = zip(field.columns, field.weights, formulas, strict=False)
-        self.parts = [pair for pair in pairs if pair[2] is not None]
+        self.parts = [(name, weight, f) for name, weight, f in pairs if f is not None]
         self.norm = Norm(words)
 
     def refresh(self) -> None:

@@ -155,8 +155,9 @@ class Hdf5Dump(TableDump):
                 fillvalue=np.nan,
                 **STORED,
             )
-        for name in ("time", *self.columns) if self.hub.output.units else ():
-            root[name].attrs["units"] = self.hub.output.units.of_column(name)
+        if units := self.hub.output.units:
+            for name in ("time", *self.columns):
+                root[name].attrs["units"] = units.of_column(name)
         for name in ("step", "type", *self.columns):
             scales = {"step": ["time"], "type": ["id"]}.get(name, ["time", "id"])
             for axis, scale in enumerate(scales):

@@ -202,7 +202,7 @@ class RigidBody(Fix):
 
     def defined(self) -> None:
         before = self.previous
-        if before is not None and before.id != self.id and before.id in self.hub.fixes:
+        if before and before.mark and before.id != self.id and before.id in self.hub.fixes:
             error = ScriptError(
                 f"fix '{before.id}' in line {before.mark.line} moves '{self.body.id}' already",
                 argument="solid",
@@ -441,13 +441,14 @@ class ContactRigidBody(Fix):
     ):
         super().__init__(hub, group)
         judge_friction(hub, mu)
-        self.mu, self.body, self.region = mu, solid, region or solid.region
+        self.mu, self.body, surface = mu, solid, region or solid.region
         if group.touches(solid) and not group.all:
             message = f"the group has points of the body '{solid.id}'"
             raise ScriptError(message, argument="group", expected="points of other solids")
-        if self.region is None:
+        if surface is None:
             message, expected = f"solid '{solid.id}' fills no region", "its surface: region=ID"
             raise ScriptError(message, argument="solid", expected=expected)
+        self.region = surface
         if self.region.flat or self.region.outline() is None:
             raise ScriptError(
                 f"region '{self.region.id}' has no surface that the program can follow",

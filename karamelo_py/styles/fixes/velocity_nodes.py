@@ -154,10 +154,7 @@ class VelocityNodes(Fix):
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
         # Contact may move held nodes only as far as they give way.
         self.prescribes_velocity = not self.bound
-
-    @property
-    def held_directions(self) -> tuple[int, ...]:
-        return tuple(k for k, formula in enumerate(self.formulas) if formula is not None)
+        self.held_directions = tuple(k for k, v in enumerate(self.formulas) if v is not None)
 
     @property
     def nodes(self) -> np.ndarray:
@@ -190,7 +187,7 @@ class VelocityNodes(Fix):
                 continue
             axes = unlike(other, self)
             shared = np.intersect1d(self.group.members, other.group.members) if axes else ()
-            if len(shared):
+            if len(shared) and other.mark:
                 names = " and ".join(f"v{AXES[k]}" for k in axes)
                 count = plural(len(shared), "node")
                 self.hub.warn(

@@ -1,6 +1,6 @@
 """A ball that pushes points with a force of depth squared."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Radius(Expression):
     script_kind = "a number or a formula above 0"
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> Expression:
+    def from_script(cls, hub: Hub, argument: Argument) -> Self:
         radius = super().from_script(hub, argument)
         if radius.is_constant and not radius.constant > 0:
             ID, style, group, kind, K, *centre, R = words_of(argument.statement)
