@@ -334,9 +334,8 @@ def _warn_about_groups(hub: Hub, simulation: Simulation) -> None:
             for moment, hook in fix.hooks().items()
             if isinstance(hook, CompiledHook) and hook.on_nodes
         )
-        unreached = (
-            of_mass and not fix.group.all and len(fix.group) and _out_of_reach(hub, simulation, fix)
-        )
+        chosen = of_mass and not fix.group.all and len(fix.group)
+        unreached = chosen and _out_of_reach(hub, simulation, fix)
         if unreached and hub.update.first_time(f"out of reach {fix.id}"):
             hub.warn(
                 f"fix {fix.style} '{fix.id}' acts on nodes that no point reaches: {NOTHING_THERE}",

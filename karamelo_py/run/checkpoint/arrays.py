@@ -328,10 +328,8 @@ def check_points(points: Points, arrays: ArraysByName, stem: str) -> None:
     for name, expected in expected_arrays.items():
         array = stored_arrays[name]
         expected = expected[0] if name == "x" and len(array.shape) == 2 else expected
-        if array.dtype != expected.dtype or array.shape != (
-            *expected.shape[:-1],
-            stored_arrays["id"].size,
-        ):
+        shape = *expected.shape[:-1], stored_arrays["id"].size
+        if array.dtype != expected.dtype or array.shape != shape:
             raise _misfit(f"{name} of points")
 
 
