@@ -373,7 +373,7 @@ def test_tiles_are_cut_by_work(monkeypatch):
     )  # fmt: skip
     method, blocks = hub.update.method, hub.simulation.setup.blocks
     two = SharedTiles(
-        SimpleNamespace(rank=0, size=2), method.lattices(hub), method.basis, 128, False, False,
+        SimpleNamespace(rank=0, size=2), method.lattices(hub), method.basis, 128, False,
         one_space=False,
     )  # fmt: skip
     of_first = {(1, 1, 0): 4, (3, 1, 0): 3, (1, 1, 1000): 4, (1, 7, 0): 6}

@@ -20,7 +20,7 @@ from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.corrected_acceleration import (
     Acceleration,
     CorrectAcceleration,
-    StoreAcceleration,
+    UpdateToCorrect,
     correct_acceleration,
 )
 from karamelo_py.kernels.equations.internal_force import InternalForce
@@ -402,9 +402,13 @@ def average_stress(s: Setup) -> tuple:
 
 
 def corrected(s: Setup) -> tuple:
-    if field(s.nodes.fields, Acceleration) is None:
-        return ()
-    return NodeTask(StoreAcceleration()), NodeTask(correct_acceleration)
+    is_corrected = field(s.nodes.fields, Acceleration) is not None
+    return (NodeTask(correct_acceleration),) if is_corrected else ()
+
+
+def update_velocity(s: Setup) -> tuple:
+    task = UpdateToCorrect() if len(corrected(s)) else nodes.NodalUpdate()
+    return (NodeTask(task),)
 
 
 def at_nodes_with(kind: type, task: Tag) -> Any:
@@ -487,7 +491,7 @@ UPDATE = (
     HEAT,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
-    NodeTask(nodes.NodalUpdate()),
+    SceneTask(update_velocity, nodes.NodalUpdate.says),
     CORRECTION,
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,

@@ -6,7 +6,7 @@ import numpy as np
 
 from karamelo_py.compiler import forget_array
 from karamelo_py.compiler.fields import SummedField, field, records
-from karamelo_py.kernels.arrays import Buffers, Nodes, Setup
+from karamelo_py.kernels.arrays import Buffers, Nodes, Setup, Tag
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.corrected_acceleration import Acceleration
 from karamelo_py.kernels.heat import Conducting
@@ -127,10 +127,15 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
     return [nodes.sums, nodes.velocity, *declared]
 
 
-def beyond(s: Setup) -> int:
-    """Return how many cells further contact, or the correction of accelerations, reads sums."""
-    corrected = field(s.nodes.fields, Acceleration) is not None
-    return max(s.contact.looks_beyond if isinstance(s.contact, SeparateFields) else 0, corrected)
+def read_beside(nodes: Nodes) -> list[np.ndarray]:
+    """Return the arrays that must be zero at nodes next to those in use."""
+    beside = field(nodes.fields, Acceleration)
+    return summed(nodes) + ([] if beside is None else [beside])
+
+
+def beyond(contact: Tag) -> int:
+    """Return how many cells further contact reads sums."""
+    return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
 def room_of(rows: int, array: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from karamelo_py.run.energy import EnergyWatch
 from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.bodies import check_bodies
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
-from karamelo_py.run.lower.walls import mark_held
+from karamelo_py.run.lower.walls import mark_sides
 from karamelo_py.run.mpi.whole import PointsMoved
 from karamelo_py.run.scene_arrays import SceneArrays
 from karamelo_py.run.stable_step import ruling_limit
@@ -214,7 +214,7 @@ class Simulation(SceneArrays):
             check_bodies(self.hub, self.setup.blocks, self.now)
         self.hub.update.method.begin(self.hub, self.setup.contact)
         if self.hub.update.method.corrected:
-            mark_held(self.hub, self.setup)
+            mark_sides(self.hub, self.setup)
 
     def _set_initial(self, fix: Fix) -> None:
         def act(_: Setup) -> None:

@@ -61,9 +61,7 @@ class Tiles:
     threads = 1  # for sums at nodes and sorting
     mode: Serial | Threaded = Serial()
 
-    def __init__(
-        self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool, corrected: bool
-    ):
+    def __init__(self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool):
         self.direct = points <= DIRECT_UP_TO  # scatter directly to the nodes, by tile
         self.dimension = d = lattices[0].dimension
         # By direction: cells of a tile of points, nodes of a tile of nodes.
@@ -85,9 +83,8 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points without a domain reach at most two cells beyond their tile; contact adds one, as
-        # the correction of accelerations does.
-        far = 2 if len(lattices) == 1 and not corrected else 3
+        # Points without a domain reach at most two cells beyond their tile; contact adds one.
+        far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
         most = float(np.diff(self.first) @ np.prod(widest, axis=1, dtype=float))
@@ -174,7 +171,7 @@ class Tiles:
         cells = float(self._cells.max())
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.motion[0].drift_limit + rounding if s.frame.moves else 0.0
-        beyond = far + drift + grid_boxes.beyond(s)
+        beyond = far + drift + grid_boxes.beyond(s.contact)
         return beyond if far < cells else cells  # also for NaN
 
     def _where(self, s: Setup, points: Points) -> np.ndarray:
@@ -433,7 +430,7 @@ class WholeDomain:
 
 def _empty(s: Setup, spans: np.ndarray) -> None:
     of = [s.nodes] + ([s.heat.nodes] if isinstance(s.heat, Conducting) else [])
-    arrays = [array for nodes in of for array in grid_boxes.summed(nodes)]
+    arrays = [array for nodes in of for array in grid_boxes.read_beside(nodes)]
     for begin, end in spans.tolist():
         for array in arrays:
             array[begin:end] = 0

@@ -9,87 +9,88 @@ return it in pairs, which conserves momentum to round-off::
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import index, real
-from karamelo_py.compiler.fields import StepField, field, vector
+from karamelo_py.compiler import index, real, where
+from karamelo_py.compiler.fields import StepField, field
 from karamelo_py.kernels import arrays
-from karamelo_py.kernels.arrays import MASS
+from karamelo_py.kernels.arrays import MASS, vector_at
 from karamelo_py.kernels.equations import RigidSums
-from karamelo_py.kernels.equations.node_updates import node_task, per_mass
+from karamelo_py.kernels.equations.node_updates import NodalUpdate, at_node, node_task
 from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import zero_vector
 
 
 class Acceleration(StepField):
-    """Change of a node's velocity by the forces of a step; 0 where the velocity is prescribed."""
+    """Change of a node's velocity by the forces, 0 where the velocity is prescribed; its mass."""
 
-    shape = vector
+    @staticmethod
+    def shape(kin):
+        return kin.dimension + 1
 
 
-class Held(StepField):
-    """1 where a fix prescribes the velocity of a node, else 0, per direction."""
+class Sides(StepField):
+    """Bits of a node: HELD << k for a fix that prescribes its velocity along axis k; at an edge of
+    its grid, LOWER << k or UPPER << k.
+    """
 
-    shape = vector
+
+HELD, LOWER, UPPER = 1, 8, 64
 
 
 @node_task
-class StoreAcceleration(NamedTuple):
-    goes_through = ("sums", "held", "acceleration")
+class UpdateToCorrect(NamedTuple):
+    """`NodalUpdate`; stores the change of the velocity for the next nodes."""
+
+    says = NodalUpdate.says
+    goes_through = (*NodalUpdate.goes_through, "sides", "acceleration")
 
     def at_node(task, kin, nodes, n, dt):
-        fixed, rigid = field(nodes.fields, Held), field(nodes.fields, RigidSums)
-        factor = dt * per_mass(nodes, n, dt)
-        if rigid is not None:
-            factor = real(0, dt) if rigid[n, MASS] > 0 else factor
+        at_node(NodalUpdate(), kin, nodes, n, dt)
+        stored, rigid = field(nodes.fields, Acceleration), field(nodes.fields, RigidSums)
+        sides = int(field(nodes.fields, Sides)[n, 0])
         for k in range(kin.dimension):
-            change = factor * nodes.sums[n, arrays.of_force(kin) + k]
-            field(nodes.fields, Acceleration)[n, k] = real(0, dt) if fixed[n, k] > 0 else change
+            change = nodes.update[n, arrays.of_change(kin) + k]
+            stored[n, k] = change if sides & (HELD << k) == 0 else real(0, dt)
+        stored[n, kin.dimension] = nodes.sums[n, MASS]
+        if rigid is not None and rigid[n, MASS] > 0:
+            for k in range(kin.dimension):
+                stored[n, k] = real(0, dt)
 
 
 @node_task
 class CorrectAcceleration(NamedTuple):
-    """Corrects v* and its change by the adjacent nodes along the axes."""
+    """Add the differences from the next nodes to v* and its change."""
 
     spread: Any  # kappa
     grids: Grid
 
     says = "accelerations corrected by the next nodes"
-    goes_through = ("sums", "sums", "acceleration", "acceleration", "update", "update")
+    goes_through = ("acceleration", "acceleration", "sides", "update", "update")
 
     def at_node(task, kin, nodes, n, dt):
-        if nodes.sums[n, MASS] > 0:
-            factor = task.spread / nodes.sums[n, MASS]
-            for axis in range(kin.dimension):
-                for way in (-1, 1):
-                    m = _beside(task, nodes, n, axis, way)
-                    _give_back(kin, nodes, n, m, factor)
+        stored, d = field(nodes.fields, Acceleration), kin.dimension
+        mass = stored[n, d]
+        if mass > 0:
+            sides, strides = int(field(nodes.fields, Sides)[n, 0]), _strides(task.grids, kin, n)
+            change = vector_at(kin, stored, n, 0, zero_vector(kin, dt))
+            more = zero_vector(kin, dt)
+            for axis in range(d):
+                for side, step in ((LOWER, -strides[axis]), (UPPER, strides[axis])):
+                    m = index(int(n) + where(sides & (side << axis) == 0, step, 0))
+                    other = vector_at(kin, stored, m, 0, change)
+                    more += min(mass, stored[m, d]) * (change - other)
+            factor = task.spread / mass
+            for k in range(d):
+                nodes.update[n, k] += factor * more[k]
+                nodes.update[n, arrays.of_change(kin) + k] += factor * more[k]
 
 
-def _give_back(kin, nodes, n, m, factor):
-    """Correct node `n` by node `m`, if that has mass; `m` is `n` at an edge of the grid."""
-    mass = min(nodes.sums[n, MASS], nodes.sums[m, MASS])
-    if mass > 0:
-        change = field(nodes.fields, Acceleration)
-        for k in range(kin.dimension):
-            more = factor * mass * (change[n, k] - change[m, k])
-            nodes.update[n, k] += more
-            nodes.update[n, arrays.of_change(kin) + k] += more
-
-
-def _beside(task, nodes, n, axis, way):
-    grids, g = task.grids, 0
+def _strides(grids, kin, n):
+    """Return the differences of the numbers of next nodes along the axes."""
+    g = 0
     while g + 1 < grids.first.size and int(n) >= grids.first[g + 1]:
         g += 1
-    end = grids.first[g + 1] if g + 1 < grids.first.size else nodes.sums.shape[0]
-    local = int(n) - grids.first[g]
-    step_x, step_y = grids.step_x[g], grids.step_y[g]
-    if axis == 0:
-        position, count, step = local // step_x, (end - grids.first[g]) // step_x, step_x
-    elif axis == 1:
-        position, count, step = local % step_x // step_y, step_x // step_y, step_y
-    else:
-        position, count, step = local % step_y, step_y, 1
-    inside = 0 <= position + way < count
-    m = int(n) + way * step if inside else int(n)
-    return index(m)
+    of_all = grids.step_x[g], grids.step_y[g], 1
+    return (*of_all[: kin.dimension - 1], 1)
 
 
 def correct_acceleration(s: arrays.Setup) -> CorrectAcceleration:

@@ -206,8 +206,7 @@ def lower(
     basis = type(method.basis)(*(real(x) for x in method.basis))
     if fixes := fixes_of_walls(hub):
         basis = with_walls(fixes, lattices, basis)
-    count = sum(solid.count for solid in hub.solids.values())
-    cut = lattices, basis, count, sparse(hub), method.corrected
+    cut = lattices, basis, sum(solid.count for solid in hub.solids.values()), sparse(hub)
     if comm.size == 1:
         tiles = Tiles(*cut)
     else:

@@ -8,7 +8,12 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import Setup
-from karamelo_py.kernels.equations.corrected_acceleration import Held
+from karamelo_py.kernels.equations.corrected_acceleration import (
+    HELD,
+    LOWER,
+    UPPER,
+    Sides,
+)
 from karamelo_py.points.basis import walled
 from karamelo_py.points.basis.splines import ABOVE, BELOW
 from karamelo_py.scene.hub import Hub
@@ -63,12 +68,19 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
             yield k, cell
 
 
-def mark_held(hub: Hub, s: Setup) -> None:
-    """Mark the nodes and directions that fixes hold in this run (`Held`)."""
-    fixed = field(s.nodes.fields, Held)
-    if fixed.any():  # pages that are never written take no memory
-        fixed[:] = 0
+def mark_sides(hub: Hub, s: Setup) -> None:
+    """Mark the nodes at edges of grids, and the nodes that fixes hold in this run (`Sides`)."""
+    sides = field(s.nodes.fields, Sides)[:, 0]
+    if sides.any():  # pages that are never written take no memory
+        sides[:] = 0
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas if fix.prescribes_velocity else ()):
             if formula is not None:
-                fixed[slice(None) if fix.group.all else fix.nodes, k] = 1
+                nodes = slice(None) if fix.group.all else fix.nodes
+                sides[nodes] = sides[nodes].astype(int) | HELD << k
+    for lattice in hub.lattices:
+        of_lattice = sides[lattice.first :][: lattice.node_count].reshape(lattice.shape)
+        for k in range(s.kin.dimension):
+            planes = np.moveaxis(of_lattice, k, 0)
+            planes[0] += LOWER << k
+            planes[-1] += UPPER << k

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler.fields import length_of_rows, rows_of_points, some_points
+from karamelo_py.compiler.fields import field, length_of_rows, rows_of_points, some_points
 from karamelo_py.kernels.arrays import Block, Points, Setup, Tag, Tiling, arrays_of, made_of
+from karamelo_py.kernels.equations.corrected_acceleration import Acceleration
 from karamelo_py.run.boxes import (
     Boxes,
     Reached,
@@ -90,11 +91,10 @@ class SharedTiles(Tiles):
         basis: Tag,
         points: int,
         sparse: bool,
-        corrected: bool,
         *,
         one_space: bool,
     ):
-        super().__init__(lattices, basis, points, sparse, corrected)
+        super().__init__(lattices, basis, points, sparse)
         self.comm = comm
         self.one_space = one_space  # bodies in contact have nodes at the same positions
         self._places = np.concatenate(
@@ -197,10 +197,13 @@ class SharedTiles(Tiles):
 
     def _boxes(self, s: Setup) -> Boxes:
         local, me = self.own_boxes(s), self.comm.rank
-        self._looks_beyond = beyond(s) > 0
+        self._looks_beyond = beyond(s.contact) > 0
+        corrected = field(s.nodes.fields, Acceleration) is not None
+        self._margin = int(corrected and not self._looks_beyond)
         of_all = {me: local, **dict(enumerate(self.comm.allgather(local)))}
         if len(local.grid):
-            low, high = local.lo.min(axis=0), local.hi.max(axis=0)
+            low = local.lo.min(axis=0) - self._margin
+            high = local.hi.max(axis=0) + self._margin
             for rank, boxes in of_all.items():
                 near = ((boxes.lo <= high) & (boxes.hi >= low)).all(axis=1)
                 of_all[rank] = Boxes(*(array[near] for array in boxes))
@@ -249,12 +252,10 @@ class SharedTiles(Tiles):
         _, reached = super()._reached(boxes)
         of, tile = self._of[reached.box], self._tile_of_domain(reached.tile)
         me = self.comm.rank
-        self._needs = {
-            int(rank): _needs(tile[here], reached.begin[here], reached.end[here])
-            for rank in unique(of)
-            for here in [of == rank]
-        }
-        self._owned = self._owned_boxes(boxes) if self._looks_beyond else []
+        self._needs = self._uses = self._by_rank(reached)
+        if self._margin:
+            self._needs = self._by_rank(super()._reached(self._widened(boxes))[1])
+        self._inner = self._inner_boxes(boxes) if self._looks_beyond else {}
         local, others = np.flatnonzero(of == me), np.flatnonzero(of != me)
         self._passed, self._from = {}, of[:0]
         if not len(local):
@@ -280,19 +281,33 @@ class SharedTiles(Tiles):
             *(np.append(a[:count], b, axis=0) for a, b in zip(boxes, more, strict=True))
         ), result
 
-    def _owned_boxes(self, boxes: Boxes) -> list[dict[int, tuple]]:
-        """Boxes of nodes whose neighbours are in them, too, by process; and all boxes."""
+    def _by_rank(self, reached: Reached) -> dict[int, Needs]:
+        of, tile = self._of[reached.box], self._tile_of_domain(reached.tile)
+        return {
+            int(rank): _needs(tile[here], reached.begin[here], reached.end[here])
+            for rank in unique(of)
+            for here in [of == rank]
+        }
+
+    def _widened(self, boxes: Boxes) -> Boxes:
+        """Return the boxes with all next nodes; their rows are whole."""
+        lo = np.maximum(boxes.lo - 1, 0)
+        hi = np.minimum(boxes.hi + 1, self._nodes[boxes.grid] - 1)
+        shape = hi - lo + 1
+        rows = np.zeros((len(lo), int(shape[:, :-1].prod(axis=1).max(initial=0)), 2), np.int64)
+        rows[:, :, 1] = shape[:, -1:] - 1
+        return boxes._replace(lo=lo, hi=hi, rows=rows)
+
+    def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
+        """Shrink boxes to nodes whose neighbours are in them, too, by process."""
         low = np.where(boxes.lo > 0, boxes.lo + 1, 0)
         end = self._nodes[boxes.grid] - 1
         high = np.where(boxes.hi < end, boxes.hi - 1, end)
-        return [
-            {
-                int(rank): (boxes.grid[here], first[here], last[here])
-                for rank in unique(self._of)
-                for here in [self._of == rank]
-            }
-            for first, last in ((low, high), (boxes.lo, boxes.hi))
-        ]
+        return {
+            int(rank): (boxes.grid[here], low[here], high[here])
+            for rank in unique(self._of)
+            for here in [self._of == rank]
+        }
 
     def _number(self, s: Setup, boxes: Boxes) -> tuple[np.ndarray, ...]:
         first, steps = super()._number(s, boxes)
@@ -318,21 +333,27 @@ class SharedTiles(Tiles):
         if self._looks_beyond:
             nodes.append(self._unknown(between(*rows_of(self._parts(grid, begin, end, 0, 0)))))
         else:
-            for rank, needs in self._needs.items():
+            for rank, needs in self._uses.items():
                 if rank < me:
                     which, low, high = needs.among(self._tile_of_domain(tiles), begin, end)
                     nodes.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
+        if self._margin and me in self._uses:
+            which, low, high = self._uses[me].among(self._tile_of_domain(tiles), begin, end)
+            own = between(*rows_of(self._parts(grid[which], low, high, 0, 0)))
+            every = between(*rows_of(self._parts(grid, begin, end, 0, 0)))
+            nodes.append(every[~np.isin(every, own)])
         self._marked = np.concatenate(nodes)
         self.foreign[self._marked] = 1
 
     def _unknown(self, nodes: np.ndarray) -> np.ndarray:
         count = int(self._nodes[0].prod()) if self.one_space else len(self.foreign)
-        number, owner = nodes % count, np.full(len(nodes), -1)
-        for of_ranks in self._owned:
-            for rank, boxes in sorted(of_ranks.items()):
-                seen = np.isin(number, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
-                owner[seen & (owner < 0)] = rank
-        return nodes[owner != self.comm.rank]
+        number = nodes % count
+        for rank, boxes in sorted(self._inner.items()):
+            seen = np.isin(number, between(*rows_of(self._parts(*boxes, 0, 0))) % count)
+            if rank == self.comm.rank:
+                return nodes[~seen]
+            number = np.where(seen, -1, number)
+        return nodes
 
     def give(self, s: Setup, number: int, kinds: int) -> None:
         """Begin to exchange the contributions of tiles to other processes' nodes."""

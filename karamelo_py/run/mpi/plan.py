@@ -70,7 +70,7 @@ def bytes_of_node(simulation: Simulation) -> int:
 def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_space = method.lattices(simulation.hub), method.fields_per_solid
-    few = simulation.count, sparse(simulation.hub), method.corrected
+    few = simulation.count, sparse(simulation.hub)
     boxes: list[Boxes] = []  # of all
     of_all = [
         SharedTiles(

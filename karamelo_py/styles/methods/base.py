@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.equations.corrected_acceleration import Acceleration, Held
+from karamelo_py.kernels.equations.corrected_acceleration import Acceleration, Sides
 from karamelo_py.kernels.equations.fbar import FBar, FBarOfSoil, PointByPoint
 from karamelo_py.language import registry
 from karamelo_py.language.rules import Restrictions
@@ -92,7 +92,7 @@ class Method:
 
     @property
     def node_fields(self) -> tuple[type, ...]:
-        return (Acceleration, Held) if self.corrected else ()
+        return (Acceleration, Sides) if self.corrected else ()
 
     @property
     def regular_points(self) -> bool:
