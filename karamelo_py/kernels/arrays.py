@@ -126,7 +126,7 @@ class Buffers(NamedTuple):
     buffer.
     """
 
-    nodes: Nodes  # fields that points scatter to
+    nodes: Nodes
     count: np.ndarray  # (2,) int64: parts; 1 if the nodes are the only buffer
     first: np.ndarray  # (S + 1,) int64: rows of part k are first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
@@ -158,7 +158,7 @@ class OnGrids(NamedTuple):
 class Matter(NamedTuple):
     kin: Tag
     points: Points
-    laws: NamedTuple  # as in `Block`
+    laws: NamedTuple
 
 
 def matter_of(kin: Tag, block: Block) -> Matter:
@@ -281,7 +281,7 @@ MOTION = np.dtype([
     ("speed", np.float64),  # of the fastest point, in cells per time
     ("move", np.float64),  # largest in this step, in cells
     ("new_move", np.float64),
-    ("stride", np.float64),  # cells that a point may move in a step
+    ("stride", np.float64),
     ("drift", np.float64),  # since the points were sorted, in cells
     ("drift_limit", np.float64),
     ("pace", np.float64),  # largest move in a step since then
@@ -349,10 +349,10 @@ LAST = 2**62  # above any id of a point
 class Control(NamedTuple):
     values: np.ndarray  # published values, after TIME, TIMESTEP, DT
     clock: np.ndarray  # (1,) CLOCK, for copies and files; the next four are its parts
-    step: np.ndarray  # (1,) STEP
-    motion: np.ndarray  # (1,) MOTION
-    energy: np.ndarray  # (1,) ENERGY
-    heat: np.ndarray  # (1,) HEAT
+    step: np.ndarray
+    motion: np.ndarray
+    energy: np.ndarray
+    heat: np.ndarray
     totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of published values; of mass and
     #                     momentum of each solid (1 + d); of elastic energy and this times velocity
     digits: np.ndarray  # (LIMBS,) scratch
@@ -376,14 +376,14 @@ def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> C
 class Setup(NamedTuple):
     """All arguments of a step; its type selects the code."""
 
-    frame: Tag  # present or reference positions
+    frame: Tag
     kin: Tag
     basis: Tag
     transfer: Tag
-    averaging: Tag  # F-bar or none
+    averaging: Tag
     contact: Tag
     bodies: Tag  # freely moving rigid bodies, or none
-    heat: Tag  # conduction and its nodes, or none
+    heat: Tag
     water: Tag  # in the pores, or none
     grids: Grid  # an array (g,) for each number
     nodes: Nodes

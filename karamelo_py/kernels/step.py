@@ -50,8 +50,8 @@ def untaken(rows: Iterable[Any], backend: type) -> list[str]:
 
 
 class InStep(NamedTuple):
-    mode: Tag  # one thread or several
-    hooks: Tag  # of the fixes
+    mode: Tag
+    hooks: Tag
     more: bool  # another step follows: leave its sums on the nodes (fused)
 
 

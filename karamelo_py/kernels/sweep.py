@@ -74,13 +74,13 @@ class Context(NamedTuple):
     buffers: Nodes  # nodes to scatter to
     now: int
     room: Number  # cells that points may still move within their tile's box
-    stride: Number  # cells that they may move at all
-    common: tuple  # (d,) reference velocity for speeds
+    stride: Number
+    common: tuple  # (d,)
     then: int  # index of the array of new locations
-    gathers: bool  # whether tasks are done
-    scatters: bool  # whether quantities are scattered
+    gathers: bool
+    scatters: bool
     dt: Number
-    kick: Number  # time that forces act
+    kick: Number
 
 
 class OldWeights(NamedTuple):

@@ -131,7 +131,7 @@ class Sweep(NamedTuple):
     scatters: bool = True
     moves: bool = True  # new positions go to the other array
     only_if_more: bool = False  # the scatter belongs to the next step
-    at: Any = None  # function of the setup: one with other nodes
+    at: Any = None
     reported: Any = take_reports  # accepts the points' reports, unless None
 
 

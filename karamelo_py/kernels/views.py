@@ -48,8 +48,8 @@ class Work(NamedTuple):
     points: Points
     laws: NamedTuple  # parameters of materials, (m,) each
     locations: Locations
-    common: tuple  # (d,) velocity that speeds are measured from
-    kick: Number  # time that forces act
+    common: tuple  # (d,) reference velocity for speeds
+    kick: Number
 
 
 @algebra

@@ -307,7 +307,7 @@ class ShareForces(NamedTuple):
 
 @node_task
 class DragWater(NamedTuple):
-    """Relative velocity after the step, from the soil's change; restores the soil's mass."""
+    """Sets the relative velocity after the step from the soil's change, and the soil's mass."""
 
     says = "drag"
     goes_through = ("sums", "update", "water sums", "pore sums", "water update")

@@ -164,7 +164,7 @@ class Viscoelastic(NamedTuple):
             raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
         if not sum(pairs[::2]) < 1:
             message = f"the fractions g sum to {sum(pairs[::2]):g}: no stiffness would remain"
-            raise ScriptError(message, argument="pairs", expected="g and tau in turn")
+            raise ScriptError(message, argument="pairs", expected="g and tau alternately")
         branches, G = Absent(), strained(elastic.whole, 1)[3]
         for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
             branches = Branch(g, tau, 0.25 / (g * G), branches)

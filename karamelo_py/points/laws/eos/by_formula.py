@@ -110,7 +110,7 @@ class EosFormula(ByPressure, EosFields):
 
 
 def eos_of(rho0: float, formula: Expression, E: float, style: str) -> NamedTuple:
-    """Build the equation of state; ScriptError without a value or stiffness at rest."""
+    """Build the equation of state; raise ScriptError without a value or stiffness at rest."""
     term = formula
     check_operations(term, "p")
     slopes = [derivative(term, name) for name in NAMES]
