@@ -30,7 +30,7 @@ from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.contact import ListedPairs
 
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
-# Vectors have three components in any dimension. The layout is that of restart files.
+# Vectors have three components in any dimension. Restart files have this layout.
 STATE = np.dtype([
     ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # of the centre
     ("momentum", *_VECTOR),  # angular
