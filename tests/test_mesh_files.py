@@ -382,7 +382,8 @@ def test_nastran_in_systems_of_coordinates(system, right, tmp_path):
     (tmp_path / "b.nas").write_text(
         f"SOL 101\nCEND\nBEGIN BULK\n{system}{CUBE_IN_NASTRAN}ENDDATA\nGRID,1,5\n"
     )
-    for name in ("a.bdf", "b.nas"):
+    (tmp_path / "c.dat").write_text((tmp_path / "b.nas").read_text())
+    for name in ("a.bdf", "b.nas", "c.dat"):
         for group in (None, 11):
             assert volume(tmp_path / name, 3, group) == pytest.approx(right, rel=1e-12)
     assert read(tmp_path / "a.bdf", 3).left_out == {"CBAR": 1}
@@ -613,6 +614,7 @@ def test_pixels_voxels_and_numbers_of_elements(type_, d, tmp_path):
     [
         ("a.inp", CUBE + "*Assembly\n*SURFACE, TYPE=NODE, NAME=S\nI.NOPE, 1\n*End Assembly\n"),
         ("a.inp", CUBE + "*ADD, SET=1\n1, 2\n*NUMBERS\n"),
+        ("a.inp", CUBE + "*ELEMENT, TYPE=U1\n7, 1, 2\n*ELGEN, ELSET=E\n7, 3\n"),
     ],
 )
 def test_keywords_that_mean_nothing_here_are_passed_over(name, text, tmp_path):

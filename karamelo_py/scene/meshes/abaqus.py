@@ -237,6 +237,8 @@ class _Deck:
     def _elgen(self, keyword: DeckKeyword) -> None:
         for row in table_of(keyword, 2, 10).astype(np.int64):
             named = [e for e in self.scope.elements if row[0] in e.numbers]
+            if not named and self.scope.skipped:
+                continue
             if not named:
                 raise wrong(keyword, f"of element {row[0]}, which is not defined above")
             kind, label, numbers, nodes = named[-1]

@@ -49,6 +49,9 @@ _FOREIGN = (
 )  # fmt: skip
 
 
+_BULK = re.compile(rb"^(SOL|CEND|BEGIN +BULK|GRID)\b", re.M | re.I)
+
+
 class MeshFile(InputFile):
     endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *BY_GMSH, *EXODUS, *LSDYNA} - {
         ".svg"
@@ -138,7 +141,7 @@ def _by_content(path: Path) -> Mesh:
         return read_obj(path)
     if ending in EXODUS:
         return read_exodus(path)
-    if ending in NASTRAN:
+    if ending in NASTRAN or (ending == ".dat" and _BULK.search(begin)):
         return read_nastran(path)
     if begin.lstrip().startswith(b"MFEM"):
         return read_mfem(path)
