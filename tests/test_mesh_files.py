@@ -13,7 +13,7 @@ from hubs import SmallHub
 from scipy.io import netcdf_file
 
 from karamelo_py.scene.meshes.by_gmsh import begin
-from karamelo_py.scene.meshes.elements import _MIDDLES as MIDDLES
+from karamelo_py.scene.meshes.elements import MIDDLES
 from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.scene.solid import words_of_volumes
@@ -225,7 +225,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.vtu", VTU.format(n=3, x="0 " * 9, nodes="0 1 7", type=5), "a node that is not"),
         ("a.med", b"\x89HDF\r\n\x1a\n" + bytes(200), "the file is damaged"),
         ("a.mesh", "MFEM NURBS mesh v1.0\n", "it is of MFEM's kind 'MFEM NURBS mesh v1.0'"),
-        ("a.mesh", "MFEM mesh v1.0\nvertices\n4\nnodes\n", "its elements have curved edges"),
+        ("a.mesh", "MFEM mesh v1.0\nvertices\n4\nnodes\n", "its edges are curved ('nodes'"),
         ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
         ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "the mesh a.inp is empty"),
         ("a.k", "*KEYWORD\n*NODE\n1,&x,0,0\n", "a.k, line 2: *NODE has parameters (&)"),
@@ -460,6 +460,36 @@ def test_meshes_of_mfem(tmp_path):
         assert volume(tmp_path / "a.mesh", 2, group) == pytest.approx(right, rel=1e-14)
     assert volume(tmp_path / "b.mesh", 2) == 2.5
     assert [lines(tmp_path / "a.mesh", group) for group in ("left", "boundary:4")] == [1, 1]
+
+
+@pytest.mark.parametrize("ordering", [0, 1])
+@pytest.mark.parametrize(
+    ("kind", "dent", "right"),
+    [
+        (3, 4, 1 + 2 / 3 * 0.1),  # the first edge, of a square: below a parabola
+        (5, 8 + 12 + 5, 1 + 4 / 9 * 0.1),  # the last face, of a cube: below a bubble
+    ],
+)
+def test_second_order_of_mfem(kind, dent, right, ordering, tmp_path):
+    """Corners, edges in the order of MFEM (mfem/fem/geom.cpp), faces, the centre: by hand."""
+    square = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    edges = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    if kind == 3:
+        d, x, middles = 2, np.array(square, float), [*edges, range(4)]
+    else:
+        d, x = 3, np.array([(*p, z) for z in (0, 1) for p in square], float)
+        across = [(0, 4), (1, 5), (2, 6), (3, 7)]
+        faces = [(0, 1, 2, 3), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)]
+        middles = [*edges, *((a + 4, b + 4) for a, b in edges), *across, *faces, range(8)]
+    nodes = np.concatenate([x, [x[list(of)].mean(axis=0) for of in middles]])
+    nodes[dent, d - 1] += 0.1 if d == 3 else -0.1
+    values = nodes if ordering else nodes.T
+    (tmp_path / "a.mesh").write_text(
+        f"MFEM mesh v1.0\ndimension\n{d}\nelements\n1\n1 {kind} {' '.join(map(str, range(2**d)))}"
+        f"\nboundary\n0\nvertices\n{2**d}\nnodes\nFiniteElementSpace\nFiniteElementCollection: "
+        f"H1_{d}D_P2\nVDim: {d}\nOrdering: {ordering}\n\n" + " ".join(map(str, values.ravel()))
+    )
+    assert volume(tmp_path / "a.mesh", d) == pytest.approx(right, rel=1e-12)
 
 
 GMSH = """\

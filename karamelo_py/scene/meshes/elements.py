@@ -51,7 +51,7 @@ SHAPES = {
 }
 
 # Corners whose mean is a further node of second-order elements: edges, then faces.
-_MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
+MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0), (0, 1, 2, 3)),
@@ -151,7 +151,7 @@ def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
     else:
         corners = np.array(shape.corners, float)
-        middles = [corners[list(of)].mean(axis=0) for of in _MIDDLES.get(shape.name, ())]
+        middles = [corners[list(of)].mean(axis=0) for of in MIDDLES.get(shape.name, ())]
         coordinates = tuple(
             map(tuple, np.concatenate([corners, *(m[None] for m in middles)]).tolist())
         )
