@@ -13,8 +13,7 @@ from hubs import SmallHub
 from scipy.io import netcdf_file
 
 from karamelo_py.scene.meshes.by_gmsh import begin
-from karamelo_py.scene.meshes.elements import MIDDLES
-from karamelo_py.scene.meshes.elements import SHAPES, elements_of, measured
+from karamelo_py.scene.meshes.elements import MIDDLES, SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
 from karamelo_py.scene.solid import words_of_volumes
 from karamelo_py.script.errors import ScriptError
