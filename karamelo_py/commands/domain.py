@@ -343,7 +343,7 @@ def group(
     kind: Literal["particles", "nodes"],
     by: Literal["region", "mesh"],
     region: Annotated[Region | Path, RegionOrFile],
-    of: str | int,
+    of: Literal["all", "solid"] | str | int,
     *solids: Solid,
 ) -> None:
     """Name a set of points or of nodes.

@@ -57,7 +57,7 @@ def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:
-    words = {p.shown for p in slots if p.shown != p.name}
+    words = {word for p in slots if p.shown != p.name for word in p.shown.split("|")}
     return [f"{p.name}ID" if p.shown == p.name in words else p.shown for p in missing]
 
 
