@@ -3,10 +3,13 @@
 from math import sqrt
 
 import numpy as np
+import pandas
 import pytest
+from conftest import INPUTS
 from scipy.optimize import brentq
 from tensors import every_kinematics, flat
 
+from karamelo_py.app.cli import main
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Space, tensor
@@ -18,7 +21,13 @@ from karamelo_py.points.laws import (
     kirchhoff_stress,
     wave_speed_squared,
 )
-from karamelo_py.points.laws.by_energy import first_instability, value_at
+from karamelo_py.points.laws.by_energy import (
+    ISOCHORIC,
+    PATHS,
+    directional_stiffness,
+    first_instability,
+    value_at,
+)
 from karamelo_py.points.laws.elastic import State
 from karamelo_py.points.laws.fibres import Holzapfel
 from karamelo_py.points.laws.formulas import with_numbers
@@ -41,6 +50,7 @@ FORMULA = "G/2*(I1 - 3) - G*log(J) + lam/2*log(J)^2"
 IN_STRETCHES = "G/2*(l1^2 + l2^2 + l3^2 - 3) - G*log(J) + lam/2*log(J)^2"
 LAWS = {form: ready(1000, form, G=G, lam=LAM) for form in (FORMULA, IN_STRETCHES)}
 SPACE = Space()
+ISO = "I1*J^(-2/3) - 3"
 TISSUE = Holzapfel.given(1, 0.3, 0.8, 0.9, 5, fibre=(0.6, 0.8, 0.0), fibre2=(0.6, -0.8, 0.0))
 HOOPED = Holzapfel.given(1, 0.3, 0.8, 0.9, 5, fibre=(0.0, 0.0, 1.0))
 
@@ -239,6 +249,121 @@ def test_waves_are_no_faster_than_their_bound(law, stretches):
     assert bound > 0.98 * fastest - 1e-6
     if stretches == (1, 1, 1) and law is not TISSUE:
         assert bound == pytest.approx(fastest, rel=1e-3)
+
+
+BAD = {
+    "Saint-Venant without lam": SaintVenantKirchhoff.given(1, 0.0, 1.0),
+    "Saint-Venant": SaintVenantKirchhoff.given(1, 10.0, 1.0),
+    "C10 < 0": MooneyRivlin.given(1, -0.1, 0.5, 20),
+    "C01 < 0": MooneyRivlin.given(1, 0.6, -0.1, 20),
+    "C20 < 0": Yeoh.given(1, 20, 0.5, -0.1),
+    "C30 < 0": Yeoh.given(1, 20, 0.5, 0.0, -0.01),
+    "mu < 0": Ogden.given(1, 20, 2.0, 1.3, -0.3, 3.0),
+    "a square too much": ready(1, f"({ISO})/2 - 0.1*({ISO})^2 + 10*(J - 1)^2"),
+    "a bounded energy": ready(1, f"1 - exp(-({ISO})) + 10*(J - 1)^2"),
+    "a logarithm": ready(1, f"log(1 + {ISO}) + 10*(J - 1)^2"),
+    "soft in tension": ready(1, f"({ISO})/2 + 10*(J - 1)^2*exp(-J)"),
+}
+
+
+@pytest.mark.parametrize("law", BAD.values(), ids=BAD)
+def test_bad_constants_are_found(law):
+    """Where the warning says, the energy is no longer convex by the logarithm of the stretch."""
+    path, x = first_instability(law)
+    e, h = np.log(x), 1e-3
+
+    def curvature(e):
+        W = [
+            energy_density(law, SPACE, State(flat(SPACE, np.diag(PATHS[path](np.exp(at))))))
+            for at in (e - h, e, e + h)
+        ]
+        return (W[0] + W[2] - 2 * W[1]) / h**2
+
+    assert curvature(0.0) > 0
+    assert min(curvature(e) if path in ISOCHORIC else 1, directional(law, path, x)) <= 0
+
+
+def directional(law, path, x):
+    return min(directional_stiffness(law, PATHS[path](x), a) for a in range(3))
+
+
+def test_good_rubbers_are_not_doubted():
+    """Treloar's rubber by Ogden (1972), and the examples of the help."""
+    for law in (
+        Ogden.given(1, 2e3, 0.63, 1.3, 0.0012, 5, -0.01, -2),
+        Yeoh.given(1, 200, 0.5, -0.01, 0.002),
+        Gent.given(1, 0.4, 80, 20),
+        Gent.given(1, 0.4, 4, 20),  # its path ends at the limit of the chains
+        ArrudaBoyce.given(1, 0.28, 5.4, 20),
+        MooneyRivlin.given(1, 0.15, 0.05, 20),
+    ):
+        assert first_instability(law) is None
+
+
+# Treloar (1944): stretch and nominal stress (MPa), uniaxial, equibiaxial and pure shear.
+TRELOAR = {
+    None: ((1.39, 0.32), (2.17, 0.58), (3.01, 0.85), (4.76, 1.58), (5.76, 2.29), (6.87, 3.75)),
+    "equal": ((1.14, 0.26), (1.69, 0.65), (2.49, 0.96), (3.43, 1.45), (4.26, 2.22)),
+    "shear": ((1.32, 0.33), (1.87, 0.59), (2.98, 0.93), (3.96, 1.28), (4.96, 1.79)),
+}
+
+
+@pytest.mark.parametrize("way", TRELOAR)
+def test_rubber_of_treloar(way):
+    """Three terms of Ogden (1972), fitted by him to these tests: within 12 %."""
+    law = Ogden.given(1e-3, 2e3, 0.618, 1.3, 0.00118, 5, -0.00981, -2)
+    for x, measured in TRELOAR[way]:
+        sides = {None: x**-0.5, "equal": x, "shear": 1.0}[way]
+        assert apart(law, x, sides) / x == pytest.approx(measured, rel=0.12, abs=0.03)
+
+
+@pytest.mark.full
+def test_ogden_is_fitted_to_the_points_of_treloar(tmp_path, monkeypatch, capsys):
+    """karamelo-py fit of two moduli, the exponents given: within 4 % of the measured stress."""
+    lines = ["m1 = 0.4", "m2 = 0.001", "material(r, ogden, 1e-3, 500, m1, 1.4, m2, 5)"]
+    points, names = TRELOAR[None][1::2], []
+    for k, (x, _) in enumerate(points):
+        n = 3 * (k + 1)
+        lines += [f"load_path(p{k}, {n}, exx={n * (x ** (1 / n) - 1)}, syy=0, szz=0)"]
+        lines += [f"element(e{k}, r, p{k})", f"U{k} = e{k}_sxx/{x}"]
+        names.append(f"U{k}")
+    lines += ["material(s, linear, 1, 1, 0)", "method(tlmpm, FLIP, linear, 1)"]
+    lines += ["dimension(1, 0, 1, 1)", "region(b, block, 0, 1)", "solid(b, region, b, 1, s, 1, 0)"]
+    lines += [f"log_modify(custom, step, {', '.join(names)})", "run(0)"]
+    (tmp_path / "in.treloar").write_text("\n".join(lines), "utf-8")
+    monkeypatch.chdir(tmp_path)
+    targets = [f"{name}={P}" for name, (_, P) in zip(names, points, strict=True)]
+    words = [word for target in targets for word in ("-match", target)]
+    words += ["-var", "m1=0.3,0.8", "-var", "m2=5e-4,3e-3", "-o", "fit.csv"]
+    assert main(["fit", "in.treloar", *words]) == 0
+    assert "m1" in capsys.readouterr().out
+    rows = pandas.read_csv("fit.csv")
+    misfits = [abs(rows[name] / P - 1) for name, (_, P) in zip(names, points, strict=True)]
+    assert np.nanmin(np.max(misfits, axis=0)) < 0.04
+
+
+def test_a_strip_with_fibres_has_the_force_of_one_element(run_interpreted):
+    """in.fibre_strip: homogeneous, so the same force as one point in plane stress."""
+    script = (
+        (INPUTS / "in.fibre_strip")
+        .read_text("utf-8")
+        .replace("refine  = 1", "refine  = 0.25")
+        .replace("strip, 2,", "strip, 1,")
+    )
+    lines = [line for line in script.splitlines() if not line.startswith("dump")]
+    log = run_interpreted("\n".join(lines).replace("n       = 20", "n       = 2")).log
+    assert log["force"][-1] == pytest.approx(log["exact"][-1], rel=2e-3)
+    assert log["force"][-1] > 0.004
+
+
+@pytest.mark.full
+def test_a_seal_is_pressed_flat(run_script):
+    """in.seal: a cylinder between plates (Johnson 1985, equation 5.57), up to 10 %."""
+    log = run_script((INPUTS / "in.seal").read_text("utf-8")).log
+    now, hertz = np.array(log["now"]), np.array(log["hertz"])
+    some = (now > 0.045) & (now < 0.105)
+    assert some.sum() >= 4 and hertz[some] == pytest.approx(now[some], rel=0.02)
+    assert (np.diff(log["force"]) > 0).all() and now[-1] == pytest.approx(0.25)
 
 
 def test_a_power_of_0_is_1():

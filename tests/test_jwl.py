@@ -81,6 +81,10 @@ def test_the_slab_of_tnt(run_script):
         fronts.append(at["x"][at["p"] > 0.5 * peaks[-1]].max())
     assert (fronts[1] - fronts[0]) / (0.4 * 0.1 / D) == pytest.approx(D, rel=0.01)
     assert 0.9 * 21e9 < peaks[1] < 21e9
+    # The release behind the front, extended to it by a parabola, has no width.
+    x = at["x"] - 0.08
+    behind = (x > -0.04) & (x < -0.008)
+    assert np.polyfit(x[behind], at["p"][behind], 2)[-1] == pytest.approx(21e9, rel=0.01)
     assert peaks[0] < peaks[1]  # the release behind the front flattens
     assert at["vx"].max() == pytest.approx(21e9 / RHO / D, rel=0.1)
     log = done.log

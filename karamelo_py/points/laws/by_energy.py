@@ -4,10 +4,10 @@ Formulas of invariants are computed in lanes; of principal stretches, or with `O
 point (`karamelo_py.points.laws.formulas`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from itertools import combinations, product
-from math import isfinite, sqrt
+from math import exp, isfinite, sqrt
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -183,32 +183,57 @@ def directional_stiffness(law: NamedTuple, stretches: Sequence[float], a: int) -
     """Return l_a^2 d2W/dl_a^2 at principal stretches, rho c^2 of a wave along direction `a`."""
     if isinstance(law, OfStretches):
         return stretches[a] ** 2 * evaluated(law.second[(0, 3, 5)[a]], law, stretches)
+    at, x = invariants_of(stretches), stretches[a] ** 2
+    return along_direction(law, at, x, at[0] - x)
+
+
+def invariants_of(stretches: Sequence[float]) -> tuple[float, float, float]:
     squares = [x * x for x in stretches]
-    J, first, x = stretches[0] * stretches[1] * stretches[2], sum(squares), squares[a]
+    first = sum(squares)
     second = 0.5 * (first * first - sum(x * x for x in squares))
-    return along_direction(law, (first, second, J), x, first - x)
+    return first, second, stretches[0] * stretches[1] * stretches[2]
 
 
-PATHS = {
+def stiffness_of_path(law: NamedTuple, stretches: Callable, x: float) -> float:
+    """Return the curvature of the energy by ln x along a path (Drucker's stability)."""
+    ends = [tuple(map(float, stretches(x * exp(h)))) for h in (-NEAR, 0, NEAR)]
+    if not isinstance(law, OfStretches):
+        ends = [(*invariants_of(end), 1.0, 1.0) for end in ends]
+    W = [evaluated(law.energy, law, end) for end in ends]
+    return W[0] + W[2] - 2 * W[1]
+
+
+ISOCHORIC = {
     "uniaxial stretching at constant volume": lambda x: (x, x**-0.5, x**-0.5),
     "biaxial stretching at constant volume": lambda x: (x, x, x**-2),
+    "shear at constant volume": lambda x: (x, 1 / x, 1.0),
+}
+PATHS = ISOCHORIC | {
     "uniaxial strain": lambda x: (x, 1.0, 1.0),
     "swelling": lambda x: (x, x, x),
 }
+NEAR = 1e-3
 
 
 @lru_cache(typed=True)
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Return path and stretch nearest to rest where a principal direction loses its stiffness."""
+    """Return path and stretch nearest to rest where a direction or a path loses its stiffness.
+
+    The path ends where the energy does, such as at the limit of chains.
+    """
     unstable = []
     for (path, stretches), end in product(PATHS.items(), (0.5, 3.0)):
         for x in np.geomspace(1, end, 60)[1:].tolist():
             at = stretches(x)
             try:
-                least = min(directional_stiffness(law, at, a) for a in {*map(at.index, at)})
+                stiffness = [directional_stiffness(law, at, a) for a in {*map(at.index, at)}]
+                if path in ISOCHORIC:
+                    stiffness.append(stiffness_of_path(law, stretches, x))
             except (ValueError, ZeroDivisionError, OverflowError):
-                least = -1.0
-            if not least > 0:
+                break
+            if not all(map(isfinite, stiffness)):
+                break
+            if not min(stiffness) > 0:
                 unstable.append((abs(np.log(x)), path, x))
                 break
     return min(unstable)[1:] if unstable else None
