@@ -32,7 +32,7 @@ from karamelo_py.points.laws.eos import (
     initial_energy,
     pressure,
 )
-from karamelo_py.points.laws.eos.by_formula import MieGrueneisen, StiffenedGas
+from karamelo_py.points.laws.eos.by_formula import EosFormula, MieGrueneisen, StiffenedGas
 from karamelo_py.points.laws.eos.p_alpha import PAlpha
 from karamelo_py.points.laws.eos_strength import EosStrength, volume_energy
 from karamelo_py.points.laws.formulas import with_numbers
@@ -310,6 +310,20 @@ def test_a_stiffened_gas_follows_its_isentrope(J):
     there, memory = at_pressure(gas, 1.0, initial_energy(gas, 1.0), 0.5, ())
     assert there == pytest.approx((6.5 / 6.1) ** (-1 / 4.4), rel=1e-4)
     assert pressure(gas, there, memory, ()) == pytest.approx(0.5, rel=1e-12)
+
+
+def test_pressure_by_formula_has_temperature_and_energy():
+    """p = K (1 - J) + a (T - T0); stored K x^2/2 + a (T - T0) x at constant T, x = 1 - J."""
+    made = EosFormula.given(8.0, with_numbers("160*(1 - J) + 0.01*(T - 300)"), T=300.0)["eos"]
+    heat = PlasticWork(0.0, 1.0, 0.0, 0.0, 300.0, 2000.0)
+    law = EosStrength(made, Elastic(80.0), temperature=heat)
+    state = with_temperature(law, SPACE, start(law, SPACE), 400.0)
+    state, work = worked(law, SPACE, state, 1e-3 * SHRINK, 30)
+    x = 1 - state.J
+    assert pressure_of(law, SPACE, state) == pytest.approx(160 * x + 1, rel=1e-9)
+    stored = energy_density(law, SPACE, state)
+    assert stored == pytest.approx(80 * x * x + x, rel=1e-9)
+    assert work == pytest.approx(stored, rel=1e-3)
 
 
 def test_a_shock_in_one_step_is_on_the_hugoniot():

@@ -25,13 +25,14 @@ from karamelo_py.points.laws.formulas import (
     with_numbers,
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script import terms
 from karamelo_py.script.derivatives import derivative
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
-NAMES = ("J", "E")
+NAMES = ("J", "E", "T")
 SOLUTIONS = 3  # passes for the energy of a step; one if the pressure is linear in it
 MOST_PASSES = 60
 
@@ -39,10 +40,12 @@ MOST_PASSES = 60
 class PressureFormula(FormulaOf):
     """Script argument: a pressure by volume ratio and internal energy."""
 
-    script_kind: ClassVar[str] = "a formula of J and E"
+    script_kind: ClassVar[str] = "a formula of J, E and T"
     names = NAMES
     quantity = "the pressure"
-    expected = "a formula of J and E, the volume ratio and the internal energy per initial volume"
+    expected = (
+        "a formula of J, E and T: volume ratio, internal energy per initial volume, temperature"
+    )
 
 
 class ByPressure:
@@ -59,7 +62,7 @@ class GasByPressure(ByPressure):
     traits = LawTraits(any_speed=True, least_density=1e-3)
 
 
-EosFields = namedtuple("EosFields", ("specific_volume", "initial"))
+EosFields = namedtuple("EosFields", ("specific_volume", "initial", "initial_temperature"))
 
 
 class EosFormula(ByPressure, EosFields):
@@ -70,10 +73,12 @@ class EosFormula(ByPressure, EosFields):
     rho0
         Density before deformation.
     p
-        Pressure: a formula of J = rho0/rho and the internal energy E per initial volume. Script
-        variables are numbers.
+        Pressure: a formula of J = rho0/rho, the internal energy E per initial volume, and the
+        temperature T. Script variables are numbers.
     E
         Initial internal energy.
+    T
+        Temperature, if neither the material nor its solid has one.
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear, as in eos shock.
 
@@ -81,12 +86,13 @@ class EosFormula(ByPressure, EosFields):
     -------
     eos(water, formula, 1000, 2.2e9*(1/J - 1) + 0.5*E)
     eos(air, formula, 1.2, 0.4*E/J, E=2.5e5, Q1=2, Q2=0.2)
+    eos(steel, formula, 7850, 160e9*(1 - J) + 5.8e6*(T - 293))
 
     Notes
     -----
-    dE = -p dJ with the mean pressure of the step; plastic and viscous work heat the material. The
-    strain energy is E minus the initial energy and the heat. Wave speeds follow from the slope at
-    constant entropy, -J (p_J - p p_E).
+    dE = -p dJ with the mean pressure of the step, at the initial T; plastic and viscous work heat
+    the material. The strain energy is E minus the initial energy and the heat, plus the energy of thermal
+    pressure. Wave speeds follow from the slope at constant entropy, -J (p_J - p p_E).
 
     See Also
     --------
@@ -94,7 +100,7 @@ class EosFormula(ByPressure, EosFields):
     """
 
     __slots__ = ()
-    syntax = "rho0, p[, E=0][, Q1=0][, Q2=0]"
+    syntax = "rho0, p[, E=0][, T=293][, Q1=0][, Q2=0]"
 
     @classmethod
     def given(
@@ -103,18 +109,21 @@ class EosFormula(ByPressure, EosFields):
         p: PressureFormula,
         *,
         E: float = 0.0,
+        T: FromZero = 293.0,
         Q1: FromZero = 0.0,
         Q2: FromZero = 0.0,
     ) -> Any:
-        return {"eos": eos_of(rho0, p, E, "formula"), **artificial_viscosity(Q1, Q2)}
+        return {"eos": eos_of(rho0, p, (E, T), "formula"), **artificial_viscosity(Q1, Q2)}
 
 
-def eos_of(rho0: float, formula: Expression, E: float, style: str) -> NamedTuple:
-    """Build the equation of state; raise ScriptError without a value or stiffness at rest."""
+def eos_of(
+    rho0: float, formula: Expression, initial: tuple[float, float], style: str
+) -> NamedTuple:
+    """Build it from initial E and T; raise ScriptError without a value or stiffness at rest."""
     term = formula
     check_operations(term, "p")
-    slopes = [derivative(term, name) for name in NAMES]
-    rest = dict(zip(NAMES, (1.0, E), strict=True))
+    slopes = [derivative(term, name) for name in NAMES[:2]]
+    rest = dict(zip(NAMES, (1.0, *initial), strict=True))
     p, *at_rest = (terms.evaluated(one, rest.__getitem__) for one in (term, *slopes))
     K = p * at_rest[1] - at_rest[0]
     if not isfinite(p) or not K > 0:
@@ -127,8 +136,9 @@ def eos_of(rho0: float, formula: Expression, E: float, style: str) -> NamedTuple
     codes: dict[str, Any] = {"p": writer.code(term), "slopes": tuple(map(writer.code, slopes))}
     codes |= {"linear": "E" not in slopes[1].names, "style": style}
     codes["in_lanes"] = in_lanes(codes["p"])
-    kind = GasByPressure if E > 0 else ByPressure
-    return writer.law(kind, {"specific_volume": 1 / rho0, "initial": E}, codes)
+    kind = GasByPressure if initial[0] > 0 else ByPressure
+    fields = zip(EosFields._fields, (1 / rho0, *initial), strict=True)
+    return writer.law(kind, dict(fields), codes)
 
 
 class StiffenedGas(ByPressure, EosFields):
@@ -173,7 +183,10 @@ class StiffenedGas(ByPressure, EosFields):
             raise ScriptError(f"gamma = {gamma:g} is impossible", argument="gamma", expected="> 1")
         formula = with_numbers("(g - 1)*E/J - g*p0", g=gamma, p0=stiffness)
         E = (p + gamma * stiffness) / (gamma - 1)
-        return {"eos": eos_of(rho0, formula, E, "stiffened-gas"), **artificial_viscosity(Q1, Q2)}
+        return {
+            "eos": eos_of(rho0, formula, (E, 0.0), "stiffened-gas"),
+            **artificial_viscosity(Q1, Q2),
+        }
 
 
 class MieGrueneisen(ByPressure, EosFields):
@@ -217,7 +230,10 @@ class MieGrueneisen(ByPressure, EosFields):
     ) -> Any:  # fmt: skip
         curve = "K*(1 - J)*(1 - G/2*max(1 - J, 0))/(1 - S*max(1 - J, 0))^2 + G*E"
         formula = with_numbers(curve, K=rho0 * c0**2, S=S, G=Gamma)
-        return {"eos": eos_of(rho0, formula, 0.0, "mie-grueneisen"), **artificial_viscosity(Q1, Q2)}
+        return {
+            "eos": eos_of(rho0, formula, (0.0, 0.0), "mie-grueneisen"),
+            **artificial_viscosity(Q1, Q2),
+        }
 
 
 class EnergyAndHeat(NamedTuple):
@@ -230,29 +246,31 @@ def _initial_energy_by_pressure(eos, template):
     return EnergyAndHeat(eos.initial, 0.0)
 
 
-def values(eos, j, E):
-    return [evaluated(code, eos, (j, E)) for code in (eos.p, *eos.slopes)]
+def values(eos, j, E, heat):
+    """Return the pressure and its slopes by J and E."""
+    at = (j, E, temperature_or(heat, eos.initial_temperature))
+    return [evaluated(code, eos, at) for code in (eos.p, *eos.slopes)]
 
 
 @compressed.on(ByPressure)
 def _compressed_by_pressure(eos, memory, step, heating):
     half = 0.5 * (step.j - step.before)
-    fixed = memory.E + heating - half * evaluated(eos.p, eos, (step.before, memory.E))
+    fixed = memory.E + heating - half * values(eos, step.before, memory.E, ())[0]
     E = memory.E + heating
     for _ in range(1 if eos.linear else SOLUTIONS):
-        p, _, slope = values(eos, step.j, E)
+        p, _, slope = values(eos, step.j, E, ())
         E = E - (E + half * p - fixed) / (1 + half * slope)
     return EnergyAndHeat(E, memory.heat + heating)
 
 
 @pressure.on(ByPressure)
 def _pressure_by_pressure(eos, j, memory, heat):
-    return evaluated(eos.p, eos, (j, memory.E))
+    return values(eos, j, memory.E, heat)[0]
 
 
 @bulk_modulus.on(ByPressure)
 def _bulk_modulus_by_pressure(eos, j, memory, heat):
-    p, by_volume, by_energy = values(eos, j, memory.E)
+    p, by_volume, by_energy = values(eos, j, memory.E, heat)
     return max(j * (p * by_energy - by_volume), 0)
 
 
@@ -264,11 +282,11 @@ def _compression_energy_by_pressure(eos, j, memory):
 @at_pressure.on(ByPressure)
 def _at_pressure_by_pressure(eos, j, memory, p, heat):
     # Newton's method along dE = -p dJ, in steps that at most halve or double the volume.
-    first = evaluated(eos.p, eos, (j, memory.E))
+    first, _, _ = values(eos, j, memory.E, heat)
     mean, new, moves = 0.5 * (first + p), j, j > 0
     for _ in range(MOST_PASSES):
         E = memory.E - mean * (new - j)
-        at, by_volume, by_energy = values(eos, new, E)
+        at, by_volume, by_energy = values(eos, new, E, heat)
         slope = min(by_volume - mean * by_energy, 0)
         change = where(slope < 0, (p - at) / where(slope < 0, slope, 1), 0)
         next_one = max(min(new + change, 2 * new), 0.5 * new)
