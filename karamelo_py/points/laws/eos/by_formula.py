@@ -91,7 +91,7 @@ class EosFormula(ByPressure, EosFields):
     Notes
     -----
     dE = -p dJ with the mean pressure of the step, at the initial T; plastic and viscous work heat
-    the material. The strain energy is E minus the initial energy and the heat, plus the energy of thermal
+    the material. The strain energy is E minus initial energy and heat, plus the energy of thermal
     pressure. Wave speeds follow from the slope at constant entropy, -J (p_J - p p_E).
 
     See Also
