@@ -144,14 +144,16 @@ FLOW = "strength(s, johnson_cook, 46e9, 90e6, 292e6, 0.31, 1, 0.025, 1.09, 298, 
 
 
 def examples(family: str, ID: str) -> dict[str, str]:
-    """Commands that make every style of a family, under one name."""
+    """Commands that make every style of a family, under one name, and what they need before."""
     found = {}
     for name in registry.names(family):
         text = sections_of(registry.find(family, name).__doc__)[1]["Example"]
-        lines = re.findall(rf"^{family}\(\w+(,.*)$", text, re.MULTILINE)
-        assert lines, name
-        for k, rest in enumerate(lines):
-            found[f"{family} {name} {k}"] = f"{family}({ID}{rest}"
+        lines = re.sub(rf"\b{ID}\b", "other", text).strip().splitlines()
+        made = [k for k, line in enumerate(lines) if line.startswith(f"{family}(")]
+        assert made, name
+        for number, k in enumerate(made):
+            line = re.sub(r"\(\w+", f"({ID}", lines[k], count=1)
+            found[f"{family} {name} {number}"] = "\n".join([*lines[:k], line])
     return found
 
 
