@@ -113,7 +113,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
             expected="plane_stress(true) with the thickness 1, and loads per thickness",
         )
     replaces = catalogue is hub.fixes
-    if replaces and ID in catalogue and new.body is None:
+    if replaces and ID in catalogue and not (new.moves or new.touches):
         hub.warn(
             f"fix '{ID}' replaces the one of line {catalogue[ID].mark.line}",
             hint="fixes that act at the same time need different IDs",

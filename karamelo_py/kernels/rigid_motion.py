@@ -144,7 +144,6 @@ def _turn_about(state, axis, angle):
 
 @noinline
 def set_matrix(state):
-    """Set R from q."""
     q, R = state.q, state.R
     a, b, c, d = q[0], q[1], q[2], q[3]
     R[0, 0] = 1 - 2 * (c * c + d * d)

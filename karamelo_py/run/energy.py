@@ -25,6 +25,7 @@ from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import moved
 
 GROWING = 2  # consecutive windows of growth before a warning
 
@@ -41,9 +42,8 @@ def unknown_work(hub: Hub) -> str:
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
         if acts and not fix.first_step_only and not fix.conserves:
             return f"fix {fix.style} '{fix.id}'"
-    free = [fix.body for fix in hub.fixes.values()]
     for solid in hub.solids.values():
-        if solid.rigid and apart and solid not in free:
+        if solid.rigid and apart and solid not in moved(hub):
             return f"rigid solid '{solid.id}'"
         if solid.material.fluid is not None:
             return f"the water in solid '{solid.id}'"

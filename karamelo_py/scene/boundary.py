@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
 from karamelo_py.language.scene import Scene
+from karamelo_py.scene.modify import moved
 from karamelo_py.scene.solid import named
 from karamelo_py.script.errors import Mark, ScriptError
 
@@ -59,9 +60,8 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
 def take_away(hub: Scene, ids: np.ndarray, mark: Mark | None) -> tuple[float, float]:
     """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
     simulation = hub.simulation
-    for fix in hub.fixes.values():
-        body = fix.body
-        if body and ((ids >= body.first_id) & (ids < body.first_id + body.count)).any():
+    for body, fix in moved(hub).items():
+        if np.any((ids >= body.first_id) & (ids < body.first_id + body.count)):
             raise ScriptError(
                 f"points of '{body.id}' cannot be deleted: fix '{fix.id}' moves it as a rigid body",
                 mark=mark,

@@ -86,6 +86,11 @@ def _formulas_in(value: Any) -> Iterator[Expression]:
             yield from _formulas_in(item)
 
 
+def moved(hub: Scene) -> dict[Any, "Fix"]:
+    """Return the fix of each rigid solid that moves by the forces on it."""
+    return {fix.moves: fix for fix in hub.fixes.values() if fix.moves is not None}
+
+
 class Fix(Publisher):
     """Base of fixes, which act on a `group` during a run. Class attributes are traits."""
 
@@ -114,7 +119,8 @@ class Fix(Publisher):
     leads_points = False  # prescribes the motion of points
     restrictions: Restrictions | None = None  # what it does not support
     reads_itself = False  # its formulas may contain its own values
-    body: Any = None  # rigid solid that moves by the forces on it
+    moves: Any = None  # rigid solid, by the forces on it
+    touches: Any = None  # rigid solid that its points push, and that pushes them
     ignites = False
     follows_points = False  # force depends on positions of points (tools)
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures

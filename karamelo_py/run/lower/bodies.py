@@ -15,7 +15,7 @@ from karamelo_py.points.laws import can, constrained_velocity, is_rigid
 from karamelo_py.run.lower.hooks import NO_PROGRAM
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
-from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.modify import Fix, moved
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.formula import evaluate_in_table
 from karamelo_py.styles.fixes.rigid_body import (
@@ -121,10 +121,9 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
             if np.isnan(away):
                 message = f"points of '{body.id}' are missing"
             raise _error(fix, message, "the fix that moved it, with the same ID, from the start")
-    bodies = [fix.body for fix in moving]
     fixes = [fix for fix in hub.fixes.values() if fix.leads_points]
     for solid in hub.solids.values():
-        led = solid in bodies or any(fix.group.touches(solid) for fix in fixes)
+        led = solid in moved(hub) or any(fix.group.touches(solid) for fix in fixes)
         speeds = v[solid.first_id : solid.first_id + solid.count]
         speeds = speeds[np.isfinite(speeds[:, 0])]
         if not led and len(speeds) and np.ptp(speeds, axis=0).max() > APART * np.abs(speeds).max():
@@ -167,10 +166,10 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
 
 
 def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
-    if fix.body not in bodies:
-        hint = f"fix(ID, rigid_body, {fix.body.id}, ...); or fix contact/surface, which moves "
+    if fix.touches not in bodies:
+        hint = f"fix(ID, rigid_body, {fix.touches.id}, ...); or fix contact/surface, which moves "
         hint += "by formulas"
-        raise _error(fix, f"solid '{fix.body.id}' has no fix rigid_body", hint)
+        raise _error(fix, f"solid '{fix.touches.id}' has no fix rigid_body", hint)
     if hub.update.method.fields_per_solid:
         hint = "fix contact/friction for friction, or method ulmpm"
         raise _error(fix, "ulmpm/contacts has this contact on its grid already", hint)

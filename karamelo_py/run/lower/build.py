@@ -144,7 +144,6 @@ def _features(hub: Hub) -> Iterator[Feature]:
 
 
 def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | None]]:
-    """Yield the restrictions of each capability in use, its words in messages and its line."""
     update, box = hub.update, hub.domain
     if update.method.corrected:
         yield CORRECTED, "mass=corrected", update.method.mark
@@ -255,8 +254,8 @@ def lower(
 
 
 def fixes_of_bodies(hub: Hub) -> tuple:
-    fixes = [fix for fix in hub.fixes.values() if fix.body or fix.prescribes_velocity]
-    return tuple(fixes) if any(fix.body for fix in fixes) else ()
+    fixes = [f for f in hub.fixes.values() if f.moves or f.touches or f.prescribes_velocity]
+    return tuple(fixes) if any(fix.moves or fix.touches for fix in fixes) else ()
 
 
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:

@@ -19,7 +19,7 @@ from karamelo_py.language.faults import as_script_error
 from karamelo_py.run.boxes import unique
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.modify import Fix, moved
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
@@ -112,8 +112,7 @@ class _Builder:
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
         uses = [*map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))]
         late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE
-        apart = self.hub.update.method.fields_per_solid
-        apart = apart or any(other.body for other in self.hub.fixes.values())
+        apart = self.hub.update.method.fields_per_solid or moved(self.hub)
         after_contact = late and fix.brakes and apart
         stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
         self.rows.append((address, stage, begin, end, slot, *uses))

@@ -144,7 +144,7 @@ class RigidBody(Fix):
         inertia: Components | None = None,
     ):
         super().__init__(hub)
-        kin, self.body = hub.domain.kin, solid
+        kin, self.moves, self.body = hub.domain.kin, solid, solid
         if not hub.update.method.fields_per_solid:
             self.node_fields = (RigidSums,)
         d = kin.dimension
@@ -260,11 +260,9 @@ class RigidBody(Fix):
             )
 
     def slots(self) -> np.ndarray:
-        names = [
-            (name, kernel.index_of(FIELDS[name[:-1]]) + "xyz".index(name[-1]))
-            for name in self.published
-        ]
-        return np.array([(self.hub.values.slot(f"{self.id}_{n}"), k) for n, k in names])
+        slots = [self.hub.values.slot(f"{self.id}_{name}") for name in self.published]
+        columns = [kernel.index_of(FIELDS[n[:-1]]) + "xyz".index(n[-1]) for n in self.published]
+        return np.column_stack([slots, columns])
 
     def _has(self, name: str, d: int) -> bool:
         axis, kind = "xyz".index(name[-1]), name[:-1]
@@ -441,7 +439,7 @@ class ContactRigidBody(Fix):
     ):
         super().__init__(hub, group)
         judge_friction(hub, mu)
-        self.mu, self.body, surface = mu, solid, region or solid.region
+        self.mu, self.touches, surface = mu, solid, region or solid.region
         if group.touches(solid) and not group.all:
             message = f"the group has points of the body '{solid.id}'"
             raise ScriptError(message, argument="group", expected="points of other solids")
@@ -459,14 +457,14 @@ class ContactRigidBody(Fix):
     def behind(self, points: PointTable) -> tuple[int, float]:
         """Return the number of points in the body before the first step, and the largest depth."""
         depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
-        index = points.numbers - self.body.first_id
-        depth = depth[(index < 0) | (index >= self.body.count)]
+        index = points.numbers - self.touches.first_id
+        depth = depth[(index < 0) | (index >= self.touches.count)]
         return int(np.sum(depth > self.hub.domain.tolerance)), float(depth.max(initial=0.0))
 
     def refuse(self, number: int) -> int:
         raise ScriptError(
-            f"{named(self.hub, number)} is so deep in the body '{self.body.id}' that no way out of "
-            "it is the shortest",
+            f"{named(self.hub, number)} is so deep in the body '{self.touches.id}' that no way out "
+            "of it is the shortest",
             mark=self.mark,
             expected="points that come less than a cell below its surface",
             hint="another place of the body at the start, smaller steps (dt_factor), or a stiffer "
@@ -483,7 +481,7 @@ def contacts_of(hub: Hub) -> list[ContactRigidBody]:
 
 
 def surfaces_of(body: RigidBody) -> list[ContactRigidBody]:
-    return [fix for fix in contacts_of(body.hub) if fix.body is body.body]
+    return [fix for fix in contacts_of(body.hub) if fix.touches is body.body]
 
 
 def _touches_nothing(fix: Any, scene: Any) -> bool:
@@ -501,7 +499,7 @@ known_failure(
 )
 known_failure(
     ContactRigidBody,
-    "points in the body '{part.body.id}'",
+    "points in the body '{part.touches.id}'",
     when=begin_behind,
     reason="{which} points of the group begin there, up to {depth:.3g} deep, and are thrown out",
     cure="another place of the body or of the other solid",

@@ -10,6 +10,7 @@ from karamelo_py.language.rules import known_failure
 from karamelo_py.points.frames import Total
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
+from karamelo_py.scene.modify import moved
 from karamelo_py.scene.solid import Solid
 from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
 
@@ -37,8 +38,7 @@ class ULMPM(Method):
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         solids = list(hub.solids.values())
-        free = [fix.body for fix in hub.fixes.values()]
-        rigid = [s.rigid and s not in free for s in solids]
+        rigid = [s.rigid and s not in moved(hub) for s in solids]
         if not any(rigid):
             return super().contact_between(hub, lattices)
         slots = np.full((2, len(solids)), -1)
@@ -82,7 +82,7 @@ class TLMPM(Method):
             solid.id
             for fix in hub.fixes.values()
             for solid in hub.solids.values()
-            if fix.body and fix.group and (fix.body is solid or fix.group.touches(solid))
+            if fix.touches and (fix.touches is solid or fix.group.touches(solid))
         }
         alone = [ID for ID in hub.solids if ID not in touching]
         if len(hub.solids) > 1 and alone and not self.warned:
