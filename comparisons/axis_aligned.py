@@ -24,4 +24,4 @@ def compare(run, axes, full):
         # A half wave over 32 cells: (pi/32)^2 = 1 %, times a constant of about one.
         yield Row(f"error with 32 cells, {name}", 0.0, errors[-1], 0.015, source)
         axes.loglog(cells, errors, "o-", label=name)
-    axes.set(xlabel="cells (1)", ylabel="relative error of the displacement (1)")
+    axes.set(xlabel="cells", ylabel="relative error of the displacement")

@@ -51,7 +51,7 @@ def compare(run, axes, full):
     axes.plot(space.press, space.load, lw=0.8, label="in 3D")
     axes.plot(press, uniform(press), "k--", lw=0.8, label="a cylinder")
     axes.plot(press, uniform(press) * sticking(press), "k:", lw=0.8, label="bound, ends stick")
-    axes.set(xlabel="compression / height (1)", ylabel="load (kN)", ylim=(0, 1200))
+    axes.set(xlabel="compression / height", ylabel="load (kN)", ylim=(0, 1200))
 
 
 def energy(log, times):

@@ -23,4 +23,4 @@ def compare(run, axes, full):
     yield Row("error with 64 cells", 0.0, errors[-1], 3e-4, "equilibrium (exact)")
     axes.loglog(cells, errors, "o-", label="CPDI Q4")
     look.slope(axes, [(cells, errors)], -2)
-    axes.set(xlabel="cells (1)", ylabel="mean error of the stress / (rho g l0) (1)")
+    axes.set(xlabel="cells", ylabel="mean error of the stress / (rho g l0)")

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
 from typing import Any
 
 from comparisons.results import Result
@@ -16,10 +17,14 @@ def processor_seconds(result: Result) -> float:
 def chart(
     axes: Any, runs: Mapping[str, Iterable[Result]], error: Callable[[Result], float]
 ) -> dict[str, list[tuple[float, float]]]:
-    """Draw the error over the cost, a line for each kind of run; return cost and error of each."""
-    found = {}
+    """Draw error against cost, with an arrow to the finer run; return cost and error of each."""
+    measured = {}
     for name, results in runs.items():
-        found[name] = [(processor_seconds(result), error(result)) for result in results]
-        axes.loglog(*zip(*found[name], strict=True), "o-", label=name)
-    axes.set(xlabel="processor time of the steps (s)", ylabel="relative error (1)")
-    return found
+        measured[name] = [(processor_seconds(result), error(result)) for result in results]
+        (line,) = axes.loglog(*zip(*measured[name], strict=True), "o", ls="", ms=6, label=name)
+        for coarse, fine in pairwise(measured[name]):
+            arrow = {"arrowstyle": "->", "color": line.get_color(), "shrinkA": 5, "shrinkB": 5}
+            axes.annotate("", xy=fine, xytext=coarse, arrowprops=arrow)
+    axes.set(xlabel="processor time of the steps (s); arrows lead to the finer or slower run")
+    axes.set(ylabel="relative error")
+    return measured

@@ -40,7 +40,7 @@ def compare(run, axes, full):
     axes.plot(time, front, label="computed")
     for (T, Z), mark, width in zip(columns(), ("o", "s"), (1.125, 2.25), strict=True):
         axes.plot(T[Z < 6], Z[Z < 6], "k" + mark, mfc="none", label=f"experiment, a = {width} in")
-    axes.set(xlabel="time / sqrt(a/2g) (1)", ylabel="front / width a (1)")
+    axes.set(xlabel="time / sqrt(a/2g)", ylabel="front / width a")
 
 
 def columns(above=0.0):

@@ -42,6 +42,6 @@ def compare(run, axes, full):
         axes.plot(1e6 * fine.Time, fine.depth, lw=1, label="cells of half the size")
     last = result.snapshots("disk_impact")[-1]
     inset = axes.inset_axes([0.44, 0.05, 0.46, 0.6])
-    coloured(inset, last.x, last.y, last.ep, "plastic strain (1)")
+    coloured(inset, last.x, last.y, last.ep, "plastic strain")
     inset.set(aspect="equal", xticks=[], yticks=[])
     axes.set(xlabel="time (µs)", ylabel="depth of the foot of the disk (mm)")

@@ -50,4 +50,7 @@ def compare(run, axes, full):
     yield Row(name, (least, 1), water[-1] / water[0], 0.0, "Torricelli, gate open as widest")
     axes.plot(log.Time, log.ux, label="end of the gate, sideways")
     axes.plot(log.Time, log.uy, label="upwards")
+    lift = np.interp(log.ux / 1e3 / LENGTH, (1 - np.cos(angles)) / angles, angles)
+    lift = 1000 * LENGTH * (1 - np.sin(lift) / lift)
+    axes.plot(log.Time, lift, "k:", lw=0.9, label="upwards, if it bends to a circular arc (exact)")
     axes.set(xlabel="time (s)", ylabel="displacement (mm)")

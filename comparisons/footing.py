@@ -24,4 +24,4 @@ def compare(run, axes, full):
         (line,) = axes.plot(log.Time, log.load, lw=1.2, label=name)
         if "bar" not in words:
             axes.axhline(load, color=line.get_color(), lw=0.9, ls=":", label=f"exact, {name}")
-    axes.set(xlabel="time (s)", ylabel="load / cohesion (1)")
+    axes.set(xlabel="time (s)", ylabel="load / cohesion")

@@ -21,5 +21,9 @@ def compare(run, axes, full):
         bulk = (last.volume / last.mass * RHO).mean()
         yield Row(f"volume after / before, aspect {a}", 1.0, bulk, 0.05, "no dilatancy")
         # Over four cells: those of one have now more, now fewer points of a sheared heap.
-        axes.plot(*surface(last, RHO, 4 * CELL).T / WIDTH, lw=1, label=f"aspect {a}")
-    axes.set(xlabel="x / l0 (1)", ylabel="height / l0 (1)", ylim=(0, None))
+        (line,) = axes.plot(*surface(last, RHO, 4 * CELL).T / WIDTH, lw=1, label=f"aspect {a}")
+        axes.plot(
+            1 + granular_runout(a), 0, "v", color=line.get_color(), ms=8, clip_on=False,
+            label=f"run-out of {a}, experiments",
+        )  # fmt: skip
+    axes.set(xlabel="x / first width", ylabel="height / first width", ylim=(0, None))

@@ -73,4 +73,4 @@ def compare(run, axes, full):
     x, deep = np.linspace(0, 1.5, 100), np.linspace(0.01, 0.3, 30)[:, None]
     exact = -hertz_stress(x * HALF, deep * HALF, LOAD, HALF).mean(axis=0) / LARGEST
     axes.plot(x, exact, "k-", lw=1, label="Hertz (exact)")
-    axes.set(xlabel="x / half width (1)", ylabel="stress near the plane / largest pressure (1)")
+    axes.set(xlabel="x / half width", ylabel="stress near the plane / largest pressure")

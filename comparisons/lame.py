@@ -38,4 +38,4 @@ def compare(run, axes, full):
     for exact in (1 - B**2 / fine**2, 1 + B**2 / fine**2, np.full_like(fine, 2 * NU)):
         axes.plot(fine, exact * share / PRESSURE, "k-", lw=0.7)
     axes.plot([], [], "k-", lw=0.7, label="exact")
-    axes.set(xlabel="radius / inner radius (1)", ylabel="stress / pressure inside (1)")
+    axes.set(xlabel="radius / inner radius", ylabel="stress / pressure inside")

@@ -40,4 +40,4 @@ def compare(run, axes, full):
     yield Row("dissipated energy (J)", work * L**2, log.lost[-1], 0.005, source)
     axes.plot(log.sheared, solution(log.sheared)[2], "k-", lw=0.8, label=source)
     axes.plot(log.sheared, log.T, "o", ms=4, mfc="none", markevery=0.05, label="mean of the points")
-    axes.set(xlabel="shear (1)", ylabel="temperature (K)")
+    axes.set(xlabel="shear", ylabel="temperature (K)")

@@ -52,7 +52,7 @@ def compare(run, axes, full):
         name = "distance of the slip surfaces with it (m)"
         yield Row(name, 0.0, distance(FAILURE, line), 2.5, SOURCE)
         axes.plot(*line.T, "C2", lw=0.8, label="the same, softening")
-    coloured(axes, last.x, last.y, last.ep, "plastic strain (1)", cmap="Greys", limits=(0, 1))
+    coloured(axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1))
     axes.plot(*top.T, "C0", label="computed surface")
     axes.plot(*still.T, "C1", label="computed: moved by less than 2 m")
     axes.plot(*SURFACE.T, "k.", ms=4, label="Huang et al.: surface")

@@ -38,7 +38,7 @@ def compare(run, axes, full):
     for quantity in profiles((x - 0.5) / TIME):
         axes.plot(x, quantity, "k-", lw=0.7)
     axes.plot([], [], "k-", lw=0.7, label="exact")
-    axes.set(xlabel="x / length of the tube (1)", ylabel="density, pressure (1)", xlim=(0.25, 0.85))
+    axes.set(xlabel="x / length of the tube", ylabel="density, pressure", xlim=(0.25, 0.85))
 
 
 def profiles(s):

@@ -27,4 +27,4 @@ def compare(run, axes, full):
         kept = energy[-1] / energy[0]
         yield Row(f"energy kept, {transfer}", energies, kept, 0.001, "bounds")
         axes.plot(log.Time, log.Lz_z / log.Lz_z[0], lw=1, label=transfer)
-    axes.set(xlabel="time (s)", ylabel="angular momentum / first (1)")
+    axes.set(xlabel="time (s)", ylabel="angular momentum / first")

@@ -21,7 +21,7 @@ def compare(run, axes, full):
         if refine == 2:
             last, late = (r.snapshots("static_collapse")[-1] for r in (here, twin))
             coloured(
-                axes, last.x, last.y, last.ep, "plastic strain (1)", cmap="Greys", limits=(0, 1)
+                axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1)
             )
             for points, colour, name in ((last, "C0", "40 load steps"), (late, "C1", "in time")):
                 axes.plot(*surface(points, RHO, H / 8).T, colour, label=f"clay, {name}")

@@ -18,7 +18,7 @@ def compare(run, axes, full):
         "explicit, 40 transits": [run(**explicit, refine=n / 16) for n in CELLS],
     }
     found = chart(axes, runs, lambda result: result.log.share[-1])
-    axes.set(ylabel="mean error of the stress / (rho g H) (1)")
+    axes.set(ylabel="mean error of the stress / (rho g H)")
     source = "equilibrium (exact)"
     for name, within in (("implicit, steps of half a cell", 6e-6), ("explicit, 40 transits", 2e-5)):
         yield Row(f"error with 512 cells, {name}", 0.0, found[name][-1][1], within, source)

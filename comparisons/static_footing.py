@@ -27,7 +27,7 @@ def compare(run, axes, full):
         runs["explicit, quadratic-spline"] = [run("footing", refine=n, **splines) for n in refine]
         runs["explicit, F-bar"] = [run("footing", refine=n) for n in refine]
     found = chart(axes, runs, error)
-    axes.set(ylabel="relative error of the load (1)")
+    axes.set(ylabel="relative error of the load")
     for name, points in found.items():
         yield Row(
             f"error on 20 x 20 cells, {name}", 0.0, points[-1][1], 0.05, "Prandtl 1920 (exact)"

@@ -44,7 +44,7 @@ def compare(run, axes, full):
     if full:
         for what, a, b in zip(("length", "foot"), found["tlmpm"], found["ulmpm"], strict=True):
             yield Row(f"{what}, tlmpm / ulmpm", 1.0, a / b, 0.02, "two methods")
-    coloured(axes, *np.hstack(drawn), "plastic strain (1)", bar=0.08, limits=(0, 2))
+    coloured(axes, *np.hstack(drawn), "plastic strain", bar=0.08, limits=(0, 2))
     radii, heights = [DIAMETER / 2, WAIST / 2, 0], [0, 0.2 * L0, LENGTH]
     axes.plot(radii, heights, "+", color="#d55e00", ms=9, mew=2, label="experiment")
     axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(-9, 9))

@@ -21,7 +21,7 @@ def compare(run, axes, full):
     spent = log.E_dissipated[-1] / ENERGY
     yield Row("fraction of it spent on plastic flow", 1.0, spent, 0.03, "no elastic vibration left")
     last = result.snapshots("taylor_bar_227")[-1]
-    coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain (1)", bar=0.08)
+    coloured(axes, 1e3 * last.x, 1e3 * last.y, last.ep, "plastic strain", bar=0.08)
     axes.axhspan(*LENGTH, color="k", alpha=0.3, label="length, finite elements")
     axes.axvspan(*RADIUS, color="r", alpha=0.3, label="radius, finite elements")
     axes.set(xlabel="radius (mm)", ylabel="height (mm)", aspect="equal", xlim=(0, 12))

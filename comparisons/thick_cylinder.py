@@ -31,4 +31,4 @@ def compare(run, axes, full):
             yield Row("largest error of the radial stress, over the yield stress", 0.0, off, 0.01,
                       source)  # fmt: skip
     axes.axhline(BEARS, color="k", lw=0.7, label="2/sqrt(3) Y ln(b/a)")
-    axes.set(xlabel="displacement inside / (a Y/E) (1)", ylabel="pressure / Y (1)")
+    axes.set(xlabel="displacement inside / (a Y/E)", ylabel="pressure / Y")
