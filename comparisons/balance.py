@@ -123,9 +123,7 @@ def measure(script: Path, *, full: bool = False) -> Balance:
     axes = [1] if isinstance(simulation.kin, Axisymmetric) else list(range(d))
     left = np.abs(p[-1] - p[0] - impulse[-1])[axes].max()
     mass = sum(
-        block.points.mass.sum()
-        for block in simulation.setup.blocks
-        if not is_rigid(block.laws)
+        block.points.mass.sum() for block in simulation.setup.blocks if not is_rigid(block.laws)
     )
     size = max(np.sqrt(2 * mass * log["E_balance"].max()), np.abs(impulse).max())
     watched = simulation.control.energy[0].watch_energy

@@ -20,9 +20,7 @@ def compare(run, axes, full):
             yield Row(f"{soil}, {8 * refine} cells: {name}", other, value, within, source)
         if refine == 2:
             last, late = (r.snapshots("static_collapse")[-1] for r in (here, twin))
-            coloured(
-                axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1)
-            )
+            coloured(axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1))
             for points, colour, name in ((last, "C0", "40 load steps"), (late, "C1", "in time")):
                 axes.plot(*surface(points, RHO, H / 8).T, colour, label=f"clay, {name}")
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", ylim=(0, 1.5 * H))
