@@ -72,6 +72,9 @@ def volume(path, dimension, group=None):
          "*ELEMENT, TYPE=CPE4R\n1, 1, 2, 12, 11\n*ELGEN, ELSET=ROW\n1, 4, 1, 1\n", "ROW", 4),
         ("*NODE, NSET=LOW\n1, 0, 0\n2, 1, 0\n*NODE, NSET=HIGH\n31, 0, 3\n32, 1, 3\n*NFILL\n"
          "LOW, HIGH, 3, 10\n*ELEMENT, TYPE=CPS4\n1, 11, 12, 22, 21\n", None, 1),
+        # shifted by 2 along y, then turned by 90 degrees about z
+        ("*NODE, NSET=A\n1, 0, 0\n2, 0, -2\n*NCOPY, OLD SET=A, NEW SET=B, CHANGE NUMBER=10, SHIFT\n"
+         "0, 2\n0, 0, 0, 0, 0, 1, 90\n*ELEMENT, TYPE=CPS3\n1, 1, 2, 11\n", None, 2),
         (  # a sector of 90 degrees between radii 1 and 2, by straight edges
             "*NODE, SYSTEM=C\n1, 1, 0\n2, 2, 0\n3, 2, 90\n4, 1, 90\n"
             "*ELEMENT, TYPE=CPS4\n1, 1, 2, 3, 4\n",
@@ -171,11 +174,11 @@ def test_a_group_from_a_mesh_holds_a_body(run_interpreted, tmp_path):
     (tmp_path / "a.inp").write_text(CUBE + "*NSET, NSET=BASE\n1, 2, 3, 4\n")
     script = f"""
         method(tlmpm, FLIP, linear, 1)
-        dimension(3, -1, 2, -1, 2, -1, 2, 0.5)
+        dimension(3, 0, 1, 0, 1, 0, 1, 0.5)
         region(body, mesh, {tmp_path}/a.inp)
+        group(base, nodes, GROUP)
         material(m, linear, 1000, 1e6, 0.3)
         solid(s, region, body, 2, m, 0.5)
-        group(base, nodes, GROUP)
         fix(hold, velocity_nodes, base, 0, 0, 0)
         fix(pull, body_force, all, 0, 0, 1)
         log_modify(custom, step, hold_z)
@@ -188,7 +191,7 @@ def test_a_group_from_a_mesh_holds_a_body(run_interpreted, tmp_path):
         ("mesh, body, BASE", "no mesh follows"),
         (f"mesh, {tmp_path}/a.inp, BASS", "no physical group 'BASS'"),
         ("region, body, some", "'of' must be one of all, solid"),
-        (f"mesh, {tmp_path}/a.inp, BASE, s", "nothing can follow the set"),
+        (f"mesh, {tmp_path}/a.inp, BASE, s", "unknown solid 's'"),
     ):
         assert says in run_interpreted(script.replace("GROUP", wrong), status=1).err
 
@@ -213,7 +216,9 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.inp", SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2, 5, 9\n", "element 1 has the node 9"),
         ("a.inp", SQUARES + "*ELEMENT, TYPE=CPS4\n1, 1, 2, 5\n", "line 8: *ELEMENT has lines"),
         ("a.inp", "*NODE\n1, zero, 0\n", "a.inp, line 1: *NODE has a line that is not numbers"),
-        ("a.inp", "*NCOPY, CHANGE NUMBER=1\n", "line 1: *NCOPY"),
+        ("a.inp", "*NCOPY, CHANGE NUMBER=1\n", "line 1: *NCOPY without SHIFT"),
+        ("a.inp", "*NCOPY, OLD SET=A, SHIFT\n1, 0, 0\n", "line 1: *NCOPY needs CHANGE NUMBER"),
+        ("a.inp", "*ELCOPY\n", "line 1: *ELCOPY"),
         ("a.inp", "*INCLUDE, INPUT=none.inp\n", "*INCLUDE of 'none.inp', which cannot be read"),
         ("a.inp", "*INCLUDE, INPUT=a.inp\n", "*INCLUDE of 'a.inp', which cannot be read"),
         ("a.inp", "*Assembly\n*Instance, name=I, part=N\n", "of the part 'N', which is not"),

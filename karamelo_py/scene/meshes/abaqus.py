@@ -27,7 +27,7 @@ from karamelo_py.scene.meshes.deck import (
 )
 from karamelo_py.scene.meshes.elements import SHAPES
 
-_REFUSED = ("NCOPY", "ELCOPY", "NMAP")
+_REFUSED = ("ELCOPY", "NMAP")
 _FAMILIES = {
     **{("solid", c): "tetra" for c in (4, 10)},
     **{("solid", c): "pyramid" for c in (5, 13)},
@@ -201,6 +201,17 @@ class _Deck:
             fraction = (numbers - first) / max(last - first, 1)
             self._add_nodes(keyword, numbers, ends[0] + fraction[:, None] * (ends[1] - ends[0]))
 
+    def _ncopy(self, keyword: DeckKeyword) -> None:
+        options = keyword.options
+        if "SHIFT" not in options or "MULTIPLE" in options:
+            raise wrong(keyword, "without SHIFT, or with MULTIPLE, is not read")
+        old = members(self.scope.nodes, options.get("OLDSET", ""))
+        change = options.get("CHANGENUMBER", "")
+        if not change.isdigit():
+            raise wrong(keyword, "needs CHANGE NUMBER, a whole number")
+        self._add_nodes(keyword, old + int(change), _motion(keyword)(self._places(keyword, old)))
+        into(self.scope.nodes, options.get("NEWSET"), old + int(change))
+
     def _nfill(self, keyword: DeckKeyword) -> None:
         if {"BIAS", "SINGULAR"} & keyword.options.keys():
             raise wrong(keyword, "with BIAS or SINGULAR is not read", "the nodes written out")
@@ -310,7 +321,7 @@ class _Deck:
 _READ: dict[str, Callable[[_Deck, DeckKeyword], None]] = {
     "PART": _Deck._part, "END PART": _Deck._end_part, "INSTANCE": _Deck._instance,
     "END INSTANCE": _Deck._end_part, "SYSTEM": _Deck._system, "NODE": _Deck._node,
-    "NGEN": _Deck._ngen, "NFILL": _Deck._nfill, "ELEMENT": _Deck._element,
+    "NGEN": _Deck._ngen, "NCOPY": _Deck._ncopy, "NFILL": _Deck._nfill, "ELEMENT": _Deck._element,
     "ELGEN": _Deck._elgen, "NSET": _Deck._set, "ELSET": _Deck._set, "SURFACE": _Deck._surface,
 }  # fmt: skip
 

@@ -104,7 +104,9 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
             f"the mesh {path.name} has a node whose position is not a number", argument="file"
         )
     for cells in mesh.cells:
-        if len(cells.nodes) and not 0 <= cells.nodes.min() <= cells.nodes.max() < len(mesh.points):
+        if not len(cells.nodes) or cells.dimension < 0:
+            continue
+        if not 0 <= cells.nodes.min() <= cells.nodes.max() < len(mesh.points):
             raise ScriptError(
                 f"the mesh {path.name} has an element with a node that is not there",
                 argument="file",
