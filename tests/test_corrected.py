@@ -78,7 +78,7 @@ def _corrected(*lines, d=2, **changes):
     return script.replace("spline)", "spline, mass=corrected)")
 
 
-@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm", "ulmpm/contacts"])
+@pytest.mark.parametrize("kind", ["ulmpm", "tlmpm"])
 def test_momentum_to_round_off(run_interpreted, kind):
     """The forces of walls and loads are all that changes it; with musl and constant steps."""
     script = _corrected("set_dt(0.004)", *HELD, "run(12)").replace("(ulmpm,", f"({kind},")
@@ -108,6 +108,7 @@ REFUSED = {
     "method(ulmpm, APIC, cpgimp, mass=corrected)": "the basis cpgimp",
     "method(ulcpdi, APIC, linear, R4, mass=corrected)": "the basis linear R4",
     "method(ulmpm, APIC, cubic-spline, mass=corrected)\nscheme(quasi-static)": "quasi-static",
+    "method(ulmpm/contacts, APIC, cubic-spline, mass=corrected)": "method ulmpm/contacts",
     "method(ulmpm, APIC, cubic-spline, mass=consistent)": "lumped, corrected",
 }
 
@@ -118,6 +119,13 @@ def test_what_has_no_correction_is_refused_by_name(run_interpreted, method):
     err = run_interpreted(script, status=1).err
     assert REFUSED[method] in err
     assert "in.script:1" in err
+
+
+@pytest.mark.parametrize("wall", ["geq0", "0, mu=0.3"])
+def test_a_wall_that_yields_is_refused(run_interpreted, wall):
+    hold = f"fix(w, velocity_nodes, low, NULL, {wall})"
+    err = run_interpreted(_corrected(*HELD[2:4], hold, "run(1)"), status=1).err
+    assert "mass=corrected does not support fix velocity_nodes with a bound or friction" in err
 
 
 @pytest.mark.parametrize(("kind", "share"), [("ulmpm", 0.8), ("tlmpm", 0.7)])

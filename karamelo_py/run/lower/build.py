@@ -139,6 +139,11 @@ def _features(hub: Hub) -> Iterator[Feature]:
     if settings.engine == "gpu":
         yield Feature("gpu", "", "--gpu", "processors, which run the same script: no --gpu")
     for fix in hub.fixes.values():
+        if (fix.held_directions and not fix.prescribes_velocity) or fix.wall_friction is not None:
+            words = f"fix {fix.style} with a bound or friction"
+            yield Feature(
+                "yielding walls", "", words, "velocities without geq, leq and mu", fix.mark
+            )
         if fix.solids or fix.follows_points:
             yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.mark)
 

@@ -21,10 +21,12 @@ from karamelo_py.script.errors import Mark, ScriptError
 LOADS = ("ContactForce", "ContactTorque")
 CORRECTED = Restrictions(
     "mass=corrected", "mass=lumped",
-    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell.
+    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell. The
+    # forces of contact are not known yet: the lowest cells of a block at rest have 5 % less stress,
+    # on a wall with a bound 23 %.
     only={"transfer": ("APIC", "AFLIP", "ASFLIP", "MLS", "TPIC", "TFLIP"),
-          "basis": ("quadratic-spline", "cubic-spline")},
-    without=("periodic", "pore_water", "implicit"),
+          "basis": ("quadratic-spline", "cubic-spline"), "method": ("ulmpm", "tlmpm")},
+    without=("periodic", "pore_water", "implicit", "yielding walls"),
 )  # fmt: skip
 
 
