@@ -12,6 +12,8 @@ import pytest
 from hubs import SmallHub
 from scipy.io import netcdf_file
 
+from karamelo_py.scene.meshes import reading
+from karamelo_py.scene.meshes.abaqus import read_deck
 from karamelo_py.scene.meshes.by_gmsh import begin
 from karamelo_py.scene.meshes.elements import MIDDLES, SHAPES, elements_of, measured
 from karamelo_py.scene.meshes.reading import read
@@ -814,6 +816,20 @@ def test_few_curved_elements_may_be_folded(tmp_path):
         else:
             with pytest.raises(ScriptError, match="is twisted"):
                 volume(tmp_path / f"{ok}.inp", 2)
+
+
+def test_a_file_that_grows_while_it_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "a.inp"
+    path.write_text(CUBE)
+
+    def read_and_write(path):
+        mesh = read_deck(path)
+        path.write_text(CUBE + "*ELEMENT, TYPE=C3D8\n")
+        return mesh
+
+    monkeypatch.setattr(reading, "read_deck", read_and_write)
+    with pytest.raises(ScriptError, match="changed while it was read"):
+        volume(path, 3)
 
 
 def test_many_sets_and_names_of_all_kinds(tmp_path):

@@ -71,9 +71,15 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
     if path.suffix.lower() in GEOMETRIES:
         refuse_commands(path, trusted=trusted)
     cad = path.suffix.lower() in CAD
-    return _read(
-        path.resolve(), dimension, size if cad else None, (status.st_mtime_ns, status.st_size)
-    )
+    state = status.st_mtime_ns, status.st_size
+    mesh = _read(path.resolve(), dimension, size if cad else None, state)
+    if path.stat().st_size != status.st_size:
+        raise ScriptError(
+            f"the file {path.name} changed while it was read",
+            argument="file",
+            hint="start again when it is written",
+        )
+    return mesh
 
 
 @lru_cache(maxsize=2)
