@@ -841,8 +841,32 @@ EVEN = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("told", "numbers"),
+    [
+        (True, {}),
+        (True, {"rho": 100 / 30, "E": 100 / 30}),
+        (True, {"gap": 0.3, "v": 0.1}),  # they meet
+        (False, {"gap": 0.3, "v": -0.1}),
+        (False, {"rho": 100, "E": 100}),
+        (False, {"E": 100}),  # waves of the light solid set a step ten times shorter
+        (False, {"basis": "cpgimp"}),
+        (False, {"basis": "quadratic-spline"}),
+        (False, {"scheme": "musl"}),
+        (False, {"more": "dt_factor(0.29)"}),
+        (False, {"time": 10}),
+    ],
+)
+def test_usl_next_to_a_much_lighter_solid_is_told(run_interpreted, told, numbers):
+    said = run_interpreted(UNEVEN.format(**EVEN | numbers), command="check").err
+    assert ("warning: light next to heavy: " in said) == told
+    if not numbers:
+        assert "solid 'heavy' is 100 times as dense as solid 'light'" in said
+        assert "fix: dt_factor(0.29)" in said
+
+
 @pytest.mark.full
-def test_usl_next_to_a_much_lighter_solid_holds_with_a_shorter_step(run_script):
+def test_usl_next_to_a_much_lighter_solid_holds_with_the_step_of_its_warning(run_script):
     """Without it, the blocks have 38 times their energy at t = 42."""
     text = UNEVEN.format(**EVEN)
     assert "energy balance: " in run_script(text, status=1).err

@@ -12,7 +12,7 @@ from karamelo_py.advice import settling
 from karamelo_py.advice.basics import BasicFacts, is_zero
 from karamelo_py.advice.bodies import drift_of, is_free, lag_of, pressed_evenly, turn_of
 from karamelo_py.advice.crossing import expected
-from karamelo_py.advice.neighbours import bent_row, parting
+from karamelo_py.advice.neighbours import bent_row, parting, uneven
 from karamelo_py.compiler.fields import declared
 from karamelo_py.language import rules
 from karamelo_py.points import transfers
@@ -59,10 +59,11 @@ class SceneFacts(BasicFacts):
     drift, rotation = cached_property(drift_of), cached_property(turn_of)
     lag, crossing = cached_property(lag_of), cached_property(expected)
     driven = cached_property(settling.driven)
-    settling = cached_property(settling.expected)
+    settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
-    # Step over the stable step.
+    # Step over the stable step, and over the limit for neighbours of different density.
     fraction = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
+    fraction_of_uneven = property(lambda self: self.fraction * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # velocity component
     turns = property(lambda self: self.turn > TURN)
     # Largest velocity over wave speed; strain by impacts and weight.

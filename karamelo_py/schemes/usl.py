@@ -26,9 +26,6 @@ class USL(NamedTuple):
     points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
     scaled by mass / limit. Momentum is conserved.
 
-    With a linear basis in ulmpm, a light elastic body next to a heavy one needs a shorter step:
-    c dt/h of the heavy body times the square root of the ratio of densities below 1.9.
-
     With fix velocity_particles on deformable points, usl runs as musl.
 
     Example
@@ -63,6 +60,16 @@ known_failure(
     "grid the moments of points at an edge act on nodes with almost no mass, and a body breaks "
     "within two periods",
     cure="scheme(musl), or a spline basis",
+)
+
+known_failure(
+    USL,
+    "light next to heavy",
+    when=lambda scheme, scene: scene.uneven.courant > 0,
+    reason="solid '{scene.uneven.heavy}' is {scene.uneven.ratio:.3g} times as dense as solid "
+    "'{scene.uneven.light}' next to it. At nodes that both reach, with little mass, usl needs a "
+    "shorter step: bodies gain energy and break within some thousand steps",
+    cure="dt_factor({scene.fraction_of_uneven:.2g}), cpgimp or quadratic-spline",
 )
 
 
