@@ -239,6 +239,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.k", "*INCLUDE_TRANSFORM\nb.k\n", "line 1: *INCLUDE_TRANSFORM is not read"),
         ("a.k", "*ELEMENT_SOLID\n1,1\n1,2,3,4\n2,1\n", "ends in the middle of an element"),
         ("a.bdf", "GRID,1,7,0.,0.,0.\n", "line 1: *GRID is in the coordinate system 7, which"),
+        ("a.bdf", "GRID,1,,1.\nBEGIN SUPER=1\nGRID,1,,2.\n", "line 3: *GRID is there twice"),
         ("a.bdf", "\nGRID,1,,x,0.,0.\n", "line 2: *GRID has 'x' instead of a number"),
         ("a.bdf", "GRID,1\nCORD2R,7\nGRID,2,7\n", "line 2: *CORD2R has three points on a line"),
     ],

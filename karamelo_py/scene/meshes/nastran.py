@@ -83,7 +83,7 @@ class _Entry(NamedTuple):
 
 def _entries(path: Path, above: tuple[Path, ...] = ()) -> Iterator[_Entry]:
     text = path.read_text("latin-1")
-    begin = re.search(r"^\s*BEGIN\s+(BULK|SUPER)", text, re.I | re.M)
+    begin = re.search(r"^\s*BEGIN\s+BULK", text, re.I | re.M)
     lines = text.splitlines()
     entry = None
     for number in range(text.count("\n", 0, begin.end()) + 1 if begin else 0, len(lines)):
@@ -180,7 +180,8 @@ def read_nastran(path: Path) -> Mesh:
         if name == "GRID":
             system = entry.whole(1) if len(entry.fields) > 1 and entry.fields[1] else -1
             at = entry, system, [entry.real(k) for k in (2, 3, 4)]
-            systems.nodes[entry.whole(0)] = at
+            if systems.nodes.setdefault(entry.whole(0), at)[1:] != at[1:]:
+                raise entry.wrong("is there twice, at two places", "one superelement")
         elif name == "GRDSET":
             systems.default = entry.whole(1)
         elif re.fullmatch(r"CORD[12][RCS]", name):
