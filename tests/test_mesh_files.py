@@ -646,6 +646,15 @@ def test_pixels_voxels_and_numbers_of_elements(type_, d, tmp_path):
         assert volume(tmp_path / "a.vtu", d, group) == pytest.approx(1, rel=1e-14)
 
 
+def test_prisms_with_six_sides(tmp_path):
+    """Of edges of length 1 and height 1: 3 sqrt(3) / 2."""
+    turn = np.arange(6) * np.pi / 3
+    x = " ".join(f"{np.cos(t):.17g} {np.sin(t):.17g} {z}" for z in (0, 1) for t in turn)
+    text = VTU.format(n=12, x=x, nodes=" ".join(map(str, range(12))), type=16)
+    (tmp_path / "a.vtu").write_text(text)
+    assert volume(tmp_path / "a.vtu", 3) == pytest.approx(1.5 * math.sqrt(3), rel=1e-14)
+
+
 @pytest.mark.parametrize(
     ("name", "text"),
     [

@@ -201,8 +201,9 @@ def _skip_close(file: Any, depth: int) -> None:
 
 
 def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
-    # VTK's pixels and voxels, which meshio supports only in part.
-    for number, name, count, dimension in ((8, "pixel", 4, 2), (11, "voxel", 8, 3)):
+    # VTK's pixels, voxels and prisms with six sides, which meshio supports only in part.
+    partly = (8, "pixel", 4, 2), (11, "voxel", 8, 3), (16, "hexa_prism", 12, 3)
+    for number, name, count, dimension in partly:
         meshio._common.num_nodes_per_cell.setdefault(name, count)
         meshio._mesh.topological_dimension.setdefault(name, dimension)
         meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
