@@ -222,6 +222,7 @@ ELASTIC = {
     "l": "mullins, d, 2, 5",
     "m": "hyperelastic, 2, 0.06*T*(I1*J^(-2/3) - 3) + 50*(J - 1)^2, cp=1, kappa=0",
     "n": "viscoelastic, m, 0.3, 0.01, wlf=(17, 52, 293)",
+    "o": "jointed, 2, 100, 0.3, 0.1, 30, 30, 90, psi=5, matrix_cohesion=0.2, matrix_phi=20",
 }
 
 

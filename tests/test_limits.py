@@ -15,7 +15,7 @@ STYLES = {
     "inflow and outflow": [("fix", "inflow"), ("fix", "outflow")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
-    "anisotropic": [("strength", "hill"), ("strength", "hashin"), ("strength", "joints")],
+    "anisotropic": [("material", "hill"), ("damage", "hashin"), ("damage", "tsai")],
     "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],
     "concrete": [("strength", "hjc"), ("damage", "gurson"), ("eos", "ignition")],
     "UMAT": [("material", "umat")],
