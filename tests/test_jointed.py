@@ -36,37 +36,37 @@ def jaeger(beta, s3=0.0, c=C, phi=PHI):
     return s3 + 2 * (c + s3 * mu) / ((1 - mu / tan(b)) * sin(2 * b))
 
 
+FREE = (0, 0), (2, 2), (0, 1), (0, 2), (1, 2)
+
+
+def excess(law, state, dl, s3):
+    """Stresses other than s1 after an increment, over those of the pressure s3."""
+    new = advance(law, SPACE, state, flat(SPACE, dl), 1.0)
+    s = symmetric_matrix(SPACE, cauchy_stress(law, SPACE, new)) + s3 * np.eye(3)
+    return np.array([s[place] for place in FREE])
+
+
 def pressed(law, s3=0.0, steps=6, end=0.001):
     """Stress s1 of a body that is pressed along y at constant pressure s3 on its other sides."""
-    kin = SPACE
-    state = with_stress(law, kin, initial_state(law, kin, 1.0), symmetric_flat(kin, -s3 * np.eye(3)))
-    free = [(0, 0), (2, 2), (0, 1), (0, 2), (1, 2)]
-
-    def stress(dl):
-        new = advance(law, kin, state, flat(kin, dl), 1.0)
-        return new, symmetric_matrix(kin, cauchy_stress(law, kin, new))
-
+    state = initial_state(law, SPACE, 1.0)
+    state = with_stress(law, SPACE, state, symmetric_flat(SPACE, -s3 * np.eye(3)))
     for _ in range(steps):
         dl = np.zeros((3, 3))
         dl[1, 1] = -end / steps
-
-        def residual():
-            s = stress(dl)[1] + s3 * np.eye(3)
-            return np.array([s[place] for place in free])
-
         for _ in range(8):
-            r = residual()
+            r = excess(law, state, dl, s3)
             if abs(r).max() < 1e-3:
                 break
             columns = []
-            for i, j in free:
-                dl[i, j] += 1e-9
-                columns.append((residual() - r) / 1e-9)
-                dl[i, j] -= 1e-9
-            for (i, j), x in zip(free, np.linalg.lstsq(np.array(columns).T, -r)[0], strict=True):
-                dl[i, j] += x
-        state, s = stress(dl)
-    return -s[1, 1]
+            for place in FREE:
+                dl[place] += 1e-9
+                columns.append((excess(law, state, dl, s3) - r) / 1e-9)
+                dl[place] -= 1e-9
+            changes = np.linalg.lstsq(np.array(columns).T, -r)[0]
+            for place, change in zip(FREE, changes, strict=True):
+                dl[place] += change
+        state = advance(law, SPACE, state, flat(SPACE, dl), 1.0)
+    return -cauchy_stress(law, SPACE, state).yy
 
 
 @pytest.mark.parametrize("beta", [40, 50, 60, 75])
