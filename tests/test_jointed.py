@@ -4,10 +4,10 @@ from math import cos, inf, radians, sin, tan
 
 import numpy as np
 import pytest
-from comparisons.results import read_log
 from tensors import every_kinematics, flat, matrix, rotation, symmetric_flat, symmetric_matrix
 
-from karamelo_py.points.kinematics import PlaneStrain, Space, nothing
+from comparisons.results import read_log
+from karamelo_py.points.kinematics import PlaneStrain, Space
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
@@ -17,7 +17,6 @@ from karamelo_py.points.laws import (
     with_stress,
 )
 from karamelo_py.points.laws.jointed import Jointed
-from karamelo_py.points.laws.linear import LinearElastic
 
 RHO, E, NU, C, PHI = 2700, 20e9, 0.25, 1e6, 30.0
 SPACE = Space()
