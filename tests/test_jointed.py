@@ -23,7 +23,7 @@ SPACE = Space()
 
 
 def rock(beta, **more):
-    """Joints whose normal is at `beta` degrees to y, in the plane."""
+    """Joints whose normal is at `beta` degrees to y, in the xy plane."""
     return Jointed.given(RHO, E, NU, C, PHI, beta, 90.0, **more)
 
 
@@ -146,7 +146,7 @@ SPECIMEN = """
 """
 
 
-def test_a_specimen_in_the_plane(run_interpreted):
+def test_a_thin_specimen(run_interpreted):
     folder = run_interpreted(SPECIMEN).folder
     slate, shale = (read_log(folder / f"element_{name}.txt") for name in ("slate", "shale"))
     assert -slate.syy.min() == pytest.approx(jaeger(60), rel=1e-3)

@@ -16,8 +16,7 @@ STYLES = {
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
     "anisotropic": [("material", "hill"), ("damage", "hashin"), ("damage", "tsai")],
-    "creep": [("strength", "norton"), ("strength", "perzyna"), ("material", "mullins")],
-    "concrete": [("strength", "hjc"), ("damage", "gurson"), ("eos", "ignition")],
+    "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],
 }

@@ -34,7 +34,7 @@ ALIGNED = 1e-9  # component of the normal that counts as none
 PASSES = 2  # of the return to two yield surfaces
 
 
-class Matrix(MohrCoulomb):
+class RockBetweenJoints(MohrCoulomb):
     """Strength of the rock between its joints, without a memory."""
 
     __slots__ = ()
@@ -79,7 +79,7 @@ class Jointed(NamedTuple):
     plastic shear and plastic extension on the joints, `ep` is the equivalent plastic strain of rock
     with a strength.
 
-    In 2D the normal should be in the plane or along z, in 1D along an axis; otherwise the body
+    In 2D the normal should be in the xy plane or along z, in 1D along an axis; otherwise the body
     shears out of plane.
 
     See Also
@@ -142,7 +142,7 @@ class Jointed(NamedTuple):
         if matrix_cohesion is not None or matrix_phi is not None:
             soil = matrix_cohesion or 0.0, matrix_phi or 0.0, matrix_psi or 0.0
             try:
-                matrix = Matrix(*MohrCoulomb.given(G, *soil))
+                matrix = RockBetweenJoints(*MohrCoulomb.given(G, *soil))
             except ScriptError as error:
                 error.argument = f"matrix_{error.argument}"
                 raise
@@ -189,7 +189,7 @@ known_failure(
     when=leans,
     reason="the joints of material '{owner.id}' lean: the body would shear out of its plane, which "
     "{scene.d}D prevents",
-    cure="a 3D scene, or a normal in the plane or along z (in 2D, tilt 0 or 90)",
+    cure="a 3D scene, or a normal in the xy plane or along z (in 2D, tilt 0 or 90)",
 )
 
 
