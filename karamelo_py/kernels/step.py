@@ -43,9 +43,7 @@ def first_rows(scheme: Any, visits: Any) -> list[Any]:
 
 
 def untaken(rows: Iterable[Any], backend: type) -> list[str]:
-    # rows become others before they are taken
-    combined = table.Gather, table.Scatter, table.SceneTask, table.Repeated
-    kinds = dict.fromkeys(type(row) for row in rows if not isinstance(row, combined))
+    kinds = [kind for kind in dict.fromkeys(map(type, rows)) if kind not in table.COMBINED]
     return [kind.__name__ for kind in kinds if not take.defined(kind, backend)]
 
 

@@ -254,15 +254,28 @@ def says_of(task: Any) -> str | None:
 _SAYS: dict[type, Any] = {
     Sweep: _says_sweep,
     NodeTask: lambda row, setup: says_of(row.task),
-    SceneTask: lambda row, setup: row.says if len(row.rows(setup)) else None,
 }
+
+
+@point_function(otherwise=True)
+def _described(row: Any, setup: Any) -> str | None:
+    rows = in_scene.find((type(row),))(row, setup)
+    texts = [_SAYS[type(one)](one, setup) for one in rows if type(one) in _SAYS]
+    return "; ".join(text for text in texts if text) or None
+
+
+@_described.on(SceneTask)
+def _described_scene(row, setup):
+    return row.says if len(row.rows(setup)) else None
 
 
 def says(row: Any, setup: Any) -> str | None:
     """Describe a row with what joins it in a scene; None if it does nothing there."""
-    rows = [row] if isinstance(row, SceneTask) else in_scene.find((type(row),))(row, setup)
-    texts = [_SAYS[type(one)](one, setup) for one in rows if type(one) in _SAYS]
-    return "; ".join(text for text in texts if text) or None
+    return _described.find((type(row),))(row, setup)
+
+
+# Kinds of rows that become others before a step takes them.
+COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
 class Company(NamedTuple):
