@@ -81,7 +81,7 @@ class SeparateFields(NamedTuple):
     forces: np.ndarray  # number of slots of forces and torques, then the slots
     rigid: np.ndarray  # (F,) bool: contact does not move the field
     torque: np.ndarray  # (F,) slot of the torque on each field
-    memory: np.ndarray  # (F,) MEMORY for shapeless bodies, else 0
+    memory: np.ndarray  # (F,) steps that `touched` is read for: MEMORY if shapeless, else 1
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: contacts of each
@@ -375,7 +375,7 @@ def _excess_of(bodies, pair, where):
     if not approach > 0:
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
-    if pair.wall and memory > 0:
+    if pair.wall and memory > 1:
         last = _last_contact(bodies, pair)
         # With three bodies, a pair may already have touched in this step.
         if last > 0 and last >= where.step - memory:

@@ -180,7 +180,7 @@ class ULMPMContacts(Method):
             change=np.zeros((count, d)),
             rigid=np.array([can(law, constrained_velocity) for law in laws]),
             torque=slots[:, 1].copy(),
-            memory=np.array([MEMORY if flows(law) else 0 for law in laws]),
+            memory=np.array([MEMORY if flows(law) else 1 for law in laws]),
             surface=np.array(
                 [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
             ),
