@@ -223,6 +223,7 @@ class Hooks(NamedTuple):
     holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
     loads: np.ndarray  # (N, d) of this step if hooks apply forces, else (0, d)
     rigid_fields: np.ndarray  # (F,) bool: fields of rigid solids, N/F nodes each; or (0,)
+    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
     mode: Tag  # one thread or several
     apart: Apart
     whole: tuple  # tags of hooks on whole points (`vector_hook`)

@@ -47,7 +47,7 @@ from karamelo_py.kernels.arrays import (
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
 from karamelo_py.kernels.table import AtNodes, Once, each_node
-from karamelo_py.kernels.totals import WORK, add_to, carry, counts, publish
+from karamelo_py.kernels.totals import WORK, add_to, add_torque, carry, counts, publish
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
@@ -81,6 +81,7 @@ class SeparateFields(NamedTuple):
     forces: np.ndarray  # number of slots of forces and torques, then the slots
     rigid: np.ndarray  # (F,) bool: contact does not move the field
     torque: np.ndarray  # (F,) slot of the torque on each field
+    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
     memory: np.ndarray  # (F,) steps that `touched` is read for: MEMORY if shapeless, else 1
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
@@ -465,10 +466,11 @@ def _take(contact, control, side, k, impulse):
         return
     force = impulse / control.step[0].kick
     add_to(control.totals, contact.slot[field_] + k, force)
-    add_to(control.totals, contact.torque[field_] + (k + 1) % 3, x[(k + 2) % 3] * force)
-    add_to(control.totals, contact.torque[field_] + (k + 2) % 3, -x[(k + 1) % 3] * force)
+    add_torque(control.totals, contact.torque[field_], x, k, force)
     if slot:
         add_to(control.totals, slot - 1 + k, -force)
+        if contact.torques[slot - 1]:
+            add_torque(control.totals, contact.torques[slot - 1], x, k, -force)
 
 
 def _before(kin, nodes, n, per_mass):
@@ -522,7 +524,10 @@ def _touch_pair(bodies, control, i, j, where):
             work -= impulse * nodes.update[m, k]
         for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
             if slot >= 0 and counts(control.ranks, n):
-                add_to(control.totals, slot + k, sign * impulse / control.step[0].kick)
+                force = sign * impulse / control.step[0].kick
+                add_to(control.totals, slot + k, force)
+                if contact.torques[slot]:
+                    add_torque(control.totals, contact.torques[slot], where.x, k, force)
     if counts(control.ranks, n):
         add_to(control.totals, WORK, float(work))
 
@@ -579,7 +584,10 @@ def _publish_forces(s):
     for c in range(1, 1 + forces[0]):
         publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):
-        publish(control, contact.reactions[1 + c], s.kin.dimension)
+        slot = contact.reactions[1 + c]
+        publish(control, slot, s.kin.dimension)
+        if contact.torques[slot]:
+            publish(control, contact.torques[slot], 3)
     for c in range(len(contact.copies)):
         for k in range(3):
             control.values[contact.copies[c, 1] + k] = control.values[contact.copies[c, 0] + k]

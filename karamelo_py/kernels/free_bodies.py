@@ -31,6 +31,7 @@ class TouchingSurface(NamedTuple):
     members: np.ndarray  # (N,) bool, by id
     mu: float
     slot: int  # of the force on the points
+    torque: int  # slot of its torque, or 0
     lost: int  # address of a function called for a point without a way out
 
 
@@ -111,6 +112,7 @@ def _list_points(body, surface, s, block, number):
         if surface.members[points.id[p]] and _list_point(body, surface, s, block, p):
             contact = body.contacts[body.count[0]]
             contact.block, contact.point, contact.slot = number, p, surface.slot
+            contact.torque = surface.torque
             body.count[0] += 1
 
 
@@ -140,6 +142,10 @@ def _give_to_points(body, s, block, number, measures):
         if measures:
             for c in range(d):
                 s.control.values[contact.slot + c] += contact.impulse[c] / kick
+            for c in range(3 if contact.torque else 0):
+                i, j, f = (c + 1) % 3, (c + 2) % 3, contact.impulse
+                torque = (contact.at[i] * f[j] - contact.at[j] * f[i]) / kick
+                s.control.values[contact.torque + c] += torque
     add_to(s.control.totals, WORK, work)
 
 
@@ -232,6 +238,8 @@ def _meet(s):
         for surface in body.surfaces:
             for c in range(s.kin.dimension):
                 s.control.values[surface.slot + c] = 0.0
+            for c in range(3 if surface.torque else 0):
+                s.control.values[surface.torque + c] = 0.0
             for number, block in enumerate(s.blocks):
                 _list_points(body, surface, s, block, number)
         if isinstance(s.contact, SeparateFields):

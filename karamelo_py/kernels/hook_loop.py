@@ -172,6 +172,9 @@ def _act_on_parts(members, task, call, k):
         first, count = _published(hooks, other)
         for row in range(first, first + count):
             totals.hand_over(private.totals, control.totals, row)
+        first = _torque_of(hooks, hooks.table[other].slot)
+        for row in range(first, first + 3 if first > 0 else 0):
+            totals.hand_over(private.totals, control.totals, row)
 
 
 def _act_on_all(members, task, call):
@@ -238,10 +241,27 @@ def _published(hooks, h):
     return slot + first, last - first + 1
 
 
+def _torque_of(hooks, slot):
+    """Return the first row of the torque of the force in rows from `slot` on, or 0."""
+    return hooks.torques[slot] if slot >= 0 else NONE
+
+
+@noinline
+def _add_torque(call, q, c, slot, force):
+    """Add the torque of component `c` of a force at the `q`-th chosen member."""
+    place, row = call.hooks.scratch, _torque_of(call.hooks, slot)
+    if row > 0 and force != 0:
+        x = (place[0, q], place[1, q], place[2, q])
+        totals.add_torque(call.control.totals, row, x, c, force)
+
+
 @noinline
 def _clear_total(hooks, h, control):
     first, count = _published(hooks, h)
     for row in range(first, first + count):
+        control.totals[row] = 0
+    first = _torque_of(hooks, hooks.table[h].slot)
+    for row in range(first, first + 3 if first > 0 else 0):
         control.totals[row] = 0
 
 
@@ -251,6 +271,9 @@ def publish_total(hooks, h, control):
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)
+    first = _torque_of(hooks, hooks.table[h].slot)
+    if first > 0:
+        totals.publish(control, first, 3)
 
 
 def _choose_nodes(members, call, row, end, member):
@@ -329,15 +352,17 @@ def _clear_held(members, holders):
 
 
 @noinline
-def _take_over(call, n, c, force):
-    """Make a hook hold node `n` by `force`; return the force of the previous holders."""
+def _take_over(call, q, c, force):
+    """Make a hook hold the `q`-th chosen node by `force`; return the force of the previous holders."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
+    n = hooks.chosen[q]
     if hooks.holders.size > 0 and hooks.table[h].holds:
         holder = hooks.holders[n, c]
         if holder.slot > 0:
             before = holder.force
             if totals.counts(control.ranks, n):
                 totals.add_to(control.totals, holder.slot - 1, -before)
+                _add_torque(call, q, c, holder.slot - 1 - c, -before)
         holder.slot = 1 + hooks.table[h].slot + c
         holder.force = before + force
     return before
@@ -369,6 +394,8 @@ def _change_nodes(members, call, count):
             hooks.scratch[WORKS, q] = work if counted else 0.0
             if counted and before != 0:
                 totals.add_to(control.totals, slot + c, before)
+            if counted:
+                _add_torque(call, q, c, slot, total + before)
         totals.add_many(control.totals, totals.WORK, hooks.scratch[WORKS], count)
         if slot >= 0:
             totals.add_many(control.totals, slot + c, hooks.scratch[TERMS], count)
@@ -409,7 +436,7 @@ def _change_update(members, call, c, q):
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
-        before = _take_over(call, n, c, total)
+        before = _take_over(call, q, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
     # Contact may still change the velocity of a free node, a rigid body of any node.
@@ -454,7 +481,7 @@ def _rub_at_nodes(members, call, count):
         return
     evaluate(call, FRICTION, count, VALUE, 0.0)
     for q in range(count):
-        rub(members, call, hooks.chosen[q], hooks.scratch[VALUE, q])
+        rub(members, call, q, hooks.scratch[VALUE, q])
 
 
 @noinline
@@ -508,6 +535,8 @@ def _act_on_whole_nodes(members, task, call, count):
         if counted and hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
+                if c < kin.dimension:
+                    _add_torque(call, q, c, hooks.table[h].slot, float(numbers[c]))
     return 0
 
 
@@ -650,6 +679,7 @@ def _act_on_motion(members, task, call, count):
                     moment[d * c + k, p] = 0
             if slot >= 0:
                 totals.add_to(control.totals, slot + c, total)
+                _add_torque(call, q, c, slot, total)
     return 0
 
 
@@ -722,6 +752,8 @@ def _act_on_whole_points(members, task, call, count):
         if hooks.table[h].slot >= 0:
             for c in range(len(numbers)):
                 totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
+                if c < kin.dimension:
+                    _add_torque(call, q, c, hooks.table[h].slot, float(numbers[c]))
         if len(members.heat):
             supply, capacity = members.heat
             if capacity[0, p] > 0:

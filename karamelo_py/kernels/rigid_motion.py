@@ -61,6 +61,7 @@ CONTACT = np.dtype([
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
     ("most", *_NUMBER),  # bound of friction
     ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point, and of its force
+    ("torque", np.int64),  # slot, or 0
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
 SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the square of the residual at the start

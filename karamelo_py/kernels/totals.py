@@ -162,6 +162,12 @@ def add_rows(totals, rows, terms):
         add_to(totals, rows[q], terms[q])
 
 
+def add_torque(totals, row, x, c, force):
+    """Add the torque about the origin of component `c` of a force at `x`."""
+    add_to(totals, row + (c + 1) % 3, x[(c + 2) % 3] * force)
+    add_to(totals, row + (c + 2) % 3, -x[(c + 1) % 3] * force)
+
+
 @point_function(otherwise=True)
 def collect(ranks, control, first, count):
     """Put the values of `count` totals, from row `first` on, into `control.answer`."""

@@ -10,7 +10,7 @@ from karamelo_py.compiler import noinline
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
-from karamelo_py.kernels.totals import add_to, counts
+from karamelo_py.kernels.totals import add_to, add_torque, counts
 
 FRICTION = 3  # program of the coefficient, after the components'
 
@@ -21,11 +21,12 @@ def _is_free(holders, programs, n, c):
 
 
 @noinline
-def rub(members, call, n, mu):
-    """Apply wall friction to node `n`; the holding hook's change of v* is the normal impulse."""
+def rub(members, call, q, mu):
+    """Apply wall friction to the `q`-th chosen node; the holding hook's change of v* is the normal impulse."""
     kin, nodes, hooks, control, dt = members.kin, members.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], members.kept
-    d, holders = kin.dimension, hooks.holders
+    d, holders, n = kin.dimension, hooks.holders, hooks.chosen[q]
+    torque, place = hooks.torques[slot], hooks.scratch
     mass = nodes.sums[n, MASS]
     across = 0.0
     along = 0.0
@@ -55,6 +56,9 @@ def rub(members, call, n, mu):
             hooks.loads[n, c] -= mass * taken / dt
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
+                if torque > 0:
+                    x = (place[0, q], place[1, q], place[2, q])
+                    add_torque(control.totals, torque, x, c, -mass * taken / dt)
     # a wall takes no heat
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 

@@ -58,6 +58,7 @@ class Publisher:
     published: tuple[str, ...] = SUFFIXES
     has_published = False
     unit = NUMBER  # of its values
+    restrictions: Restrictions | None = None  # what it does not support
 
     def publish(self, name: str, value: float) -> None:
         if name not in self.published:
@@ -117,7 +118,6 @@ class Fix(Publisher):
     by_sizes = False  # sizes of points follow from their volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
-    restrictions: Restrictions | None = None  # what it does not support
     reads_itself = False  # its formulas may contain its own values
     moves: Any = None  # rigid solid, by the forces on it
     touches: Any = None  # rigid solid that its points push, and that pushes them
@@ -126,6 +126,8 @@ class Fix(Publisher):
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # present faces (m, d, d) of a tool
     accelerates = False  # formulas are forces per mass
+    exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed if asked for
+    presses = False  # the force is that of a surface on points
     brakes = False
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
     # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not

@@ -30,6 +30,8 @@ class Values:
         self._of: dict[str, dict[str, int]] = {}  # slots of names, by ID
         self._first: dict[str, int] = {}  # slot of ID_x, named or not
         self._used = 0
+        # Slot of the torque that goes with the force in slots x, y, z from this one on; or 0.
+        self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
 
@@ -64,6 +66,22 @@ class Values:
             if name not in slots and self._slots.get(name) == slot:
                 del self._slots[name]
         self._of[ID] = slots
+
+    def publish_torque(self, ID: str) -> None:
+        """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin of ``ID_x``, ...
+
+        Of contact between two solids, ``ID_t2x``, ... is that on the second one.
+        """
+        first = self._first[ID]
+        if not self.torques[first]:
+            self.torques[first] = self._reserve(6)
+        for k, suffix in enumerate(("tx", "ty", "tz", "t2x", "t2y", "t2z")):
+            self._slots[f"{ID}_{suffix}"] = int(self.torques[first]) + k
+
+    def torque_of(self, ID: str) -> np.ndarray:
+        """Return the torque of ``ID`` to be read or set, (6,), or (0,) if nobody asked for it."""
+        slot = int(self.torques[self._first[ID]])
+        return self.array[slot : slot + 6 * bool(slot)]
 
     def slot(self, name: str) -> int:
         return self._slots[name]

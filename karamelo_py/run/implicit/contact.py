@@ -207,6 +207,9 @@ class Contact:
             if slot >= 0:
                 one, other = (self.a == a) & (self.b == b), (self.a == b) & (self.b == a)
                 values[slot : slot + 3] = force[other].sum(0) - force[one].sum(0)
+                if turns := tag.torques[slot]:
+                    turning = loads[other, 3:].sum(0) - loads[one, 3:].sum(0)
+                    values[turns : turns + 3] = turning
         for source, copy in tag.copies:
             values[copy : copy + 3] = values[source : source + 3]
         tag.touched[self.pairs[:, 0], self.b] = np.where(

@@ -66,4 +66,4 @@ class PushingTool:
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()
-        self.fix.publish_components(self.view.total(self.force))
+        self.fix.publish_load(Displaced(self.view, self.way), self.force)

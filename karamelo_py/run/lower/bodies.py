@@ -58,6 +58,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
             touch.group.has(np.arange(count)) & soft,
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
+            int(hub.values.torques[hub.values.slot(f"{touch.id}_x")]),
             address_of_python(touch.refuse, CALL),
         )
         for touch in surfaces_of(fix)

@@ -164,6 +164,8 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
             yield solid.material.fluid.restrictions, "pore_water", solid.mark
     for fix in hub.fixes.values():
         yield fix.restrictions, f"fix {fix.style}", fix.mark
+    for compute in hub.computes.values():
+        yield compute.restrictions, f"compute {compute.style}", compute.mark
     name = registry.name_of("scheme", type(update.scheme))
     yield update.scheme.traits.restrictions, f"scheme {name}", update.scheme_mark
 

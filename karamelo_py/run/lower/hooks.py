@@ -52,6 +52,7 @@ def lower_hooks(
         holders=np.zeros((builder.shared_nodes(), dimension), arrays.HELD).view(np.recarray),
         loads=np.zeros((builder.loaded_nodes, dimension)),
         rigid_fields=builder.rigid_fields,
+        torques=hub.values.torques,
         mode=mode or Serial(),
         # Values per thread, with padding in between.
         apart=arrays.Apart(
@@ -108,7 +109,8 @@ class _Builder:
                 address = address_of(hook.function, hook.signature)
         formulas = [f for f in (*fix.formulas, fix.wall_friction) if f is not None]
         holds = hook.holds and (slot >= 0 or not hook.on_nodes)
-        uses_place = any(f.names & set(POINT_SEEDS) for f in formulas)
+        turns = bool(self.hub.values.torques.any())
+        uses_place = turns or any(f.names & set(POINT_SEEDS) for f in formulas)
         count = len(fix.published) if slot >= 0 and hook.tag is not None else 0
         uses = [*map(int, (hook.uses_before, hook.uses_share, holds, uses_place, count))]
         late = STAGES[moment] == arrays.POST_UPDATE_GRID_STATE

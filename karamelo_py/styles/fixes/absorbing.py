@@ -84,6 +84,7 @@ class Absorbing(Fix):
     published = ("x", "y", "z")
     node_fields = (Normal, Support)
     order = LAST
+    exerts = True
 
     post_particles_to_grid = vector_hook(
         absorb,

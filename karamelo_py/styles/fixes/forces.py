@@ -61,7 +61,7 @@ class BodyForce(Fix):
     syntax = "group, bx[, by[, bz]]"
     published = ("x", "y", "z")
     unit = FORCE
-    accelerates = True
+    accelerates = exerts = True
 
     post_particles_to_grid = node_hook(accelerate)
 
@@ -128,6 +128,7 @@ class ForceNodes(Fix):
     syntax = "group, fx[, fy[, fz]]"
     published = ("x", "y", "z")
     unit = FORCE
+    exerts = True
 
     post_particles_to_grid = node_hook(share_out, shares=True)
 
@@ -136,10 +137,17 @@ class ForceNodes(Fix):
         self.formulas = per_direction(hub, "f", force)
 
 
+def torques(x: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return the torques (n, 3) about the origin of forces (n, d) at `x` (n, d)."""
+    arm, push = np.zeros((2, len(x), 3))
+    arm[:, : x.shape[1]], push[:, : x.shape[1]] = x, force
+    return np.cross(arm, push)
+
+
 class PointForces(Fix):
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
-    point_by_point = True
+    point_by_point = exerts = True
     conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, group: ParticleGroup):
@@ -153,10 +161,17 @@ class PointForces(Fix):
     def forces(self, points: PointsView) -> np.ndarray:
         raise NotImplementedError
 
+    def publish_load(self, points: PointsView, force: np.ndarray) -> None:
+        """Publish the sum of forces (n, d) on points, and their torque if asked for."""
+        self.publish_components(points.total(force))
+        torque = self.hub.values.torque_of(self.id)
+        if len(torque):
+            torque[:3] = points.total(torques(points.position, force))
+
     def initial_integrate(self, points: PointsView) -> None:
         force = self.forces(points)
         points.force = points.force + force
-        self.publish_components(points.total(force))
+        self.publish_load(points, force)
 
 
 class ForceParticles(PointForces):
@@ -244,7 +259,7 @@ class LocalDamping(Fix):
     """
 
     published = ("x", "y", "z")
-    brakes = True
+    brakes = exerts = True
     order = LAST
 
     post_update_grid_state = node_hook(brake)

@@ -21,6 +21,7 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.fixes.forces import torques
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import Gripping
 
@@ -40,7 +41,7 @@ class PairContact(Gripping):
 
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
-    point_by_point = True
+    point_by_point = exerts = True
     conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
@@ -70,7 +71,7 @@ class PairContact(Gripping):
         raise NotImplementedError
 
     def initial_integrate(self, points: PointsView) -> None:
-        simulation, total = self.hub.simulation, np.zeros(3)
+        simulation, total, turning = self.hub.simulation, np.zeros(3), np.zeros(6)
         kin, blocks = simulation.kin, simulation.setup.blocks
         rows = self._near(simulation)
         d, grips = kin.dimension, [field(block.points.fields, self.grip) for block in blocks]
@@ -81,7 +82,7 @@ class PairContact(Gripping):
             ]
             last = float(simulation.control.step[0].last_dt)
             push = partial(self._push, kin, (last, points.contact_dt, points.contact_kick))
-            result, total = simulation.comm.at_first(push, np.concatenate(tables))
+            result, total, turning = simulation.comm.at_first(push, np.concatenate(tables))
         for block, grip, k in zip(blocks, grips, range(len(blocks)), strict=True):
             if grip is not None:
                 grip[:] = 0
@@ -92,6 +93,8 @@ class PairContact(Gripping):
                     grip[:, some] = result[: len(some), d:].T
                 result = result[len(some) :]
         self.publish_components(total)
+        torque = self.hub.values.torque_of(self.id)
+        torque[:] = turning[: len(torque)]
 
     def sent(self, simulation: Any) -> int:
         """Number of points that may touch others now; one process searches all of them."""
@@ -131,7 +134,7 @@ class PairContact(Gripping):
     def _push(
         self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
     ) -> list[tuple]:
-        """Forces and grips of the points of each process, and the sum of forces on rank 0."""
+        """Forces and grips of the points of each process, the sum of forces, and the torques."""
         of_all, d = np.concatenate(tables), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
@@ -146,7 +149,11 @@ class PairContact(Gripping):
         force = np.empty((n, d + grip.shape[1]))
         force[order] = np.concatenate([bodies.force, bodies.grip], axis=1)
         ends = np.cumsum([len(one) for one in tables])[:-1]
-        return [(rows, cells.total) for rows in np.split(force, ends)]
+        turning = np.zeros(6)
+        if len(self.hub.values.torque_of(self.id)):
+            each, first = torques(x, bodies.force), bodies.first2
+            turning = np.concatenate([each[:first].sum(axis=0), each[first:].sum(axis=0)])
+        return [(rows, cells.total, turning) for rows in np.split(force, ends)]
 
 
 gain(
@@ -304,7 +311,7 @@ class ContactFriction(Fix):
 
     syntax = "solid1, solid2, mu|no-slip"
     published = ("x", "y", "z")
-    for_method = True
+    for_method = exerts = True
 
     def __init__(
         self,

@@ -425,7 +425,7 @@ class ContactRigidBody(Fix):
     """
 
     published = ("x", "y", "z")
-    for_method = True
+    for_method = exerts = presses = True
     by_sizes = True
 
     def __init__(

@@ -125,7 +125,7 @@ class VelocityNodes(Fix):
     syntax = "group, vx[, vy[, vz]][, mu=mu]"
     published = ("x", "y", "z")
     unit = FORCE
-    prescribes_velocity = True
+    prescribes_velocity = exerts = True
 
     def __init__(
         self,

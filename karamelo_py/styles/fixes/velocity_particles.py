@@ -65,7 +65,7 @@ class VelocityParticles(VelocityOfPoints):
     """
 
     published = ("x", "y", "z")
-    leads_points = True
+    leads_points = exerts = True
 
     initial_integrate = point_hook(start, publishes=False, uses_before=True)
     post_advance_particles = point_hook(carry, uses_before=True)

@@ -180,6 +180,7 @@ class ULMPMContacts(Method):
             change=np.zeros((count, d)),
             rigid=np.array([can(law, constrained_velocity) for law in laws]),
             torque=slots[:, 1].copy(),
+            torques=hub.values.torques,
             memory=np.array([MEMORY if flows(law) else 1 for law in laws]),
             surface=np.array(
                 [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
@@ -193,6 +194,8 @@ class ULMPMContacts(Method):
             contact.friction[a, b] = contact.friction[b, a] = fix.friction
             contact.pair[a, b] = hub.values.slot(f"{fix.id}_x")
         published = [*contact.slot, *contact.torque, *contact.pair[contact.pair >= 0]]
+        turning = hub.values.torques[published]
+        published += list(turning[turning > 0])
         contact.forces[: 1 + len(published)] = [len(published), *published]
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]

@@ -22,7 +22,7 @@ from karamelo_py.styles.fixes.forces import PointForces
 class ToolFix(PointForces):
     """Base of fixes that push points, taken as small cubes (in 2D squares)."""
 
-    follows_points = True
+    follows_points = presses = True
     needs_stiffness = False  # the force scales with the point's shear modulus
 
     def __init__(self, hub: Hub, group: ParticleGroup):

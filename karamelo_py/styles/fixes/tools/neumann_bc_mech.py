@@ -38,6 +38,7 @@ class NeumannBcMech(ToolFix):
     """
 
     syntax = "group, tx[, ty[, tz]]"
+    presses = False
 
     def __init__(self, hub: Hub, group: ParticleGroup, *traction: Expression | None):
         super().__init__(hub, group)
