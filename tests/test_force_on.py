@@ -1,5 +1,7 @@
 """Compute force_on: force, torque and point of action, for every way in which a force can act."""
 
+from textwrap import dedent
+
 import numpy as np
 import pytest
 
@@ -31,7 +33,8 @@ BOX = """
     log_modify(custom, step, F_x, F_y, F_tz, p_x, p_y, L_z)
     run(4)
 """
-MATE = "solid(mate, region, mate, 2, rubber, 0.1)\ntranslate_particles(mate, region, mate, 0, 0.004)"
+MATE = """solid(mate, region, mate, 2, rubber, 0.1)
+    translate_particles(mate, region, mate, 0, 0.004)"""
 LED = "material(steel, rigid, 1000)\n" + MATE.replace("rubber", "steel")
 FREE = LED + "\nfix(m, rigid_body, mate, velocity=(0, 1))"
 GRID, PLANE = "ulmpm/contacts", "0, 0.61, 0, 0.1, 1, 0"
@@ -89,35 +92,159 @@ def test_the_force_is_the_change_of_momentum(run_interpreted, way):
 
 TABLE = """
     method(ulmpm/contacts, FLIP, linear, 0.99)
-    dimension(2, 0, 1, 0, 0.6, 0.1)
-    region(table, block, 0.1, 0.9, 0.1, 0.2)
-    region(block, block, 0.4, 0.7, 0.2, 0.4)
-    material(rubber, linear, 1000, 1e5, 0.3)
-    solid(table, region, table, 1, rubber, 0.1)
-    solid(block, region, block, 1, rubber, 0.1)
+    dimension(2, 0, 1, 0, 0.7, 0.1)
+    region(table, block, 0, 1, 0.1, 0.3)
+    region(block, block, 0.4, 0.7, 0.3, 0.5)
+    material(rubber, neo-hookean, 1000, 1e5, 0.3)
+    solid(table, region, table, 2, rubber, 0.1)
+    solid(block, region, block, 2, rubber, 0.1)
     region(low, block, INF, INF, INF, 0.1)
     group(low, nodes, region, low, all)
     group(block, particles, region, block, solid, block)
     fix(low, velocity_nodes, low, 0, 0)
     fix(weight, body_force, all, 0, -10)
-    fix(push, force_particles, block, 30, 0)
-    fix(rub, contact/friction, block, table, no-slip)
+    fix(push, force_particles, block, {push}, 0)
+    fix(rub, contact/friction, block, table, 0.5)
     fix(calm, local_damping, all, 0.8)
-    compute(B, force_on, block, x=0.55, y=0.2)
+    compute(B, force_on, block, x=0.55, y=0.3)
     compute(T, force_on, table)
     compute(S, force_on, low)
     compute(G, force_on, low, weight, push)
     compute(c, center_of_mass, block)
     set_output(1500)
-    log_modify(custom, step, B_x, B_y, B_tz, B_px, T_x, T_y, T_tz, S_y, S_px, G_x, G_y, G_tz, c_x, c_y)
+    log_modify(custom, step, B_x, B_y, B_tz, B_px, T_x, T_y, S_y, S_px, G_x, G_y, G_tz, c_x, c_y)
     run(1500)
 """
 
 
-def test_a_block_on_a_table_pushed_above_its_foot(run_script):
-    """The table bears m g under the centre, moved by F h/(m g) towards where the push tends."""
-    log = run_script(TABLE).log
-    print(log)
-    b = {name: log[name][-1] for name in log}
-    assert (b["B_x"], b["B_y"]) == pytest.approx((-30, 600), rel=1e-9)
-    assert (b["T_x"], b["T_y"]) == pytest.approx((30, -600), rel=1e-9)
+@pytest.mark.parametrize("push", [0, 30])
+def test_a_block_on_a_table_pushed_above_its_foot(run_script, push):
+    """The table bears m g below the centre; pushed by F at the height y, F y / m g further on."""
+    log = run_script(TABLE.format(push=push)).log
+    end = {name: log[name][-1] for name in log}
+    assert [end[name] for name in ("B_x", "B_y", "T_x", "T_y", "S_y")] == pytest.approx(
+        [-push, 600, push, -600, 2600], abs=6e-7
+    )
+    assert [end[f"G_{name}"] for name in ("x", "y", "tz")] == pytest.approx([0, 0, 0], abs=6e-7)
+    acts_at = 0.55 + end["B_tz"] / end["B_y"]
+    assert acts_at == pytest.approx(end["c_x"] + push * (end["c_y"] - 0.3) / 600, abs=1e-8)
+    assert end["B_px"] == pytest.approx(acts_at, abs=2e-5)  # of the inclined line, near its foot
+
+
+TANK = """
+    method(ulmpm, APIC, quadratic-spline)
+    dimension(2, 0, 1, 0, 1, 0.1)
+    region(water, block, 0, 0.6, 0, 0.8)
+    eos(water, fluid, 1000, 1e5, 7)
+    strength(water, fluid, 10)
+    material(water, eos-strength, water, water)
+    solid(water, region, water, 2, water, 0.1)
+    region(wall, block, 0.6, INF, INF, INF)
+    region(other, block, INF, 0, INF, INF)
+    region(floor, block, INF, INF, INF, 0)
+    group(wall, nodes, region, wall, all)
+    group(other, nodes, region, other, all)
+    group(floor, nodes, region, floor, all)
+    fix(wall, velocity_nodes, wall, 0, NULL)
+    fix(other, velocity_nodes, other, 0, NULL)
+    fix(floor, velocity_nodes, floor, NULL, 0)
+    fix(g, body_force, all, 0, -10)
+    fix(calm, local_damping, all, 0.8)
+    compute(F, force_on, wall)
+    compute(G, force_on, wall, other, floor, g)
+    compute(c, max_position, all)
+    set_output(500)
+    log_modify(custom, step, F_x, F_y, F_px, F_py, G_x, G_y, G_tz, c_y)
+    run(1500)
+"""
+
+
+def test_a_wall_holds_water(run_script):
+    """rho g H^2/2 at the height H/3, and all walls and the weight balance."""
+    log = run_script(TANK).log
+    assert log.F_x[-1] == pytest.approx(-1000 * 10 * 0.8**2 / 2, rel=0.01)
+    assert log.F_py[-1] == pytest.approx(0.8 / 3, rel=0.01)
+    assert log.G_x[-1] == pytest.approx(0, abs=1e-8)
+    assert log.G_y[-1] == pytest.approx(0, abs=1)
+    assert log.G_tz[-1] == pytest.approx(0.3 * log.G_y[-1], abs=1e-6)  # what is left, in the middle
+
+
+SPACE = """
+    method(ulmpm, APIC, linear)
+    dimension(3, 0, 4, 0, 4, 0, 4, 1)
+    region(box, block, 1, 3, 1, 2, 1, 2)
+    region(low, block, INF, INF, INF, INF, 0, 1)
+    material(rubber, linear, 1, 100, 0.3)
+    solid(box, region, box, 1, rubber, 1)
+    group(low, nodes, region, low, all)
+    fix(push, force_particles, all, 2*y, -x, 3)
+    fix(floor, velocity_nodes, low, NULL, 0.1, 0)
+    compute(F, force_on, push, floor, x=1, y=2, z=3)
+    compute(p, linear_momentum, all)
+    compute(L, angular_momentum, all, 1, 2, 3)
+    set_dt(1e-2)
+    set_output(1)
+    log_modify(custom, F_x, F_y, F_z, F_tx, F_ty, F_tz, F_px, F_py, F_pz, {momenta})
+    run(4)
+"""
+
+
+def test_in_space_the_point_of_action_is_on_the_central_axis(run_interpreted):
+    """Force and torque are rates of momentum; about the point only a torque along F remains."""
+    momenta = ", ".join(f"{name}_{axis}" for name in "pL" for axis in "xyz")
+    log = run_interpreted(SPACE.format(momenta=momenta)).log
+    found = {k: np.stack([log[f"{k}{axis}"] for axis in "xyz"], 1) for k in ("F_", "F_t", "F_p")}
+    force, torque, place = found["F_"][2:], found["F_t"][2:], found["F_p"][2:]
+    for name, rate in (("p_", force), ("L_", torque)):
+        change = np.diff(np.stack([log[f"{name}{axis}"] for axis in "xyz"], 1), axis=0)[1:]
+        assert rate == pytest.approx(change / 1e-2, abs=2e-8)
+    left = torque - np.cross(place - [1, 2, 3], force)
+    assert np.cross(left, force) == pytest.approx(0, abs=1e-6)
+
+
+WRONG = {
+    "nothing": ("compute(F, force_on, nothing)", "there is no solid and no fix 'nothing'"),
+    "no force": ("compute(F, force_on, start)", "publishes no force with a torque"),
+    "the same grid": ("compute(F, force_on, box)", "box, mate have the same nodes"),
+    "a sum": (
+        "fix(w, contact/surface, all, wall)\ncompute(F, force_on, box)",
+        "acts on box, mate, and its force is their sum",
+    ),
+    "twice": (
+        "fix(w, contact/surface, box, wall)\ncompute(F, force_on, box, w)",
+        "the force of 'w' would count twice",
+    ),
+    "two meanings": ("fix(box, body_force, all, 0, 1)\ncompute(F, force_on, box)", "and a fix"),
+    "later": (
+        "fix(w, contact/surface, box, wall)\ncompute(F, force_on, box)\n"
+        "fix(v, contact/surface, box, wall)\nrun(1)",
+        "fixes that act on its solid have been defined or deleted since",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_summed_is_refused(run_interpreted, case):
+    lines, message = WRONG[case]
+    head = BOX.format(method="ulmpm", solids=MATE, lines="", parts="").partition("    compute(")[0]
+    line = "fix(start, initial_velocity_particles, box, 1, 0)"
+    done = run_interpreted(f"{dedent(head)}{line}\n{lines}\n", status=1)
+    assert message in done.err
+
+
+AXIS = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, 0, 1, 0, 1, 0.1)
+    axisymmetric(true)
+    region(box, block, 0, 0.2, 0, 0.2)
+    material(rubber, linear, 1000, 1e5, 0.3)
+    solid(box, region, box, 2, rubber, 0.1)
+    fix(w, body_force, all, 0, 1)
+    compute(F, force_on, w)
+    run(1)
+"""
+
+
+def test_around_an_axis_there_is_no_point_of_action(run_interpreted):
+    done = run_interpreted(AXIS, status=1)
+    assert "compute force_on does not support axisymmetric scenes" in done.err

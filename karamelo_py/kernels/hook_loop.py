@@ -353,7 +353,7 @@ def _clear_held(members, holders):
 
 @noinline
 def _take_over(call, q, c, force):
-    """Make a hook hold the `q`-th chosen node by `force`; return the force of the previous holders."""
+    """Make a hook hold chosen node `q` by `force`; return the force of the previous holders."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     n = hooks.chosen[q]
     if hooks.holders.size > 0 and hooks.table[h].holds:

@@ -22,7 +22,7 @@ def _is_free(holders, programs, n, c):
 
 @noinline
 def rub(members, call, q, mu):
-    """Apply wall friction to the `q`-th chosen node; the holding hook's change of v* is the normal impulse."""
+    """Apply wall friction to chosen node `q`; the normal impulse is the holder's change of v*."""
     kin, nodes, hooks, control, dt = members.kin, members.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], members.kept
     d, holders, n = kin.dimension, hooks.holders, hooks.chosen[q]

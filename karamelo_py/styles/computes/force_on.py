@@ -138,25 +138,26 @@ class ForceOn(Compute):
             elif load.force not in self.hub.fixes:
                 continue  # deleted
             of = [f"{names[0]}_{axis}" for axis in AXES]
-            force = [values.get(name) if name in values else 0.0 for name in of]
+            pushes = [values.get(name) if name in values else 0.0 for name in of]
             if load.of_method:
-                torque = [values.get(f"{names[1]}_{axis}") for axis in AXES]
+                turns = np.array([values.get(f"{names[1]}_{axis}") for axis in AXES])
             else:
-                torque = values.torque_of(load.force)[3 * load.of_second :][:3]
-            total[:3] += load.sign * np.array(force)
-            total[3:] += torque
+                turns = values.torque_of(load.force)[3 * load.of_second :][:3]
+            total[:3] += load.sign * np.array(pushes)
+            total[3:] += turns
         force, torque = total[:3], total[3:] - np.cross(self.about, total[:3])
-        square = force @ force
+        square = float(np.dot(force, force))
         arm = np.cross(force, torque) / square if square > 0 else 0.0
-        everything = dict(zip(ForceOn.published, [*force, *torque, *(self.about + arm)], strict=True))
+        numbers = [*force, *torque, *(self.about + arm)]
+        everything = dict(zip(ForceOn.published, numbers, strict=True))
         for name in self.published:
             self.publish(name, everything[name])
 
     def _loads(self) -> list[Summand]:
         loads: list[Summand] = []
         for part in self.parts:
-            found = [Summand(part.ID)] if part.solid is None else list(self._on(part.solid, part.mark))
-            for load in found:
+            one = part.solid
+            for load in [Summand(part.ID)] if one is None else self._on(one, part.mark):
                 if load in loads:
                     message = f"the force of '{load.force}' would count twice"
                     raise ScriptError(message, mark=part.mark, expected="each once")
@@ -173,7 +174,7 @@ class ForceOn(Compute):
         others = [s.id for s in self.hub.solids.values() if s is not solid]
         reason = "no fix of contact acts on it"
         if others and not self.hub.update.method.own_grids:
-            reason = f"on the common grid it and {', '.join(others)} have the same nodes"
+            reason = f"{', '.join([solid.id, *others])} have the same nodes"
         raise ScriptError(
             f"the force of contact on solid '{solid.id}' is not known: {reason}",
             mark=mark,
@@ -207,5 +208,3 @@ class ForceOn(Compute):
                 hint=f"compute(F, force_on, {fix.id}) measures the force on all of them",
             )
         return True
-
-

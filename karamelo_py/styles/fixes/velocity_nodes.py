@@ -119,7 +119,7 @@ class VelocityNodes(Fix):
 
     See Also
     --------
-    velocity_particles, initial_velocity_nodes, compute reaction
+    velocity_particles, initial_velocity_nodes, compute reaction, compute force_on
     """
 
     syntax = "group, vx[, vy[, vz]][, mu=mu]"
@@ -257,7 +257,7 @@ class Reaction(Compute):
 
     See Also
     --------
-    fix velocity_nodes, internal_force
+    force_on, fix velocity_nodes, internal_force
     """
 
     published = ("x", "y", "z")
