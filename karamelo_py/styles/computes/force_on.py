@@ -40,7 +40,7 @@ class Acting(NamedTuple):
             raise ScriptError(
                 f"fix '{ID}' ({fix.style}) publishes no force with a torque",
                 mark=argument.mark,
-                expected=f"the solid '{fix.body.id}'" if fix.body else cls.script_kind,
+                expected=f"the solid '{fix.moves.id}'" if fix.moves else cls.script_kind,
             )
         return cls(ID, argument.mark, solid)
 
