@@ -451,7 +451,7 @@ def test_examples_of_styles_fit_their_signatures(family, name, tmp_path, monkeyp
             try:
                 # Some lines speak of what is defined above them.
                 starts = line.startswith(("log", "material", "eos"))
-                speaks = starts or "c_y" in line or "v_x" in line
+                speaks = starts or any(word in line for word in ("c_y", "v_x", "force_on"))
                 above = lines[:k] if speaks else []
                 _tried([*above, line], dimension, tmp_path)
                 break

@@ -127,7 +127,7 @@ class Fix(Publisher):
     faces_of: Any = None  # present faces (m, d, d) of a tool
     accelerates = False  # formulas are forces per mass
     exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed if asked for
-    presses = False  # the force is that of a surface on points
+    presses = False  # it is the force of a surface on points
     brakes = False
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
     # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not

@@ -70,7 +70,7 @@ class Values:
     def publish_torque(self, ID: str) -> None:
         """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin of ``ID_x``, ...
 
-        Of contact between two solids, ``ID_t2x``, ... is that on the second one.
+        Of contact between two solids, ``ID_t2x``, ... acts on the second one.
         """
         first = self._first[ID]
         if not self.torques[first]:
@@ -79,7 +79,7 @@ class Values:
             self._slots[f"{ID}_{suffix}"] = int(self.torques[first]) + k
 
     def torque_of(self, ID: str) -> np.ndarray:
-        """Return the torque of ``ID`` to be read or set, (6,), or (0,) if nobody asked for it."""
+        """Return the torque of ``ID`` to be read or set, (6,), or (0,) if no compute needs it."""
         slot = int(self.torques[self._first[ID]])
         return self.array[slot : slot + 6 * bool(slot)]
 

@@ -59,7 +59,7 @@ class ForceOn(Compute):
 
     Parameters
     ----------
-    part
+    part, more
         A solid: the force of contact on it, by other solids, rigid bodies, tools and surfaces. A
         fix: its force on the points or nodes of its group. Several: their sum.
     x, y, z
@@ -67,15 +67,16 @@ class ForceOn(Compute):
 
     Example
     -------
-    compute(F, force_on, wall)
-    compute(G, force_on, block, floor, x=0.5, y=0)
-    log_modify(custom, time, F_x, F_py, G_y, G_tz)
+    fix(clamp, velocity_nodes, left, 0, 0)
+    fix(pull, force_particles, tip, 0, -100)
+    compute(F, force_on, clamp, pull, x=0.5)
+    log_modify(custom, time, F_x, F_tz, F_py)
 
     Notes
     -----
     Publishes the force ID_x, ID_y, ID_z, the torque ID_tx, ID_ty, ID_tz, and the point of action
-    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. The force on a wall, a tool or a surface is
-    the opposite of that of its fix.
+    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, a tool or a surface
+    takes the opposite force.
 
     The force acts along a line; ID_px, ... is its point nearest to x, y, z. In
     3D it is the central axis, about which a torque along the force may remain. A line meets the
