@@ -165,6 +165,8 @@ MISTAKES = {
     "gravity=(0, -1)": ("gravity=(0, 0, -1)", "3 components", "2 formulas"),
     "gravity=(0, 1)": ("pivot=(2, 3), velocity=(1, 0)", "pivot holds the body", "spin=..."),
     "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
+    "velocity=(0, 1)": ("velocity=(0, 1), motion=(NULL, 2)", "motion says 2", "NULL or 2 for y"),
+    "spin=2": ("spin=2, fixed=(rz)", "fixed says 0", "NULL or 0 for rz"),
     "turning=1": ("", "nothing acts on the body 'body'", "gravity=(...)"),
     "scheme(musl, start=half)": ("scheme(newmark)", "support scheme newmark", "velocity_particles"),
     "set_dt(0.1)": ("precision(single)", "not support precision(single)", "precision(double)"),
@@ -176,8 +178,13 @@ MISTAKES = {
     "run(10)": ("fix(c, rigid_body, body, spin=1)\nrun(10)", "moves 'body' already", "replaces it"),
     "dump": (
         "fix(c, contact/rigid_body, all, body, 0.2)\ndelete_fix(b)\ndump",
-        "no fix",
-        "rigid_body",
+        "is the contact with 'body', which this fix moves",
+        "delete_fix(c) in a line before",
+    ),
+    "set_output": (
+        "fix(c, contact/rigid_body, all, body)\nfix(d, contact/rigid_body, all, body)\nset_output",
+        "is the contact of points of this group with 'body' already",
+        "or one fix",
     ),
     "run": (
         "delete_fix(b)\nrun(1)\nfix(b, rigid_body, body, spin=1)\nrun",

@@ -52,6 +52,7 @@ def delete_fix(hub: Hub, ID: str) -> None:
     --------
     fix
     """
+    hub.fixes[ID].deleted()
     hub.fixes.remove(ID)
 
 

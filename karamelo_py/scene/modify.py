@@ -173,6 +173,9 @@ class Fix(Publisher):
     def defined(self) -> None:
         """Called when the fix has its ID."""
 
+    def deleted(self) -> None:
+        """Called before the fix is deleted; raises if other fixes need it."""
+
     def seconds(self) -> float:
         """Estimated core seconds per step, for ``check``."""
         from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())

@@ -90,7 +90,8 @@ class ForceOn(Compute):
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
     other tools. They come before this compute. Each sums its torque only if a compute asks for it.
     Friction of contact/minimize_penetration acts between the centres of points, so the torques on
-    the two solids are not quite opposite.
+    the two solids are not quite opposite. The torque of velocity_particles lacks the angular
+    momentum that affine transfers store within points.
 
     See Also
     --------

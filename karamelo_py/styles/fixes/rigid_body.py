@@ -186,11 +186,27 @@ class RigidBody(Fix):
             elif self.led[k] is not None and not hub.rehearsing:
                 velocities[k] = self.led[k].evaluate(hub.values)
         state.v[:], state.spin[:] = velocities[:3], velocities[3:]
+        self._refuse_another_start((velocity, spin), start, fixed)
         self._spin_up()
         self.published = tuple(name for name in self.published if self._has(name, d))
         self.has_load = any(item is not None for item in self.formulas_of_body)
         if self.previous is None:
             self._begin_points(solid)
+
+    def _refuse_another_start(
+        self, given: tuple[Components | None, Components | None], start: list, fixed: Any
+    ) -> None:
+        """Refuse initial velocities in directions in which the body moves as prescribed."""
+        for k, (item, formula) in enumerate(zip(start, self.led, strict=True)):
+            components = given[k // 3]
+            if item is None or formula is None or components is None or self.hub.rehearsing:
+                continue
+            wanted, value = item.evaluate(self.hub.values), formula.evaluate(self.hub.values)
+            if wanted != value:
+                held = fixed is not None and WAYS[k] in [part.text for part in fixed.listed()]
+                name = "fixed" if held else ("motion", "turning")[k // 3]
+                message = f"it begins with {wanted:g} for {WAYS[k]}, and {name} says {value:g}"
+                raise _wrong(components.argument, message, f"NULL or {value:g} for {WAYS[k]}")
 
     @property
     def memory(self) -> np.ndarray:
@@ -242,6 +258,16 @@ class RigidBody(Fix):
             )
         for slot, column in self.slots():
             self.hub.values.array[slot] = self.numbers[column]
+
+    def deleted(self) -> None:
+        touch: Any = next(iter(surfaces_of(self)), None)
+        if touch is not None:
+            raise ScriptError(
+                f"fix '{touch.id}' (line {touch.mark.line}) is the contact with '{self.body.id}', "
+                "which this fix moves",
+                argument="ID",
+                expected=f"delete_fix({touch.id}) in a line before",
+            )
 
     def rigid_positions(self) -> np.ndarray:
         d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
@@ -453,6 +479,20 @@ class ContactRigidBody(Fix):
                 argument="region" if region else "solid",
                 expected="a block, cylinder, sphere, closed STL surface or mesh, or some of these",
             )
+
+    def defined(self) -> None:
+        others: list[Any] = [fix for fix in contacts_of(self.hub) if fix is not self]
+        for other in others:
+            same = (other.touches, other.region) == (self.touches, self.region)
+            if same and len(np.intersect1d(other.group.members, self.group.members)):
+                error = ScriptError(
+                    f"fix '{other.id}' (line {other.mark.line}) is the contact of points of this "
+                    f"group with '{self.touches.id}' already",
+                    argument="group",
+                    expected="groups without points in common, or one fix",
+                )
+                error.mark, error.command = self.mark, "fix contact/rigid_body"
+                raise error
 
     def behind(self, points: PointTable) -> tuple[int, float]:
         """Return the number of points in the body before the first step, and the largest depth."""
