@@ -223,13 +223,16 @@ ELASTIC = {
     "m": "hyperelastic, 2, 0.06*T*(I1*J^(-2/3) - 3) + 50*(J - 1)^2, cp=1, kappa=0",
     "n": "viscoelastic, m, 0.3, 0.01, wlf=(17, 52, 293)",
     "o": "jointed, 2, 100, 0.3, 0.1, 30, 30, 90, psi=5, matrix_cohesion=0.2, matrix_phi=20",
+    "p": "linear, 2, 100, 0.3",
+    "q": "hill, p, flow, 30, R=(1.8, 1.3, 2.1)",
 }
 
 
 def of_laws(method: str, laws: dict[str, str], thin: str = "false") -> str:
     """One point for each law, strengths or materials, pulled and sheared."""
     lines = [f"method({method})", f"dimension(2, 0, {len(laws) / 10 + 0.1}, 0, 0.3, {H})",
-             f"plane_stress({thin})", "eos(bulk, linear, 8, 160)"]  # fmt: skip
+             f"plane_stress({thin})", "eos(bulk, linear, 8, 160)",
+             "strength(flow, johnson_cook, 40, 0.1, 0.2, 0.4, 1, 0.01, 0, 293, 900)"]  # fmt: skip
     for k, (name, law) in enumerate(laws.items()):
         lines += [
             f"region({name}, block, {k / 10}, {(k + 1) / 10}, 0.1, 0.2)",

@@ -11,7 +11,7 @@ from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.basis.product import Along, along, node_number, register, warn_of_many_nodes
 from karamelo_py.points.basis.weighted import Weighted
 from karamelo_py.points.grid import cells_along, in_cells
-from karamelo_py.points.kinematics import I, det, planar, product, tensor, total
+from karamelo_py.points.kinematics import I, det, planar, product, stretch, tensor, total
 
 LEAST = 1e-3
 MOST = 1.0
@@ -227,7 +227,7 @@ def _deformed_cpgimp_det(basis, kin, location, dl):
 def _deformed_cpgimp_stretch(basis, kin, location, dl):
     d = kin.dimension
     start, F = location[2 * d : 3 * d], tensor(planar(kin), location[3 * d :]).after(dl.planar())
-    stretches = F.diagonal() if isinstance(basis, CPGIMPDiagonal) else F.stretch()
+    stretches = F.diagonal() if isinstance(basis, CPGIMPDiagonal) else stretch(F)
     half = [size * abs(factor) for size, factor in zip(start, stretches[:d], strict=True)]
     return (*location[:d], *half, *start, *F)
 

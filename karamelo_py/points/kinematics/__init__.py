@@ -302,36 +302,6 @@ class Tensor(Matrix):
         a = self.transposed().at()
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
-    def stretch(self):
-        """Return U = sqrt(F^T F) for det F != 0.
-
-        2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson
-        1984, J. Elasticity 14). 3D: Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its
-        rotation R, then U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius
-        norms), to round-off even for equal stretches.
-        """
-        if self.kin.dimension == 3:
-            r = self
-            for _ in range(POLAR_STEPS):
-                r = r.towards_rotation()
-            return r.turned_back(self)
-        a = self.at()
-        if self.kin.dimension == 1:
-            return self.symmetric._make([abs(a.get((i, i), 1)) for i in range(3)])
-        size = abs(a[0, 0] * a[1, 1] + a[0, 1] * -a[1, 0])
-        c = {(i, j): a[0, i] * a[0, j] + a[1, i] * a[1, j] for i in (0, 1) for j in (0, 1)}
-        k = 1 / sqrt(c[0, 0] + c[1, 1] + size + size)
-        around = abs(a.get((2, 2), 1))
-        return self.symmetric._make(
-            [k * (c[0, 0] + size), k * (c[1, 1] + size), around, k * c[0, 1]]
-        )
-
-    def towards_rotation(self):
-        back = inv(self)
-        g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in self])))
-        pairs = zip(self, back.transposed(), strict=True)
-        return self._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
-
     def turned_back(self, f):
         r, f = self.at(), f.at()
 
@@ -593,6 +563,36 @@ def inv(f):
     return f._make(
         [k * cofactor(a, d, j, i) if max(i, j) < d else 1 / a[i, j] for i, j in f.places]
     )
+
+
+def stretch(f):
+    """Return U = sqrt(F^T F) for det F != 0.
+
+    2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson 1984, J.
+    Elasticity 14). 3D: Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its rotation R, then
+    U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius norms), to round-off
+    even for equal stretches.
+    """
+    if f.kin.dimension == 3:
+        r = f
+        for _ in range(POLAR_STEPS):
+            r = towards_rotation(r)
+        return r.turned_back(f)
+    a = f.at()
+    if f.kin.dimension == 1:
+        return f.symmetric._make([abs(a.get((i, i), 1)) for i in range(3)])
+    size = abs(a[0, 0] * a[1, 1] + a[0, 1] * -a[1, 0])
+    c = {(i, j): a[0, i] * a[0, j] + a[1, i] * a[1, j] for i in (0, 1) for j in (0, 1)}
+    k = 1 / sqrt(c[0, 0] + c[1, 1] + size + size)
+    around = abs(a.get((2, 2), 1))
+    return f.symmetric._make([k * (c[0, 0] + size), k * (c[1, 1] + size), around, k * c[0, 1]])
+
+
+def towards_rotation(f):
+    back = inv(f)
+    g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in f])))
+    pairs = zip(f, back.transposed(), strict=True)
+    return f._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
 
 
 def sym(a):
