@@ -75,7 +75,7 @@ def pulled(law, steps=6, end=0.02):
 def test_yield_stress_and_r_value_against_the_angle(angle):
     """Y(a), R(a) of Hill (1948): Y^2/Y(a)^2 = F s^4 + G c^4 + H (c^2 - s^2)^2 + 2 N s^2 c^2."""
     stress, strain, _ = pulled(sheet(-angle), steps=1, end=0.004)
-    F, G, H, _, _, N = of_lankford(*R)
+    F, G, H, _, _, N = of_lankford(R)
     c, s = cos(radians(angle)), sin(radians(angle))
     factor = F * s**4 + G * c**4 + H * (c * c - s * s) ** 2 + 2 * N * s * s * c * c
     assert stress == pytest.approx(Y / sqrt(factor), rel=2e-3)
@@ -192,7 +192,7 @@ def test_a_sheet_in_plane_stress(run_interpreted):
     """
     ).folder
     t = read_log(folder / "element_strip.txt")
-    F, G, H, _, _, N = of_lankford(*R)
+    F, G, H, _, _, N = of_lankford(R)
     c, s = cos(radians(30)), sin(radians(30))
     factor = sqrt(F * s**4 + G * c**4 + H * (c * c - s * s) ** 2 + 2 * N * s * s * c * c)
     # The work of ep against the flow stress is that of the plastic strain along the pull.

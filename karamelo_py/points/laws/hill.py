@@ -96,21 +96,24 @@ class YieldRatios(Ratios):
     size = 6
 
 
-def of_lankford(r0: float, r45: float, r90: float) -> tuple[float, ...]:
+def of_lankford(R: tuple[float, ...]) -> tuple[float, ...]:
     """Return F, G, H, L, M, N of a sheet, with the yield stress of direction 1."""
+    r0, r45, r90 = R
     shear = (r0 + r90) * (1 + 2 * r45) / (2 * r90 * (1 + r0))
     return r0 / (r90 * (1 + r0)), 1 / (1 + r0), r0 / (1 + r0), 1.5, 1.5, shear
 
 
-def of_ratios(r11, r22, r33, r12, r13, r23) -> tuple[float, ...]:
+def of_ratios(ratios: tuple[float, ...]) -> tuple[float, ...]:
     """Return F, G, H, L, M, N; the ratios are 1 for an isotropic body."""
+    r11, r22, r33, r12, r13, r23 = ratios
     a, b, c = 1 / r11**2, 1 / r22**2, 1 / r33**2
     shears = 1.5 / r23**2, 1.5 / r13**2, 1.5 / r12**2
     return 0.5 * (b + c - a), 0.5 * (c + a - b), 0.5 * (a + b - c), *shears
 
 
-def surface(F, G, H, L, M, N) -> np.ndarray:
+def surface(constants: tuple[float, ...]) -> np.ndarray:
     """Return P (6, 6) of q^2 = T.P.T in Mandel's notation."""
+    F, G, H, L, M, N = constants
     P = np.diag([G + H, F + H, F + G, L, M, N])
     P[0, 1] = P[1, 0] = -H
     P[0, 2] = P[2, 0] = -G
@@ -187,7 +190,7 @@ class Hill(NamedTuple):
         and 90 degrees to axis 1, the rolling direction; axis 3 is through the sheet.
     yields
         Instead of R, yield stresses (r11, r22, r33, r12, r13, r23) over the reference; all 1 for an
-        isotropic body. Those of shear are over the reference divided by sqrt(3).
+        isotropic body. In shear they are over the reference divided by sqrt(3).
 
     Example
     -------
@@ -202,8 +205,7 @@ class Hill(NamedTuple):
     with q at most the flow stress (Hill 1948, "A theory of the yielding and plastic flow of
     anisotropic metals", Proc. R. Soc. Lond. A 193). T is the Kirchhoff stress R^T tau R in axes
     that rotate by the polar part R of F, and T = C:e with the elastic strain e, which is small.
-    Strain increments there are those of the stretch U, exact in volume, so rotations of any size
-    cause none. Flow is associated; ep is the plastic strain conjugate to q (dump column), and
+    The stretch U alone strains, exactly in volume, so rotations of any size cause no stress. Flow is associated; ep is the plastic strain conjugate to q (dump column), and
     hardening is isotropic. R-values leave shears through the sheet isotropic (L = M = 3/2).
 
     In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0).
@@ -250,7 +252,7 @@ class Hill(NamedTuple):
                 argument="strength",
                 expected="a strength such as plastic, swift, tabulated or johnson_cook",
             )
-        constants = of_lankford(*R) if R else of_ratios(*yields)
+        constants = of_lankford(R) if R else of_ratios(yields or ())
         F, G, H, *_ = constants
         if not F * G + G * H + H * F > 1e-9 or not F + G + H > 0:
             raise ScriptError(
@@ -260,7 +262,7 @@ class Hill(NamedTuple):
                 "1/r33^4",
             )
         law = elastic.whole
-        return built(law, hard, turned(surface(*constants), axes(angle, tilt, spin)))
+        return built(law, hard, turned(surface(constants), axes(angle, tilt, spin)))
 
 
 def built(law: Any, strength: Any, P: np.ndarray) -> YieldingByHill:
@@ -307,7 +309,7 @@ def _is_round_hill(law):
     )
 
 
-class Memory(NamedTuple):
+class Hardened(NamedTuple):
     strength: Any
 
 
@@ -315,13 +317,13 @@ class State(NamedTuple):
     F: Any
     U: Any  # stretch
     e: Any  # elastic strain in axes that rotate by the polar part of F
-    m: Memory
+    m: Hardened
     loss: Any  # dissipated energy per reference volume
 
 
 @laws.initial_state.on(YieldingByHill)
 def _initial_state_hill(law, kin, template):
-    m = Memory(initial_memory(law.strength, template))
+    m = Hardened(initial_memory(law.strength, template))
     return State(unit(kin), nothing(kin) + I, nothing(kin), m, 0)
 
 
@@ -388,7 +390,7 @@ def _by_rates_hill(law):
 def stretching(kin, state, dl, U):
     """Return the strain increment U_m^-1 (C_new - C_old)/2 U_m^-1, with U_m between the stretches.
 
-    Its trace is made that of the logarithm, so volumes do not drift.
+    Its trace is corrected to the logarithm of the volume ratio, so volumes do not drift.
     """
     middle = state.F @ inv(as_tensor(kin, 0.5 * (state.U + U)))
     strain = sym(dl + 0.5 * (dl.transposed() @ dl)).carried(middle.transposed() - I)
@@ -408,7 +410,7 @@ def _advance_hill(law, kin, state, dl, dt):
     limit, _ = flow(law.strength, before_flow(law.strength, memory, ()), x, dt)
     g = x / limit
     lost = [x * (g * rate / (1 + g * rate)) for rate, x in zip(rates, z, strict=True)]
-    m = Memory(updated_memory(law.strength, memory, x, dt))
+    m = Hardened(updated_memory(law.strength, memory, x, dt))
     return State(F, U, e - strain_from(law, lost, e), m, state.loss + limit * x)
 
 
