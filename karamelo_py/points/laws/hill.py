@@ -204,9 +204,10 @@ class Hill(NamedTuple):
     q^2 = F (T22 - T33)^2 + G (T33 - T11)^2 + H (T11 - T22)^2 + 2 L T23^2 + 2 M T13^2 + 2 N T12^2,
     with q at most the flow stress (Hill 1948, "A theory of the yielding and plastic flow of
     anisotropic metals", Proc. R. Soc. Lond. A 193). T is the Kirchhoff stress R^T tau R in axes
-    that rotate by the polar part R of F, and T = C:e with the elastic strain e, which is small.
-    The stretch U alone strains, exactly in volume, so rotations of any size cause no stress. Flow is associated; ep is the plastic strain conjugate to q (dump column), and
-    hardening is isotropic. R-values leave shears through the sheet isotropic (L = M = 3/2).
+    that rotate by the polar part R of F, and T = C:e with the elastic strain e, which is small. The
+    stretch U alone strains, exactly in volume, so rotations of any size cause no stress. Flow is
+    associated; ep is the plastic strain conjugate to q (dump column), and hardening is isotropic.
+    R-values leave shears through the sheet isotropic (L = M = 3/2).
 
     In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0).
 
