@@ -225,6 +225,7 @@ ELASTIC = {
     "o": "jointed, 2, 100, 0.3, 0.1, 30, 30, 90, psi=5, matrix_cohesion=0.2, matrix_phi=20",
     "p": "linear, 2, 100, 0.3",
     "q": "hill, p, flow, 30, R=(1.8, 1.3, 2.1)",
+    "r": "tsai-hill, g, 0.6, 0.3, 0.3, 30",
 }
 
 

@@ -15,7 +15,7 @@ STYLES = {
     "inflow and outflow": [("fix", "inflow"), ("fix", "outflow")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
-    "failure with directions": [("damage", "hashin"), ("damage", "tsai")],
+    "failure of fibres": [("damage", "hashin"), ("material", "hashin")],
     "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],

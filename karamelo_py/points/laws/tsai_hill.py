@@ -1,0 +1,232 @@
+"""Material tsai-hill: failure of laminae and wood."""
+
+from typing import Any, ClassVar, NamedTuple
+
+from karamelo_py.compiler import where
+from karamelo_py.language.arguments import Argument, look_up
+from karamelo_py.language.scene import Scene
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import I, total
+from karamelo_py.points.laws.elastic import OfDeformation
+from karamelo_py.points.laws.elastic import State as Deformed
+from karamelo_py.points.laws.orthotropic import Directional, axes, stress_of
+from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.script.errors import ScriptError
+
+
+class DirectionalBase:
+    """Script argument: the elastic law of a solid that fails with directions."""
+
+    script_kind: ClassVar[str] = "the ID of a material orthotropic or transverse"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        material = look_up(hub.materials, argument)
+        if not isinstance(material.whole, Directional):
+            raise ScriptError(
+                f"material '{material.id}' has no directions",
+                mark=argument.mark,
+                expected=cls.script_kind,
+            )
+        return material
+
+
+class TsaiHill(NamedTuple):
+    """Elastic solid with directions that breaks where the stress reaches its strength.
+
+    Parameters
+    ----------
+    elastic
+        ID of a material orthotropic or transverse.
+    X
+        Strength along axis 1, the fibres.
+    Y
+        Strength across.
+    S
+        Shear strength of planes with axis 1.
+    angle, tilt, spin
+        Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own.
+    Xc, Yc
+        Strengths in compression; default: as in tension.
+    residual
+        Remaining fraction of the stiffness, above 0 and below 1.
+
+    Example
+    -------
+    material(lamina, orthotropic, 1600, 140e9, 9e9, 9e9, 0.3, 0.3, 0.4, 5e9, 5e9, 3e9, 30)
+    material(ply, tsai-hill, lamina, 2000e6, 50e6, 80e6, 30, Xc=1200e6, Yc=170e6)
+
+    Notes
+    -----
+    A point breaks when T11 (T11 - T22 - T33)/X^2 + (T22^2 + T33^2)/Y^2 + (1/X^2 - 2/Y^2) T22 T33 +
+    (T12^2 + T13^2)/S^2 + (4/Y^2 - 1/X^2) T23^2 exceeds 1, the criterion of Tsai (1968) and Hill
+    (1948) for a solid that is isotropic across axis 1 (Jones 1999, "Mechanics of composite
+    materials", section 2.9.3). T is the second Piola-Kirchhoff stress; the signs of T11 and T22 +
+    T33 choose the strengths. From then on the stress is the fraction `residual` of the elastic
+    stress; the energy lost at once is dissipated. Dump columns: `damage`, 0 or 1, and
+    `damage_init`, the largest value of the criterion so far. Where points break one after the
+    other, the energy of a crack depends on the cell size.
+
+    See Also
+    --------
+    orthotropic, transverse, hill, fix erosion
+    """
+
+    elastic: Any
+    X: float
+    Y: float
+    S: float
+
+    syntax = "elastic, X, Y, S[, angle][, tilt][, spin][, Xc=X][, Yc=Y][, residual=0.01]"
+
+    @classmethod
+    def given(
+        cls, elastic: DirectionalBase, X: AboveZero, Y: AboveZero, S: AboveZero,
+        angle: float = 0.0, tilt: float = 0.0, spin: float = 0.0, *,
+        Xc: AboveZero | None = None, Yc: AboveZero | None = None, residual: AboveZero = 0.01,
+    ) -> Any:  # fmt: skip
+        strengths = (X, Y), (X, Yc or Y), (Xc or X, Y), (Xc or X, Yc or Y)
+        for along, across in strengths:
+            if across >= 2 * along:
+                raise ScriptError(
+                    f"with {across:g} across and {along:g} along axis 1 some shear would never "
+                    "break the solid",
+                    argument="Y",
+                    expected="a strength across below twice the strength along axis 1",
+                )
+        if not residual < 1:
+            raise ScriptError(
+                f"a residual fraction of {residual:g} is no failure",
+                argument="residual",
+                expected="a number above 0 and below 1",
+            )
+        turn = map(float, axes(angle, tilt, spin).ravel())
+        return Failing(elastic.whole, X, Xc or X, Y, Yc or Y, S, residual, Turn(*turn))
+
+
+class Turn(NamedTuple):
+    in_lanes = True
+
+    xx: float
+    xy: float
+    xz: float
+    yx: float
+    yy: float
+    yz: float
+    zx: float
+    zy: float
+    zz: float
+
+
+class _Fields(NamedTuple):
+    elastic: Any
+    X: float
+    Xc: float
+    Y: float
+    Yc: float
+    S: float
+    residual: float
+    turn: Turn  # columns: the axes of strength
+
+
+class Failing(OfDeformation, _Fields):
+    """An elastic solid with a criterion of Tsai and Hill."""
+
+    __slots__ = ()
+    in_lanes = True
+    traits = laws.LawTraits()
+
+
+class State(NamedTuple):
+    F: Any
+    index: Any  # largest value of the criterion so far
+    loss: Any  # dissipated energy per reference volume
+
+
+@laws.initial_state.on(Failing)
+def _initial_state_failing(law, kin, template):
+    return State(laws.initial_state(law.elastic, kin, template).F, 0, 0)
+
+
+def piola_stress(law, kin, F):
+    return stress_of(law.elastic, laws.elastic_strain(law.elastic, kin, Deformed(F)))
+
+
+def criterion(law, T):
+    a = T.at()
+
+    def component(p, q):
+        pairs = [(i, j) for i in range(3) for j in range(3) if (i, j) in a]
+        return total([law.turn[3 * i + p] * law.turn[3 * j + q] * a[i, j] for i, j in pairs])
+
+    t11, t22, t33 = [component(k, k) for k in range(3)]
+    t12, t13, t23 = component(0, 1), component(0, 2), component(1, 2)
+    x = 1 / where(t11 < 0, law.Xc, law.X)
+    y = 1 / where(t22 + t33 < 0, law.Yc, law.Y)
+    xx, yy = x * x, y * y
+    shears = (t12 * t12 + t13 * t13) / (law.S * law.S) + (4 * yy - xx) * t23 * t23
+    return (
+        t11 * (t11 - t22 - t33) * xx
+        + (t22 * t22 + t33 * t33) * yy
+        + ((xx - 2 * yy) * t22 * t33 + shears)
+    )
+
+
+def fraction_left(law, index):
+    return where(index < 1, 1, law.residual)
+
+
+@laws.advance.on(Failing)
+def _advance_failing(law, kin, state, dl, dt):
+    F = state.F.after(dl)
+    index = max(state.index, criterion(law, piola_stress(law, kin, F)))
+    gone = fraction_left(law, state.index) - fraction_left(law, index)
+    return State(F, index, state.loss + gone * laws.energy_density(law.elastic, kin, Deformed(F)))
+
+
+@laws.kirchhoff_stress.on(Failing)
+def _kirchhoff_stress_failing(law, kin, state):
+    whole = piola_stress(law, kin, state.F).carried(state.F - I)
+    return fraction_left(law, state.index) * whole
+
+
+@laws.energy_density.on(Failing)
+def _energy_density_failing(law, kin, state):
+    whole = laws.energy_density(law.elastic, kin, Deformed(state.F))
+    return fraction_left(law, state.index) * whole
+
+
+@laws.dissipated_energy.on(Failing)
+def _dissipated_energy_failing(law, kin, state):
+    return state.loss
+
+
+@laws.damage.on(Failing)
+def _damage_failing(law, kin, state):
+    return where(state.index < 1, 0, 1)
+
+
+@laws.damage_initiation.on(Failing)
+def _damage_initiation_failing(law, kin, state):
+    return state.index
+
+
+@laws.wave_speed_squared.on(Failing)
+def _wave_speed_squared_failing(law, kin, state):
+    return laws.wave_speed_squared(law.elastic, kin, Deformed(state.F))
+
+
+@laws.specific_volume.on(Failing)
+def _specific_volume_failing(law):
+    return law.elastic.specific_volume
+
+
+@laws.is_round.on(Failing)
+def _is_round_failing(law):
+    return laws.is_round(law.elastic)
+
+
+laws.column(Failing, "damage", laws.damage)
+laws.column(Failing, "damage_init", laws.damage_initiation)
+laws.column(Failing, "dissipated", laws.dissipated_energy)
