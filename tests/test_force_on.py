@@ -90,6 +90,25 @@ def test_the_force_is_the_change_of_momentum(run_interpreted, way):
     assert force[2] == pytest.approx(change[2], abs=4e-6 * size if method == "tlmpm" else exact)
 
 
+@pytest.mark.parametrize("way", [way for way in WAYS if len(WAYS[way]) > 2 and way != "pair"])
+def test_action_is_reaction(run_interpreted, way):
+    """Between two solids; friction at points acts between their centres, not at one place."""
+    line, _, solids, method = (*WAYS[way], *USUAL[len(WAYS[way]) :])
+    both = "compute(R, force_on, mate)\ncompute(B, force_on, box)"
+    script = BOX.format(method=method, lines=f"fix(w, {line})\n{both}", parts="w", solids=solids)
+    columns = "B_x, B_y, B_tz, R_x, R_y, R_tz"
+    log = run_interpreted(script.replace("F_x, F_y, F_tz, p_x, p_y, L_z", columns)).log
+    action = np.stack([log.B_x, log.B_y, log.B_tz])[:, 1:]
+    reaction = np.stack([log.R_x, log.R_y, log.R_tz])[:, 1:]
+    size = np.abs(action).max()
+    assert size > 1
+    assert action[:2] == pytest.approx(-reaction[:2], abs=1e-9 * size)
+    tolerance = 2e-4 if "minimize_penetration" in line else 1e-9
+    assert action[2] == pytest.approx(-reaction[2], abs=tolerance * size)
+
+
+
+
 TABLE = """
     method(ulmpm/contacts, FLIP, linear, 0.99)
     dimension(2, 0, 1, 0, 0.7, 0.1)
@@ -167,6 +186,34 @@ def test_a_wall_holds_water(run_script):
     assert log.G_x[-1] == pytest.approx(0, abs=1e-8)
     assert log.G_y[-1] == pytest.approx(0, abs=1)
     assert log.G_tz[-1] == pytest.approx(0.3 * log.G_y[-1], abs=1e-6)  # what is left, in the middle
+
+
+LOADED = """
+    method(ulmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 0.6, 0, 0.4, 0.1)
+    region(box, block, 0.2, 0.4, 0.1, 0.3)
+    region(low, block, INF, INF, INF, 0.1)
+    material(rubber, linear, 1000, 1e6, 0.3)
+    solid(box, region, box, 2, rubber, 0.1)
+    group(low, nodes, region, low, all)
+    fix(low, velocity_nodes, low, 0, 0)
+    fix(push, force_particles, all, 30*time, 0)
+    fix(weight, body_force, all, 0, -10*time)
+    compute(G, force_on, low, push, weight)
+    set_dt(0.5)
+    set_output(1)
+    log_modify(custom, step, low_y, G_x, G_y, G_tz)
+    run_time(1)
+"""
+
+
+def test_load_steps_balance(run_interpreted):
+    """Torques to the displacement in a step, since loads act where the step begins."""
+    log = run_interpreted(LOADED).log
+    assert log.low_y[1:] == pytest.approx([200, 400], rel=1e-9)
+    assert np.stack([log.G_x, log.G_y]) == pytest.approx(np.zeros((2, 3)), abs=4e-7)
+    assert np.abs(log.G_tz).max() < 1e-3
 
 
 SPACE = """

@@ -75,16 +75,17 @@ class ForceOn(Compute):
     Notes
     -----
     Publishes the force ID_x, ID_y, ID_z, the torque ID_tx, ID_ty, ID_tz, and the point of action
-    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, a tool or a surface
-    takes the opposite force.
+    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, a tool or a surface takes the
+    opposite force.
 
-    The force acts along a line; ID_px, ... is its point nearest to x, y, z. In
-    3D it is the central axis, about which a torque along the force may remain. A line meets the
-    height y = 0 at x = ID_tz/ID_y, if the torque is about the origin.
+    The force acts along a line; ID_px, ... is its point nearest to x, y, z. In 3D it is the central
+    axis, about which a torque along the force may remain. A line meets the height y = 0 at x =
+    ID_tz/ID_y, if the torque is about the origin.
 
     A solid's walls (fix velocity_nodes), loads and weight count only if their fixes are named.
     Forces of points act at their positions, forces of nodes at the nodes, both at the beginning of
-    the step.
+    the step: in load steps torques err by the displacement in a step. In tlmpm nodes stay at their
+    initial positions.
 
     Fixes: velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
