@@ -213,7 +213,7 @@ def test_load_steps_balance(run_interpreted):
     log = run_interpreted(LOADED).log
     assert log.low_y[1:] == pytest.approx([200, 400], rel=1e-9)
     assert np.stack([log.G_x, log.G_y]) == pytest.approx(np.zeros((2, 3)), abs=4e-7)
-    assert np.abs(log.G_tz).max() < 1e-3
+    assert np.abs(log.G_tz).max() < 1e-2  # of 120
 
 
 SPACE = """
