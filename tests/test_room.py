@@ -216,7 +216,7 @@ def test_a_scene_that_does_not_fit_is_refused_in_one_message(small, tmp_path, ca
     said = capsys.readouterr().err
     assert said.startswith("in.large:6:1: error: solid: the scene has 48 points, which take at ")
     assert said.count("error") == 1 and "cells 1.1 times as large" in said
-    assert "; this machine has 1.21e-05 GiB in all" in said
+    assert "; this machine has 1.21e-05 GiB in total" in said
     assert "precision(single)" in said and "several machines" in said
 
 
@@ -304,7 +304,7 @@ def test_points_are_not_counted_to_the_end_where_none_fits(small, tmp_path, caps
     (tmp_path / "in.script").write_text(block(2, "run(1)"), encoding="utf-8")
     small(64 * 10)
     assert main(["in.script"]) == 1
-    assert "the scene has some 24 points with these" in capsys.readouterr().err
+    assert "with these, the scene has some 24 points" in capsys.readouterr().err
 
 
 def test_a_grid_that_no_machine_has_room_for(tmp_path, capsys, monkeypatch):

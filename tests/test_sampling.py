@@ -207,7 +207,7 @@ def test_sensitivity_of_a_linear_function(folder, capsys):
     assert len(pandas.read_csv("sobol.csv")) == 16
     assert main(["sensitivity", "in.lin", *words, "-method", "fit", "-n", "6", "-o", "f.csv"]) == 0
     out = capsys.readouterr().out
-    assert "v_x: a linear function predicts a run from the others within" in out
+    assert "v_x: a linear function has a leave-one-out error of" in out
     assert re.search(r"^b +0\.[78]", out, re.M) and "6 runs" in out
 
 

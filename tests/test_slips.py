@@ -163,9 +163,9 @@ def test_points_without_memory_are_not_counted():
     lattice = Lattice(2, hub.domain.lo, hub.domain.hi, 1e-4)
     room = Room(whole=4e9, of_one=100, already=0, single=False)
     said = (
-        r"the scene has some 4.\de\+07 points with these, which take more than 4.\d+ GiB of memory"
+        r"with these, the scene has some 4.\de\+07 points, which take more than 4.\d+ GiB of memory"
     )
-    with pytest.raises(ScriptError, match=rf"{said}; this machine has 3.73 GiB in all"):
+    with pytest.raises(ScriptError, match=rf"{said}; this machine has 3.73 GiB in total"):
         fill(disk, hub.domain, lattice, 2, room=lambda: room)
     assert sum(looked) == SAMPLE
 
@@ -180,7 +180,7 @@ def test_many_points_a_cell_without_memory_are_refused_at_once(monkeypatch):
     lattice = Lattice(2, hub.domain.lo, hub.domain.hi, 0.05)
     # pi (0.2^2 - 0.195^2) (4000/0.05)^2 = 4.0e7 points
     room = Room(whole=3.6e9, of_one=100, already=0, single=False)
-    with pytest.raises(ScriptError, match=r"the scene has some 3.[6-9]\d*e\+07 points with these"):
+    with pytest.raises(ScriptError, match=r"with these, the scene has some 3.[6-9]\d*e\+07 points"):
         fill(ring, hub.domain, lattice, 4000, room=lambda: room)
 
 

@@ -146,20 +146,20 @@ def load_path(
     increments
         Number of increments.
     exx, eyy, ezz, exy, exz, eyz
-        Strain: the sum of the increments, so ln(length/initial length) for many; shear strains are
-        tensor components, half the angle.
+        Strain, summed over the increments: ln(length/initial length) if these are many. Shear
+        strains are tensor components, half the shear angle.
     gxy, gxz, gyz
-        Angle of simple shear, twice the tensor strain. gxy moves x along y and rotates the point by
-        gxy/2; exy does not rotate it.
+        Angle of simple shear, twice the tensor strain. gxy is a displacement in x that grows with
+        y, and rotates the point by gxy/2; exy does not rotate it.
     sxx, syy, szz, sxy, sxz, syz
-        Cauchy stress, tension positive. The program finds the strain of this component.
+        Cauchy stress, tension positive. The program solves for the strain of this component.
     volumetric
-        exx + eyy + ezz: what remains is split among the unspecified normal strains.
+        exx + eyy + ezz: the remainder is split among the unspecified normal strains.
     turn
         Angle in radians by which the point rotates about z. Strains and stresses refer to fixed
         axes.
     duration
-        Duration for rate-dependent laws, by default 1. Alone, it holds the point.
+        Duration for rate-dependent laws, by default 1. Given alone, it holds the strain.
 
     Example
     -------
@@ -188,7 +188,7 @@ def load_path(
     if not turn and all(value is None for value in prescribed):
         raise ScriptError(
             "no strain and no stress is prescribed: nothing would change",
-            expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... holds it",
+            expected="exx=..., sxx=..., gxy=..., volumetric=... or turn=...; duration=... to hold",
         )
     path = LoadPath(
         increments=increments,
@@ -236,8 +236,8 @@ def element(
         ``plane-stress`` (no stress szz); ``axisymmetric`` (x the radius, y the axis, z around it);
         ``1D`` (exx only); ``uniaxial-stress`` (stress sxx only).
     tangent
-        Whether to print the tangent of the last increment: derivatives of the Cauchy stress by
-        strains and angles of shear (twice the tensor strains).
+        Whether to print the tangent of the last increment: derivatives of the Cauchy stress
+        with respect to the strains and shear angles (twice the tensor strains).
 
     Example
     -------
@@ -254,11 +254,11 @@ def element(
     reference volume; columns of the law, such as the equivalent plastic strain ep. The last row is
     published as ID_exx, ID_sxx and so on.
 
-    The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. The increment of
-    a rotation is skew to first order; its second-order part has the least stored energy, because
-    laws in rate form and laws in F differ on rigid motion. Prescribed stresses are found by
+    The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. For a rotation,
+    dt grad v is skew to first order. Laws in rate form and laws in F differ on its second-order
+    part: the program takes the one that stores the least energy. Prescribed stresses are found by
     Newton's method with the exact tangent. An increment that does not converge is halved, up to
-    eight times; then the files show the increments so far.
+    eight times. If that fails, the files show the increments before it.
 
     See Also
     --------
@@ -317,7 +317,7 @@ def _follow(point: Point, paths: tuple[LoadPath, ...], response: Response) -> No
                 f"load path '{path.id}' (number {number + 1}), {error}"
                 + (f"; the last increment ended at {reached}" if reached else ""),
                 argument=2 + number,
-                hint="smaller stresses, or strains in their place" if path.stress
+                hint="smaller stresses, or strains instead" if path.stress
                 else "more increments",
             ) from None  # fmt: skip
 

@@ -6,22 +6,21 @@ method and application to stress propagation in granular material", CMES 2(4)). 
 adds a tangential impulse, at most mu times as large. Momentum is conserved to round-off.
 
 Where more than two fields meet, all pairs compute impulses from the same velocities, so the order
-of the solids does not matter. Each pair takes 1 / k of its impulse, k being the larger of its
-bodies' numbers of pairs, so that energy does not grow. Further iterations remove the rest.
+of the solids does not matter. Each impulse is divided by the number of approaching pairs of one of
+its two bodies, the larger number, so that energy does not grow. Further iterations remove the rest.
 
 Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap is
 measured from the mean positions of each body's points around a node
 (`karamelo_py.points.basis.surface`), and bodies may approach until it is closed at the end of the
-step. Convex bodies are apart if they are apart along one direction: the grid axes are tried too,
-since normals tilt where faces end.
+step. Convex bodies are apart if any direction shows a gap. The grid axes are tried in addition to
+the normal, as normals tilt where faces end.
 
-The mean position is not the lowest point of a liquid or granular material: points would sink into a
-wall, a little for each gap that it seems to leave. So bodies that hold no shape may leave a wall,
-but not approach it, for 100 steps after a contact, as their points leave it for some steps at a
-time; contact at nodes that a moving wall comes from counts too. (An elastic disk that may not
-approach either takes 4 % less force: Hertz.) A wall is a body of prescribed velocity. It may be one
-cell thick and have corners that other bodies fill: only its faces towards the other body count, and
-none in a hollow corner may be entered.
+A wall is a body of prescribed velocity. In a liquid or granular material some points lie closer to
+the wall than the mean position says, so each apparent gap would let them sink in a little. Their
+points leave the wall for a few steps at a time. Bodies of such shapeless materials may therefore
+leave a wall but not approach it for 100 steps after a contact, also one at nodes that a moving wall
+has left. (With the same rule, an elastic disk takes 4 % less force: Hertz.) A wall may be one cell
+thick: only its faces towards the other body count. No face of a hollow corner may be entered.
 """
 
 from math import sqrt
@@ -52,10 +51,10 @@ from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
-# squared sines of angles about the mean direction out of a body:
+# squared sine of the scatter of a body's outward directions about their mean:
 SCATTER = 0.003  # accuracy for a plane face
 EDGE = 0.03  # above it a face ends or is round
-FACING = 0.3  # cosine of the angle at which two faces face each other
+FACING = 0.3  # directions with a larger cosine count as the same
 MEMORY = 100  # steps after a contact in which shapeless bodies may not approach a wall
 REPEATS = 16  # iterations where more than two fields meet; each at least halves the rest
 
@@ -67,13 +66,13 @@ class SeparateFields(NamedTuple):
     looks_beyond = 1  # cells beyond the points' nodes whose sums are read
 
     stride: int  # to the same position in the next field
-    beside: np.ndarray  # (d, 2) stride to the next node, and nodes, along each axis
+    beside: np.ndarray  # (d, 2) stride to the next node, and number of nodes, along each axis
     per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient; infinite: no slip
     warmth: np.ndarray  # (F, F) fraction of frictional heat to the first of two fields
     pair: np.ndarray  # (F, F) slot of the force of a pair on its first field, or -1
     slot: np.ndarray  # (F,) slot of the force on each field
-    copies: np.ndarray  # (k, 2) slots: from a field to other solids with that field
+    copies: np.ndarray  # (k, 2) slot of a field, and of another solid that gets its force
     touched: np.ndarray  # (N, F) int32: last step (from 1) of contact between a node and a later
     #                      field's node; negative if they stuck
     prescribed: np.ndarray  # (N, d) 1 + slot of the reaction if a fix prescribes v, else 0
@@ -82,7 +81,7 @@ class SeparateFields(NamedTuple):
     rigid: np.ndarray  # (F,) bool: contact does not move the field
     torque: np.ndarray  # (F,) slot of the torque on each field
     torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
-    memory: np.ndarray  # (F,) steps that `touched` is read for: MEMORY if shapeless, else 1
+    memory: np.ndarray  # (F,) steps that a contact is remembered: MEMORY if shapeless, else 1
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: contacts of each
@@ -186,14 +185,14 @@ def _cosine_above(a, b, least):
 def _normal(bodies, n, other):
     """Return the outward direction of a body, and the squared sine of its scatter angle.
 
-    The mean of the sums of m grad N over the nodes around `n`, with weights 1/4, 1/2, 1/4 along
-    each axis, is accurate to two degrees for a plane face; the sum of one node rotates by tens as
-    rows of points inclined to the grid pass it. Nodes whose sum points the same way as `other`, the
-    outward direction of the other body, are omitted, so that only one face of a thin wall counts.
+    It averages the sums of m grad N of the nodes around `n`, with weights 1/4, 1/2, 1/4 along each
+    axis: accurate to two degrees for a plane face. A single sum varies by tens of degrees as rows
+    of points inclined to the grid pass its node. Nodes whose sum points the same way as `other`,
+    the other body's outward direction, are omitted: only one face of a thin wall counts.
 
-    The length weighs it against the other body's direction: more with the surface around the nodes,
-    less where their directions differ, as at edges. (Lemiale, Nairn & Hurmane 2010 take the larger
-    sum: the edge of a block on a base of its density is tilted by 15 degrees.)
+    Its length is its weight against the other body's direction: larger with more surface around the
+    nodes, smaller where their directions differ, as at edges. (Lemiale, Nairn & Hurmane 2010 take
+    the larger sum. A block's edge on a base of equal density is then tilted by 15 degrees.)
     """
     contact, kin, _ = bodies
     total, lengths = zero_vector(kin, 0.0), 0.0
@@ -210,7 +209,7 @@ def _normal(bodies, n, other):
     if square > 0:
         scatter = max(1.0 - square / (lengths * lengths), 0.0) + SCATTER
         total = square / (scatter * scatter) * total
-    if kin.hoops:  # on the axis: along it
+    if kin.hoops:  # no radial component on the axis
         total = vector(kin, [_kept(contact, n, 0) * total[0], *total[1:]])
     return total, scatter
 
@@ -231,7 +230,7 @@ def _is_hollow(bodies, n, normal, other):
 
 @noinline
 def _entering(bodies, n, other, velocity, least):
-    """Return the largest part of a velocity, above `least`, into a face towards `other`."""
+    """Return the largest component of a velocity, if above `least`, into a face towards `other`."""
     contact, kin, _ = bodies
     most, penetrating = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
@@ -253,8 +252,8 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity to remove so that no face of a hollow corner is entered.
 
-    The rest slides along one face, along the edge of two, or is 0. It is perpendicular to the
-    removed part, so one impulse removes all of that.
+    The rest slides along one face, along the edge of two, or is 0. The removed part is
+    perpendicular to it, so that one impulse removes it.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -299,7 +298,7 @@ def _pair_of(bodies, records, n, m, may_be_hollow):
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
-    # Opposite faces ending next to each other tilt to opposite sides; the difference does not.
+    # Normals of opposite faces with a common end tilt to opposite sides; the difference does not.
     outward = of_n - of_m
     wall, yields = led_n != led_m, vector(kin, yielding)
     return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
@@ -351,7 +350,7 @@ def _directions(bodies, pair):
 def _last_contact(bodies, pair):
     """Return the last step of contact at the nodes of a pair, 0 for none.
 
-    Contact at the nodes that a moving rigid wall comes from counts too.
+    Contact at the nodes that a moving rigid wall has left counts too.
     """
     contact, kin, nodes = bodies
     other = pair.m // contact.stride
@@ -368,7 +367,7 @@ def _last_contact(bodies, pair):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity beyond closing the gap in a step; 0 for bodies apart."""
+    """Return the approach velocity in excess of closing the gap in a step; 0 if apart."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -407,7 +406,7 @@ def _friction_of(pair, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """List the fields at a position in `meeting`; return their number, 0 if not first."""
+    """List fields at a position in `meeting`; return their number, 0 if `n` is not the first."""
     if not nodes.sums[n, MASS] > 0:
         return 0
     a = n // contact.stride
@@ -494,7 +493,7 @@ def _touch_pair(bodies, control, i, j, where):
         return  # both prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # No friction on the remaining approach, because separate bodies may still meet.
+    # Friction leaves the remaining approach: it is what closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:
@@ -502,8 +501,8 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Dissipation is impulse times the mean of the sliding speeds at both ends of the step; in
-        # between, internal forces undo their change.
+        # Dissipation is the impulse times the mean of the sliding speeds at start and end of the
+        # step; within it, internal forces offset the change that the impulse makes.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
@@ -646,7 +645,7 @@ def list_pairs(bodies, grids, spans, pairs):
 
 @noinline
 def _stay_pair(bodies, i, j, pair, sticks):
-    """Remove a pair's velocity across the surface, or all of it that v* lacks."""
+    """Remove a pair's normal velocity; if they stick all of it, in a hollow all not along v*."""
     contact, kin, nodes = bodies
     share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:
@@ -700,8 +699,8 @@ def _stay(steps):
     """Prevent the deforming velocity from opening or closing active contacts.
 
     Mapped separately from v*, it would move surfaces that are pressed together, and stress would do
-    spurious work: a collision of bars quadruples their energy, or doubles it if only approach is
-    removed. `steps` is 1 if v* of this step is known, else 0, when the last step's contacts count.
+    spurious work: colliding bars would quadruple their energy, or double it if only approach is
+    removed. With `steps` 1, the contacts of this step count (v* is known), with 0 the last step's.
     """
 
     def stay(s, n):

@@ -1,19 +1,19 @@
 """Motion of free rigid bodies, and the impulses of their contacts.
 
 A body is its mass, inertia, position, rotation, momentum and surface. A contact is a position x
-with a mass m and velocity v* of the other body, a normal n out of the rigid one, and a gap g. With
-the velocity U = (V, w) of the rigid body at the end of the step, A U = V + w x (x - X), its impulse
-is known in closed form::
+with a mass m and velocity v* of the other body, a normal n out of the rigid one, and a gap g. U =
+(V, w) is the rigid body's velocity at the end of the step, and A U = V + w x (x - X) its velocity
+at x. The impulse of the contact is then known in closed form::
 
     p_n = s m max(n . (A U - v*) - g / dt, 0)
     p_t = m (A U - v*)_t, but at most mu p_n
 
-so the body's equations alone remain, M (U - U*) + sum A^T p = 0, six at most, solved by Newton's
-method: the mass of what it touches does not limit the step. Contact at points has s = 0.1 (dt /
-dt0)^2 with the whole step dt0: an implicit spring, as stiff in shortened steps. Contact at nodes
-has s = 1.
+so only the body's equations remain, at most six: M (U - U*) + sum A^T p = 0. Newton's method solves
+them. As this is implicit, the mass of the other body does not limit the step. Contact at points has
+s = 0.1 (dt / dt0)^2, dt0 being the unshortened step: an implicit spring of constant stiffness.
+Contact at nodes has s = 1.
 
-Forces act over `kick`, motion over dt. Between the forces the angular momentum is constant, and the
+Forces act over `kick`, motion over dt. While it moves, its angular momentum is constant, and the
 body rotates about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma &
 Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar system"): the energy of a
 free top oscillates by O(dt^2) and does not drift.
@@ -35,21 +35,21 @@ STATE = np.dtype([
     ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # of the centre
     ("momentum", *_VECTOR),  # angular
     ("q", np.float64, 4),  # rotation since the start, a quaternion
-    ("angle", *_VECTOR),  # the same about each axis in 2D; a vector along the axis in 3D
+    ("angle", *_VECTOR),  # rotation about z in 2D, may exceed 2 pi; rotation vector in 3D
     ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step, about the centre
     ("R", *_MATRIX),  # rotation matrix of q
     ("move", *_VECTOR),  # displacement of the centre in this step, over dt
-    ("spread", *_MATRIX),  # of other points: (rotation in this step - 1) / dt
+    ("spread", *_MATRIX),  # velocity gradient of its points: (rotation in this step - 1) / dt
     ("passes", *_NUMBER),  # of Newton's method, in this step
     ("failed", *_NUMBER),  # steps without a solution
 ])  # fmt: skip
-NUMBERS = STATE.itemsize // 8  # and above: the torque of contact about the origin, for `slots`
+NUMBERS = STATE.itemsize // 8  # indices from here on, in `slots`: torque about the origin
 CONSTANTS = np.dtype([
     ("mass", *_NUMBER), ("inertia", *_VECTOR),  # principal moments
     ("axes", *_MATRIX),  # principal axes, by columns
     ("start", *_VECTOR),
     ("bound", *_NUMBER),  # largest distance of its points from x
-    ("speed", *_NUMBER),  # of a point of the body at most, in this step
+    ("speed", *_NUMBER),  # upper bound of the speeds of its points in this step
     ("offset", *_VECTOR),  # of the centre of mass from x, in the frame of the start
 ])  # fmt: skip
 CONTACT = np.dtype([
@@ -99,7 +99,7 @@ class FreeBody(NamedTuple):
     dofs: np.ndarray  # (6,) int64: 1 if it moves freely, 0 if prescribed
     constants: np.ndarray  # (1,) CONSTANTS
     state: np.ndarray  # (1,) STATE
-    numbers: np.ndarray  # (NUMBERS,): the state again
+    numbers: np.ndarray  # (NUMBERS,) the state, viewed as numbers
     slots: np.ndarray  # (k, 2) slots of published values, and their indices in `numbers`
     formulas: Formulas
     solution: Solution
@@ -192,7 +192,7 @@ def _set_spin(body):
 
 @noinline
 def _turn_by_spin(body, dt):
-    """Rotate by the spin of the step: of a body whose rotation is prescribed in part."""
+    """Rotate a body whose rotation is partly prescribed, by the spin of the step."""
     state = body.state[0]
     w = state.spin
     size = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
@@ -389,7 +389,7 @@ def solve(body, dt):
     state.passes = 0
     if _iterate(body, dt, False):
         return
-    # Bounds of friction from the last normal impulses: convex, so Newton's method converges.
+    # Friction bounds fixed from the last normal impulses: convex, so Newton's method converges.
     for _ in range(BOUNDS_AT_MOST):
         change = largest = 0.0
         for i in range(body.count[0]):
@@ -448,7 +448,7 @@ def start_step(body, control):
 
 @noinline
 def _velocities_of(body, momentum):
-    """Solve M U = P for the free components of U; the others are given."""
+    """Solve M U = P for the free components of U; the others are prescribed."""
     work = body.solution
     M, J = work.mass, work.slope
     for a in range(6):
@@ -461,10 +461,10 @@ def _velocities_of(body, momentum):
 
 @noinline
 def finish_step(body, control, dimension):
-    """Take the momentum that contact leaves, move the body, and publish.
+    """Set the momentum after contact, move the body, and publish its values.
 
-    `Solution.total`: impulses of the body on others, about its centre. Returns their product with
-    the change of its velocity.
+    Return the sum of impulses on other bodies (`Solution.total`, about the centre) times the change
+    of this body's velocity.
     """
     state, work, values = body.state[0], body.solution, control.values
     kick, dt, total = control.step[0].kick, values[DT], work.total
@@ -531,6 +531,6 @@ def _set_angle(state, dt, dimension):
 
 @noinline
 def _about_origin(body, k):
-    """Torque of contact about the origin, from the centre before this step."""
+    """Torque of contact about the origin, with the position of the centre before this step."""
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

@@ -77,10 +77,10 @@ def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
     hint = turned or meant(word, by_name) or longer
     if expected and not (hint or by_name):
-        hint = f"leave out '{word} ='; == compares"
+        hint = f"leave out '{word} ='; a comparison is written =="
     if any(p.name == word for p in expected):
         hint = f"arguments are given by position: leave out '{word} ='"
-    choices = ", ".join(f"{n}=..." for n in by_name) or "arguments in their order, without names"
+    choices = ", ".join(f"{n}=..." for n in by_name) or "arguments by position, without names"
     message = f"no argument is named '{word}'"
     mark = argument.mark
     code = "arguments"
@@ -128,7 +128,7 @@ def misfit(
     family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):
         text, hint = f"one of {', '.join(registry.names(family))}", None
-    if re.fullmatch(r"0\d\d", argument.text):  # of 1,000
+    if re.fullmatch(r"0\d\d", argument.text):  # the 000 of 1,000
         hint = "commas separate arguments: a million is 1e6 or 1000000"
     message, mark = f"{which} must be {text}, not {unfit.got}", unfit.mark or argument.mark
     return ScriptError(message, mark=mark, expected=text, hint=hint, code="argument")

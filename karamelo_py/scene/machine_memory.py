@@ -29,16 +29,16 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes with swap; `free` lacks memory that the system does not report (ZFS caches)."""
+    """Bytes, swap included; `free` omits caches that the system does not report (ZFS)."""
 
     free: float
     whole: float
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Memory with caches and swap; None if the system does not report it.
+    """Return the memory with caches and swap; None if the system does not report it.
 
-    The least of the machine's, of containers and jobs (cgroups), and of each process (ulimit -v).
+    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) all count.
     """
     import psutil
 
@@ -121,25 +121,25 @@ class Room(NamedTuple):
 
     def tell(self, count: float) -> None:
         if count > MANY:
-            words = f"some {count:.2g} points are placed, which take more than "
+            words = f"placing about {count:.2g} points, which take more than "
             self.say(render_message("note", f"{words}{in_words(count * self.of_one)} of memory"))
 
     def refused(self, count: float) -> ScriptError:
         need = in_words((count + self.already) * self.of_one)
         return ScriptError(
-            f"the scene has some {count + self.already:.2g} points with these, which take more "
-            f"than {need} of memory; this machine has {in_words(self.whole)} in all",
+            f"with these, the scene has some {count + self.already:.2g} points, which take more "
+            f"than {need} of memory; this machine has {in_words(self.whole)} in total",
             hint="larger cells, or fewer points per cell"
-            + ("" if self.single else "; precision(single) before this line takes half of it"),
+            + ("" if self.single else "; precision(single) before this line halves the memory"),
             code="memory",
         )
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Room for points whose law has `state` numbers.
+    """Return the room for points whose law has `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers; the last good state
-    of a run repeats position, velocity and state.
+    A point has two positions, a velocity, a mass, the state and three integers; the stored last
+    good state of a run has a position, a velocity and the state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

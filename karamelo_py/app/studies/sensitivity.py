@@ -30,14 +30,14 @@ Says which random variables matter for a result, by runs of a script.
   karamelo-py sensitivity in.slope -method morris -n 10 ...     first: which of many matter at all
 
 sobol: the fraction of the variance that a variable explains by itself (first), and with all its
-interactions (total), with intervals of 95 % (Saltelli et al. 2010); n (d + 2) runs of d variables.
-morris: the mean size of the change of the result over the range of a variable, between quantiles
-of 1 and 99 % (mu*), and the deviation of the changes (sigma): curvature and interaction (Morris
-1991; Campolongo et al. 2007); n (d + 1) runs.
-fit: the indices of sobol of a function fitted to n runs, where runs are dear: a polynomial or
-thin-plate splines, by the smallest error of predicting each run from the others, which is printed.
-Runs that are known are not repeated."""
-DOUBTED = 0.2  # error of a fit over the deviation of the runs
+interactions (total), with 95 % confidence intervals (Saltelli et al. 2010); n (d + 2) runs for d
+variables.
+morris: how much a variable changes the result over its range (1 % to 99 % quantile): mean absolute
+change (mu*), and standard deviation of the changes (sigma), which shows curvature and interaction
+(Morris 1991; Campolongo et al. 2007); n (d + 1) runs.
+fit: for expensive runs: sobol indices of a surrogate fitted to n runs, a polynomial or thin-plate
+splines, whichever has the smaller leave-one-out error (printed). Existing runs are reused."""
+DOUBTED = 0.2  # leave-one-out error of a fit, over the standard deviation of the runs
 LEVELS = 4  # of morris
 ENDS = 0.01, 0.99  # quantiles
 
@@ -107,7 +107,7 @@ def results_of(study: Study, randoms: Sequence[Random], fixed: dict[str, str]) -
             if None in one or not np.isfinite(one).all():
                 raise ScriptError(
                     f"the run with {worded(case)} has no result: {row['reason'] or row['status']}",
-                    hint="narrower distributions: every run counts here",
+                    hint="narrower distributions: every run must have a result",
                 )
         return np.array(made, float).T
 
@@ -123,8 +123,8 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "-method", choices=("sobol", "morris", "fit"), default="sobol", help="indices (sobol)"
     )
-    parser.add_argument("-n", type=positive, default=64, help="runs of each kind (64)")
-    parser.add_argument("-seed", type=int, default=1, help="of the samples (1)")
+    parser.add_argument("-n", type=positive, default=64, help="base number n of samples (64)")
+    parser.add_argument("-seed", type=int, default=1, help="random seed of the samples (1)")
     parser.add_argument(
         "-o", type=Path, default=Path("sensitivity.csv"), help="table of runs (sensitivity.csv)"
     )
@@ -172,9 +172,9 @@ def run(options: Namespace) -> int:
         if options.method == "sobol":
             _doubt(rows, options.n)
     for item, (name, wrong) in zip(items, fits, strict=False):
-        print(f"{item.word}: {name} predicts a run from the others within {wrong:.2g} deviations")
+        print(f"{item.word}: {name} has a leave-one-out error of {wrong:.2g} standard deviations")
         if wrong > DOUBTED:
-            print(f"that is too much for these indices: -n {2 * options.n}, or -method sobol")
+            print(f"too large for reliable indices: -n {2 * options.n}, or -method sobol")
     print(f"{plural(len(study.rows), 'run')}; the table is {out}")
     return 0
 
@@ -182,4 +182,4 @@ def run(options: Namespace) -> int:
 def _doubt(rows: Sequence[tuple[Interval, Interval]], n: int) -> None:
     widest = max(total.high - total.low for _, total in rows)
     if widest > 0.2:
-        print(f"the widest interval is {widest:.2g}: -n {2 * n} makes them narrower")
+        print(f"intervals are up to {widest:.2g} wide: -n {2 * n} makes them narrower")

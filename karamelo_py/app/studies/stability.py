@@ -29,16 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DESCRIPTION = """\
-Maps where a script is stable over one or two of its variables: stable, damped (spurious energy
-loss), growing (spurious energy gain; both as the program itself finds by kinetic + stored +
-dissipated energy less the work of loads, or as a log column exceeds a bound), left (a point left
-the domain, which tells nothing of the step), short (too few steps to see whether energy grows), or
-failed, with the reason. A mistake of the script
-ends the study. Edges are searched by halves, from coarse to fine: cells between like ones are not
-run, and "run 7 of at most 400" is one of about 100. Rows of words (basis, transfer, scheme) are
-searched one by one. The table is written next to the picture (map.csv), and says which cells were
-run; -var with one value is passed on. Where nothing grows and no run fails, -accuracy shades by
-errors.
+Maps where a script is stable over one or two of its variables. The classes of runs: stable, damped
+(spurious energy loss), growing (spurious energy gain), left (a point left the domain, so the run
+says nothing about the step), short (too few steps to see whether energy grows), and failed, with
+the reason. The energy is kinetic + stored + dissipated energy less the work of loads, or a log
+column with a bound. An error in the script ends the study. Edges between classes are found by
+bisection, from coarse to fine: cells between two of one class are not run, so that "run 7 of at
+most 400" means about 100 runs. Each word (basis, transfer, scheme) has a row that is searched
+separately. The table next to the picture (map.csv) says which cells were run. -var with one value
+is passed on. -accuracy shades the stable cells by an error.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var basis=linear,cubic-spline -accuracy err
@@ -51,10 +50,10 @@ CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")
 UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
-FEWEST = watch.FEW * watch.LOOK + 1  # for enough energies
+FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the energy is checked often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
 FIRST = 0.1  # fraction of the log over which energies are averaged
-FEW = 9  # up to as many values of a variable all get a tick
+FEW = 9  # largest number of values of a variable that all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
     "short": "#e4e4e4", "failed": "#7d2a3a",
@@ -145,9 +144,9 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Largest mean over the first; inf for NaN.
+    """Return the largest running mean over the first; inf for NaN.
 
-    Means are over a tenth of the rows; from rest the median replaces the first.
+    Means are over a tenth of the rows. If the first is 0, the median replaces it.
     """
     if not len(energy):
         return 0.0
@@ -179,8 +178,9 @@ def in_short(row: Row, code: str) -> str:
 class Map:
     """Stability over one or two `axes` of the variables in `values`.
 
-    Growth is measured by the log column `energy` by more than the factor `bound`, else by the
-    program. The column `error` shades stable cells. Variables go in step with their `leaders`.
+    A run grows if the log column `energy` grows by more than the factor `bound`; without a column,
+    the program judges. The column `error` shades stable cells. A variable has the index of its
+    leader in `leaders` (-zip).
     """
 
     def __init__(
@@ -282,8 +282,8 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Each row's x where the first step equals the column `step` (extrapolated powers of x), or
-        None."""
+        """Return each row's x at which the first step equals the column `step`, extrapolated as a
+        power of x; or None."""
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
@@ -324,7 +324,7 @@ class Map:
 
     def tell(self) -> None:
         count, run = Counter(self.classes.values()), len(self.results)
-        print(f"{run} of {len(self.classes)} cells were run (the others lie between like ones)")
+        print(f"{run} of {len(self.classes)} cells were run; others lie between cells of one class")
         for kind in CLASSES:
             if count[kind]:
                 print(f"  {kind:<8} {plural(count[kind], 'cell')}")
@@ -450,12 +450,12 @@ def explore(
     stride: int = 6,
     apart: Sequence[bool] = (False, False),
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Classes of the cells that were run, and of the inferred others.
+    """Return the classes of the cells that were run, and those inferred for the others.
 
-    Lines and columns about `stride` cells apart are run first. Cells between two of one class in a
-    row or column get that class, the nearest first; between different ones the middle is run,
-    longest gaps first. Along an edge, one in three cells is run, so that no bow is cut off. Islands
-    between runs are missed. Nothing is inferred along a direction of words (`apart`).
+    Cells on a grid about `stride` cells wide are run first. Cells between two of one class in a row
+    or column get that class, shortest gaps first; between two classes the middle cell is run,
+    longest gaps first. Along an edge, at least one in three cells is run to follow its curve.
+    Islands between runs are missed. Along an axis of words (`apart`), nothing is inferred.
     """
     classes: list[Hashable] = []
     plane = np.full(shape, UNKNOWN)
@@ -487,7 +487,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill cells between equal ones, unless row and column disagree."""
+    """Fill cells between two of one class, unless row and column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -517,7 +517,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle of stretches along an edge without a run."""
+    """Yield length and middle of the stretches of an edge that have no run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])

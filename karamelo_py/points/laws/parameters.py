@@ -35,9 +35,9 @@ def warn_of_locking(law: type) -> None:
         law,
         "locking",
         when=keeps_volume,
-        reason="Poisson's ratio of material '{owner.id}' is {nu:.9g}; the basis {scene.basis_name} "
-        "without F-bar cannot bend or spread at constant volume, so bodies are too stiff (a strip "
-        "of 8 cells on a block by 19 % with 0.49, 87 % with 0.499)",
+        reason="Poisson's ratio of material '{owner.id}' is {nu:.9g}; with the basis "
+        "{scene.basis_name} without F-bar, cells cannot bend or spread at constant volume: bodies "
+        "are too stiff (a block under a strip of 8 cells: 19 % at 0.49, 87 % at 0.499)",
         cure="anti_volumetric_locking(true), or quadratic-spline",
     )
 
@@ -52,12 +52,12 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """Return epsdot0 of 1 + `factor` ln(rate/epsdot0); it may be 0 only if `factor` is."""
+    """Return the epsdot0 of 1 + `factor` ln(rate/epsdot0); 0 is allowed if `factor` is 0."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
         raise ScriptError(
-            f"there is no rate to compare with, and {name} = {factor:g} is not 0",
+            f"rate dependence, {name} = {factor:g}, needs a reference rate",
             argument="epsdot0",
             expected=f"a number above 0, or {name} = 0",
         )
@@ -68,7 +68,7 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    Tables of laws pad it with its last number, so a law that needs the length stores it.
+    Tables of several laws pad it with its last number, so a law that needs the length stores it.
     """
 
     values: tuple[float, ...]

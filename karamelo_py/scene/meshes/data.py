@@ -7,14 +7,14 @@ import numpy as np
 
 from karamelo_py.script.errors import unknown
 
-# By family of cell types: meshio's name without the number of nodes.
+# Keys are families of cells: meshio's type names without the number of nodes.
 DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
 }  # fmt: skip
 
 
-_MANY = 100  # names, of which a message lists a few
+_MANY = 100  # names; where a mesh has more, a message lists only a few
 
 
 class CellBlock(NamedTuple):
@@ -59,7 +59,7 @@ class Mesh(NamedTuple):
     cells: list[CellBlock]
     sets: Mapping[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
     node_sets: Mapping[str, np.ndarray]  # masks (N,)
-    left_out: dict[str, int]  # no solids, such as springs
+    left_out: dict[str, int]  # number of other elements by type, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
         """Cells of an element set, outer faces of a node set, or all; ScriptError if unknown or
@@ -83,8 +83,8 @@ class Mesh(NamedTuple):
         name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh groups have numbers and perhaps names; a number of only one dimension needs no
-            # dimension in front.
+            # Gmsh numbers its groups and may name them. A number used in only one dimension needs
+            # no dimension as a prefix.
             known = {*names}
             once = [n for n in names if n.rpartition(":")[2] not in known or ":" not in n]
             named = [name for name in once if not name.isdigit()] or once
@@ -105,7 +105,7 @@ class Mesh(NamedTuple):
         return name
 
 
-# Counter-clockwise from outside; in 2D the interior is on the left.
+# Counter-clockwise as seen from outside; in 2D the interior is on the left.
 FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "triangle": ((0, 1), (1, 2), (2, 0)),

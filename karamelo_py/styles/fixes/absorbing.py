@@ -19,18 +19,18 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.edges import SIDES
 
-LAYERS = 3.5  # cells between the nodes of an edge, along its normal
+LAYERS = 3.5  # largest extent of the nodes of an edge along its normal, in cells
 
 
 class Support(Field):
-    """Force that balanced a node when fix absorbing began; NaN before."""
+    """Force that balances the initial force on a node; NaN before the first step."""
 
     shape = vector
     start = float("nan")
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """Apply rho c A in all directions; `normal` is rho A, of which one component counts."""
+    """Add dashpots rho c A; of `normal` (rho A), only the component `axis` is used."""
     axis, along, across = values
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
@@ -65,11 +65,11 @@ class Absorbing(Fix):
 
     Notes
     -----
-    The traction is -rho c v, with the speed of P waves for the normal velocity and of S waves along
-    the surface. Of a pulse of 20 cells at normal incidence, 0.2 % of the energy returns; oblique
-    waves return more. In saturated ground, soil and water move as one at the edge.
+    The traction is -rho c v, with the P wave speed for the normal velocity and the S wave speed
+    along the surface. A pulse 20 cells long at normal incidence reflects 0.2 % of its energy;
+    oblique waves reflect more. In saturated ground, soil and water move as one at the edge.
 
-    The fix opposes the force that it measures on each node in its first step. Ground that begins
+    The fix balances the force that it measures on each node in its first step. Ground that begins
     with its stress (fix initial_stress) therefore stays at rest; a later load, such as weight,
     slowly pushes the edge outwards.
 
@@ -124,15 +124,15 @@ class Absorbing(Fix):
         if np.ptp(x) <= LAYERS * self.hub.domain.h and outer:
             return
         raise ScriptError(
-            f"the nodes lie at {self.side[0]} = {x.min():.4g} to {x.max():.4g}: not at one edge, "
-            f"on the side {self.side} of the bodies",
+            f"the nodes lie at {self.side[0]} = {x.min():.4g} to {x.max():.4g}, not at a "
+            f"single edge on the side {self.side} of the bodies",
             argument="side",
             expected="a group of nodes at an edge, and the side that it faces",
         )
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return the speeds of P and S waves, in full pores for the mass of the soil alone."""
+    """Return the P and S wave speeds; in saturated soil, times its density they give rho c."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)
@@ -140,5 +140,5 @@ def speeds(material: Material) -> tuple[float, float]:
         return sqrt(fast), sqrt(slow)
     heavier = material.fluid.heavier(1 / specific_volume(law))
     stiffer = material.fluid.stiffness * specific_volume(law)
-    # rho c of soil and water together, over the density of the soil.
+    # rho c of soil and water together, over the density of the soil alone.
     return sqrt((fast + stiffer) * heavier), sqrt(slow * heavier)
