@@ -8,6 +8,8 @@ import pytest
 from tensors import every_kinematics, flat, rotation, symmetric_matrix
 
 from comparisons.results import read_log
+from karamelo_py.compiler import on_numbers
+from karamelo_py.compiler.slopes import Dual
 from karamelo_py.points.kinematics import I, PlaneStrain, Space
 from karamelo_py.points.laws import (
     advance,
@@ -22,6 +24,7 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.hill import Hill, of_lankford
+from karamelo_py.points.laws.jointed import Jointed
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.orthotropic import Orthotropic
 from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic
@@ -248,3 +251,31 @@ def test_axes_that_lean_out_of_the_plane_are_reported(run_interpreted):
 def test_surfaces_that_no_sheet_has(run_interpreted, line, says):
     head = MATERIAL + "strength(free, linear, 1)\nmaterial(rubber, yeoh, 1, 1e3, 1, 1)\n"
     assert says in run_interpreted(f"{head}material(m, hill, {line})\n", status=1).err
+
+
+def rock(angle):
+    return Jointed.given(2700, E, NU, 1e6, 10.0, angle, 90.0, psi=5.0)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [sheet(20), rock(35.0), rock(75.0)],
+    ids=["hill", "slip", "opening"],
+)
+def test_slopes_are_the_tangent_of_a_step_with_flow(law):
+    """Load steps: stress by each component of grad v, beside central differences."""
+    kin, size = PlaneStrain(), 2e-3
+    start = with_stress(law, kin, initial_state(law, kin, 1.0), kin.Symmetric(0.0, -1e6, 0.0, 0.0))
+    step = [size * x for x in (1.0, 1.5, 0.2, -1.4)]
+
+    def stress(dl):
+        new = on_numbers(advance)(law, kin, start, kin.Tensor._make(dl), 1.0)
+        return on_numbers(cauchy_stress)(law, kin, new), new
+
+    made, _ = stress([Dual(x, tuple(float(j == k) for j in range(4))) for k, x in enumerate(step)])
+    assert dissipated_energy(law, kin, stress(step)[1]) > 0
+    for k in range(4):
+        low, high = ([x + sign * 1e-7 * (j == k) for j, x in enumerate(step)] for sign in (-1, 1))
+        exact = (np.array(stress(high)[0]) - np.array(stress(low)[0])) / 2e-7
+        slopes = [one.slopes[k] for one in made]
+        assert np.allclose(slopes, exact, rtol=1e-5, atol=1e-5 * E)

@@ -66,7 +66,7 @@ class Orthotropic(NamedTuple):
 
     See Also
     --------
-    transverse, saint-venant-kirchhoff, plane_stress
+    transverse, hill, tsai-hill, saint-venant-kirchhoff, plane_stress
     """
 
     rho: AboveZero
@@ -130,7 +130,7 @@ class Transverse(NamedTuple):
 
     See Also
     --------
-    orthotropic, linear
+    orthotropic, jointed, tsai-hill, linear
     """
 
     rho: AboveZero
