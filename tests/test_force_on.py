@@ -107,8 +107,6 @@ def test_action_is_reaction(run_interpreted, way):
     assert action[2] == pytest.approx(-reaction[2], abs=tolerance * size)
 
 
-
-
 TABLE = """
     method(ulmpm/contacts, FLIP, linear, 0.99)
     dimension(2, 0, 1, 0, 0.7, 0.1)
