@@ -1,4 +1,4 @@
-"""Billet pressed flat between platens that hold it, in 3D: load and shape against axisymmetry."""
+"""Billet compressed between sticking platens, in 3D: load and shape against axisymmetry."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Beam that sinks under a sudden weight: its lowest point, by CPDI and cpgimp."""
+"""Cantilever under a suddenly applied weight: lowest point, by CPDI and cpgimp."""
 
 from comparisons.exact import minimum
 from comparisons.row import Row

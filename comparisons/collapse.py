@@ -1,4 +1,4 @@
-"""Heap of aluminium bars released on one side: what is left, against Bui et al. (experiment)."""
+"""Heap of aluminium bars released on one side: final shape, against Bui et al. (experiment)."""
 
 from math import atan, degrees
 from pathlib import Path
@@ -28,10 +28,10 @@ def compare(run, axes, full):
     # The toe is as thin as a cell: coarse grids lose the end of it.
     yield Row("run-out (m)", SURFACE[-1, 0], toe, 0.03 if full else 0.1, SOURCE)
     off = 1e3 * distance(SURFACE, top)
-    yield Row("distance of the surfaces (mm)", 0.0, off, 3, SOURCE)
+    yield Row("distance between the surfaces (mm)", 0.0, off, 3, SOURCE)
     # At the foot the floor, which lets nothing slip, holds 10 mm more of the heap.
     off = 1e3 * distance(FAILURE, still)
-    yield Row("distance of the failure lines (mm)", 0.0, off, 4 if full else 6, SOURCE)
+    yield Row("distance between the failure lines (mm)", 0.0, off, 4 if full else 6, SOURCE)
     # Published are 14 degrees (experiment) and 13 (Wyser et al. 2020).
     angle = repose(x, depth)
     yield Row("angle of repose (degrees)", (13, 14), angle, 0.05, f"{SOURCE}; Wyser et al. 2020")

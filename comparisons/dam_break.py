@@ -1,4 +1,4 @@
-"""Column of water that falls down: its front against Martin & Moyce, and its density."""
+"""Collapsing water column: its front against Martin & Moyce, and its density."""
 
 from pathlib import Path
 
@@ -59,5 +59,5 @@ def density(result, name):
     snapshots = result.snapshots("dam_break")
     off = [np.quantile(abs(s.mass / s.volume / RHO - 1), 0.99) for s in snapshots]
     return Row(
-        f"change of density of 99 points in 100, {name}", 0.0, max(off), 0.03, "incompressible"
+        f"99th percentile of the density change, {name}", 0.0, max(off), 0.03, "incompressible"
     )

@@ -1,4 +1,4 @@
-"""Long reservoir whose dam goes at once: depths against the solution of Ritter."""
+"""Long reservoir whose dam is removed instantly: depths against the solution of Ritter."""
 
 import numpy as np
 

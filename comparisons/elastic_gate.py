@@ -1,4 +1,4 @@
-"""Water that pushes an elastic gate open: a stiff gate at rest as a beam; outflow and energy."""
+"""Water that pushes an elastic gate open: stiff gate at rest by beam theory; outflow and energy."""
 
 import numpy as np
 

@@ -15,7 +15,7 @@ def compare(run, axes, full):
     if full:
         words = {"phi": 20, "v": 0.16}
         cases["friction and dilatancy of 20 degrees"] = words, prandtl_load(1, radians(20)), 0.08
-        cases["volumes not averaged"] = {"bar": "false"}, (1.15 * limit, 2 * limit), 0.0
+        cases["without F-bar"] = {"bar": "false"}, (1.15 * limit, 2 * limit), 0.0
     for name, (words, load, within) in cases.items():
         log = run(**words).log
         late = (log.Time > 0.7) & (log.Time < 0.99)

@@ -24,9 +24,9 @@ def compare(run, axes, full):
     yield Row("momentum over the ball's", 1.0, -log.P_z[5] / (MASS * V), 0.03, "exact")
     # Later, what splashes back leaves the domain.
     kept = log.P_z[log.Time < 5e-6][-1] / log.P_z[0]
-    yield Row("momentum at 5 us over that at first", 1.0, kept, 1e-6, "exact")
+    yield Row("momentum at 5 us over initial momentum", 1.0, kept, 1e-6, "exact")
     total = (log.Ek + log.Es + log.lost) / log.Ek[0]
-    yield Row("energy at the end over that at first", 1.0, total[-1], 0.03, "exact")
+    yield Row("final over initial energy", 1.0, total[-1], 0.03, "exact")
     last = result.snapshots("plate_penetration")[-1]
     # It is free to spread sideways, too, which a plane shock does not know.
     plug = (last.type == 2) & (np.hypot(last.x0, last.y0) < 3e-3)

@@ -1,4 +1,4 @@
-"""Bar that vibrates in its first mode in steps of 10 and 100 times what a wave needs for a cell."""
+"""Bar that vibrates in its first mode, in steps of 10 and 100 times the wave transit of a cell."""
 
 import numpy as np
 

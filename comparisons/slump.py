@@ -36,9 +36,9 @@ def compare(run, axes, full):
     # The digitised surface has some 60 m2 more below it than the slope had at first.
     top = surface(last, RHO, 1.0)
     hill = SURFACE[SURFACE[:, 1] > 16]
-    yield Row("distance of the surfaces (m)", 0.0, distance(hill, top), 1.5, SOURCE)
+    yield Row("distance between the surfaces (m)", 0.0, distance(hill, top), 1.5, SOURCE)
     still = slip(last)
-    yield Row("distance of the slip surfaces (m)", 0.0, distance(FAILURE, still), 2.5, SOURCE)
+    yield Row("distance between the slip surfaces (m)", 0.0, distance(FAILURE, still), 2.5, SOURCE)
     # A slice that turns like a rigid body slips on a circle (Fellenius 1936).
     yield Row("distance from a circle over radius", 0.0, roundness(still), 0.01, "rotation")
     if full:
@@ -49,7 +49,7 @@ def compare(run, axes, full):
             "toe with cohesion that falls to 8 kPa, over that", (1, 1.1), further, 0.0, "softer"
         )
         line = slip(soft)
-        name = "distance of the slip surfaces with it (m)"
+        name = "distance between the slip surfaces with it (m)"
         yield Row(name, 0.0, distance(FAILURE, line), 2.5, SOURCE)
         axes.plot(*line.T, "C2", lw=0.8, label="the same, softening")
     coloured(axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1))

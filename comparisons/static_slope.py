@@ -1,4 +1,4 @@
-"""Slope whose weight grows until it fails: the weight, and where it slips, by limit analysis."""
+"""Slope whose weight grows until it fails: weight and slip surface, against limit analysis."""
 
 from math import radians
 

@@ -1,4 +1,4 @@
-"""Thick cylinder widened until all of its wall flows: pressure, and stress across the wall."""
+"""Thick cylinder expanded until its whole wall yields: pressure, and stress across the wall."""
 
 from math import log, sqrt
 
