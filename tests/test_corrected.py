@@ -51,6 +51,31 @@ def test_the_frequency_of_a_bar(run_interpreted, method, scheme, lumped, correct
     assert abs(_late(run_interpreted, f"{method}, mass=corrected", scheme)) < corrected
 
 
+AXIS = """
+method(ulmpm, APIC, quadratic-spline, mass=corrected)
+scheme({scheme})
+dimension(2, 0, 1, 0, 1, 0.1)
+axisymmetric(true)
+region(b, block, 0, 0.6, 0.2, 0.8)
+material(m, linear, 1, 1, 0.3)
+solid(b, region, b, 2, m, 0.1)
+fix(start, initial_velocity_particles, all, 0.05*x0, 0)
+dump(d, all, particle, 20, d.*.LAMMPS, x0, s11, s33)
+set_dt(0.02)
+run(20)
+"""
+
+
+@pytest.mark.parametrize("scheme", ["usl", "musl"])
+def test_stress_at_the_axis(run_interpreted, scheme):
+    """Nodes on the axis take no radial velocity from their neighbours: s11 = s33 there."""
+    points = run_interpreted(AXIS.format(scheme=scheme)).snapshots("d")[-1]
+    inner = points["x0"] < 0.05
+    s11, s33 = (points[name][inner] for name in ("s11", "s33"))
+    assert abs(s11).min() > 1e-3
+    assert np.allclose(s11, s33, rtol=0.02)
+
+
 @pytest.mark.parametrize(("basis", "most"), [("quadratic", 0.0075), ("cubic", 0.0055)])
 def test_a_square_that_pulsates(run_script, basis, most):
     """Manufactured solution of in.axis_aligned, G = 0.05: 2.03 and 2.41 % with lumped masses."""

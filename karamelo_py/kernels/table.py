@@ -416,7 +416,7 @@ def average_stress(s: Setup) -> tuple:
 
 def corrected(s: Setup) -> tuple:
     is_corrected = field(s.nodes.fields, Acceleration) is not None
-    return (NodeTask(correct_acceleration),) if is_corrected else ()
+    return (NodeTask(correct_acceleration), *hold_axis(s)) if is_corrected else ()
 
 
 def update_velocity(s: Setup) -> tuple:
