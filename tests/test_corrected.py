@@ -54,15 +54,15 @@ def test_the_frequency_of_a_bar(run_interpreted, method, scheme, lumped, correct
 AXIS = """
 method(ulmpm, APIC, quadratic-spline, mass=corrected)
 scheme({scheme})
-dimension(2, 0, 1, 0, 1, 0.1)
+dimension(2, 0, 1.2, 0, 2, 0.1)
 axisymmetric(true)
-region(b, block, 0, 0.6, 0.2, 0.8)
+region(b, block, 0, 0.8, 0.5, 1.5)
 material(m, linear, 1, 1, 0.3)
 solid(b, region, b, 2, m, 0.1)
 fix(start, initial_velocity_particles, all, 0.05*x0, 0)
-dump(d, all, particle, 20, d.*.LAMMPS, x0, s11, s33)
+dump(d, all, particle, 60, d.*.LAMMPS, x0, s11, s33)
 set_dt(0.02)
-run(20)
+run(60)
 """
 
 
