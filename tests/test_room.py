@@ -216,7 +216,7 @@ def test_a_scene_that_does_not_fit_is_refused_in_one_message(small, tmp_path, ca
     said = capsys.readouterr().err
     assert said.startswith("in.large:6:1: error: solid: the scene has 48 points, which take at ")
     assert said.count("error") == 1 and "cells 1.1 times as large" in said
-    assert "; this machine has 1.21e-05 GiB in total" in said
+    assert "; this machine has 1.21e-05 GiB in all" in said
     assert "precision(single)" in said and "several machines" in said
 
 
