@@ -218,6 +218,7 @@ def _mirrored(hub: Hub) -> Words:
     for k in range(free_from(domain.kin), domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2
+        middle = round(middle / domain.h, 9) * domain.h + 0.0
         cells = (middle - domain.lo[k]) / domain.h
         rest = [axis for axis in range(domain.dimension) if axis != k]
         if abs(cells - round(cells)) > 1e-6 or not all(_given_alike(hub, k, rest)):

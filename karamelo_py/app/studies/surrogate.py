@@ -10,7 +10,7 @@ from karamelo_py.app.studies.uncertainty import Interval
 from karamelo_py.script.errors import ScriptError
 
 GROUPS = 10  # of runs, each left out once for the intervals of indices
-SAMPLES = 1024  # of the fitted function, for each index
+SAMPLES, FEW = 16384, 1024  # of the fitted function for each index, and for its interval
 WIDE = 1.96  # standard deviations of an interval of 95 %
 
 Function = Callable[[np.ndarray], np.ndarray]  # (n, d) to (n,)
@@ -71,8 +71,8 @@ def indices(
 ) -> tuple[list[list[tuple[Interval, Interval]]], list[tuple[str, float]]]:
     """First and total Sobol' indices for each result and variable, and the fit of each result.
 
-    Intervals are by leaving out a tenth of the runs (delete-group jackknife); they include the
-    error of the fit as far as it changes with the runs.
+    Intervals are by leaving out a tenth of the runs (delete-group jackknife), and include the error
+    of the sums over samples; they contain the error of the fit as far as it changes with the runs.
     """
     from scipy.stats import qmc, sobol_indices
 
@@ -84,11 +84,11 @@ def indices(
     middle, spread = inputs.mean(axis=1), inputs.std(axis=1)
     x = (inputs.T - middle) / spread
 
-    def of(name: str, rows: np.ndarray, y: np.ndarray) -> np.ndarray:
+    def of(name: str, rows: np.ndarray, y: np.ndarray, samples: int = FEW) -> np.ndarray:
         function = FITS[name](x[rows], y[rows])
         rng = np.random.default_rng(seed)
         made = sobol_indices(
-            func=lambda at: function((at.T - middle) / spread)[None], n=SAMPLES,
+            func=lambda at: function((at.T - middle) / spread)[None], n=samples,
             dists=list(laws), rng=rng,
         )  # fmt: skip
         return np.array([np.ravel(made.first_order), np.ravel(made.total_order)])
@@ -99,9 +99,10 @@ def indices(
         if not y.std():
             raise ScriptError("a result is the same in all runs: no variable matters for it")
         name, wrong = best(x, y)
-        whole = of(name, np.ones(n, bool), y)
+        every = np.ones(n, bool)
+        whole, rough = of(name, every, y, SAMPLES), of(name, every, y)
         parts = np.array([of(name, group != k, y) for k in range(group.max() + 1)])
-        half = WIDE * np.sqrt((len(parts) - 1) * parts.var(axis=0))
+        half = WIDE * np.sqrt((len(parts) - 1) * parts.var(axis=0)) + abs(whole - rough)
         tables.append(
             [
                 tuple(Interval(m, m - h, m + h) for m, h in zip(*pair, strict=True))
