@@ -40,6 +40,7 @@ from karamelo_py.points.laws.spall import CochranBanner, DamageFormula, TulerBut
 from karamelo_py.points.laws.strengths.ceramics import Concrete, JohnsonHolmquist2
 from karamelo_py.points.laws.strengths.hardening import Plastic
 from karamelo_py.points.laws.strengths.linear import Elastic
+from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
 from karamelo_py.points.laws.strengths.porous import CrushableFoam, Gurson
 from karamelo_py.points.laws.temperatures import PlasticWork
 
@@ -267,6 +268,56 @@ def test_voids_of_gurson_grow_in_tension():
     assert state.m.strength.Jp == pytest.approx(1, abs=1e-12)
 
 
+def test_closed_voids_leave_dense_metal():
+    """(1 - f) Jp is constant until f = 0; then pressure does not yield, and q = Ym."""
+    part = Gurson(45.0, 0.2, 5e-3, 0.1, 1e-2)
+    law = EosStrength(LinearPressure(1 / 8.9, 138.0), part)
+    for steps in (3, 100):
+        ratio = 0.86 ** (1 / (3 * steps)) - 1
+        state, work = worked(law, SPACE, start(law, SPACE), ratio * np.eye(3), steps)
+        memory = state.m.strength
+        assert memory.f == pytest.approx(0, abs=1e-12)
+        assert memory.Jp == pytest.approx(0.99, rel=1e-9)
+        assert pressure_of(law, SPACE, state) == pytest.approx(138 * (1 - 0.86 / 0.99), rel=1e-9)
+    lost, stored = (f(law, SPACE, state) for f in (dissipated_energy, energy_density))
+    assert lost + stored == pytest.approx(work, rel=2e-2)
+    state = stretched(law, SPACE, state, isochoric(-1e-3), 50)
+    hard = 0.2 * (1 + state.m.strength.ep / 5e-3) ** 0.1
+    assert mises(law, SPACE, state) == pytest.approx(hard, rel=1e-2)
+    whole = law._replace(strength=part._replace(f0=0.0))
+    state = stretched(whole, SPACE, start(whole, SPACE), 0.01 * np.eye(3), 5)
+    assert state.m.strength == (0.0, 0.0, 1.0)
+
+
+def test_foam_without_pores_is_elastic():
+    """At ep = e, as many moduli as the material has carry further strain."""
+    law = EosStrength(LinearPressure(1 / 0.25, 0.4), FOAM._replace(e=0.5))
+    state = stretched(law, SPACE, start(law, SPACE), np.diag([-1e-3, 0, 0]), 900)
+    assert state.m.strength.ep == pytest.approx(0.5, rel=1e-4)
+    assert -stress(law, SPACE, state)[0, 0] > 20 * 5e-3
+
+
+HOT = MieGrueneisen.given(8.94, 3.933, 1.5, 2.0)["eos"]
+
+
+@pytest.mark.parametrize(
+    ("strength", "way"),
+    [
+        (Gurson(45.0, 0.2, 5e-3, 0.1, 0.05), np.diag([1e-3, 0, 0])),
+        (CrushableFoam.given(45.0, 0.2, 0.1), np.diag([-1e-3, 0, 0])),
+        (MohrCoulomb.given(45.0, 0.2, 30.0, 10.0), np.diag([-1e-3, 1.2e-3, 0])),
+    ],
+    ids=lambda x: type(x).__name__,
+)
+def test_plastic_volume_conserves_energy_in_a_hot_solid(strength, way):
+    """Work is stored or dissipated, although heat changes the pressure (Gamma > 0)."""
+    law = EosStrength(HOT, strength)
+    state, work = worked(law, SPACE, start(law, SPACE), way, 250)
+    lost, stored = (f(law, SPACE, state) for f in (dissipated_energy, energy_density))
+    assert lost > 0.2 * work
+    assert lost + stored == pytest.approx(work, rel=1e-2)
+
+
 def test_voids_join_until_the_metal_fails():
     part = Gurson(80.0, 0.4, 5e-3, 0.1, 1e-3, 1.5, 1.0, 0.05, 0.15, 0.04, 0.05, 0.02)
     law = EosStrength(LinearPressure(1 / 7.8, 160.0), part)
@@ -442,6 +493,8 @@ def test_a_flyer_spalls_a_plate(run_script):
         ("eos(r, p-alpha, solid, 0.9, 1, 2)", "a distension of 0.9 leaves no pores"),
         ("eos(r, p-alpha, solid, 1.2, 3, 2)", "pores are gone at 2 before they are crushed at 3"),
         ("eos(r, p-alpha, gas, 1.2, 1, 2)", "eos 'gas' is no equation of state of a solid"),
+        ("strength(c, crushable-foam, 1, 1)\nmaterial(m, eos-strength, gas, c)",
+         "pressure makes strength 'c' flow, which a gas cannot do"),
         ("strength(c, crushable-foam, 1, 1, 0.5)", "the plastic volume cannot change"),
         ("strength(c, gurson, 1, 1, 1, 1, 0.7)", "the metal fails at first"),
         ("strength(c, gurson, 1, 1, 1, 1, 0.1, 1.5, 1, 0.2, 0.1)", "not above fc = 0.2"),

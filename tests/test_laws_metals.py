@@ -356,6 +356,22 @@ def test_stress_relaxes_by_creep(n):
             assert mises(law, Space(), end) < 0.3 * 0.1
 
 
+def test_slow_creep_in_single_precision():
+    """Rates of 1e-50 q^5 are below the least number; q^(1-n) = q0^(1-n) + (n - 1) 3 G A t."""
+    double = EosStrength(
+        LinearPressure(1 / 8e3, 1e11), Norton.given(6e10, 1e-35, 5.0, Q=3e4, T=900.0)
+    )
+    law, kin = law_in(double, np.float32), Space()
+    state, steps = initial_state(law, kin, np.float32(1)), 40
+    e = 1e8 / 1.8e11
+    for dl, dt in [((e, -e / 2, -e / 2), 1e-3), *[((0.0, 0.0, 0.0), 1e5)] * steps]:
+        dl = kin.Tensor._make(np.float32(x) for x in np.diag(dl).ravel())
+        state = advance(law, kin, state, dl, np.float32(dt))
+    rate = 1.8e11 * 1e-35 * np.exp(-3e4 / 900)
+    exact = (1e8**-4 + 4 * rate * 1e5 * steps) ** -0.25
+    assert mises(law, kin, state) == pytest.approx(exact, rel=1e-2)
+
+
 def test_steady_creep_and_flow():
     """q = (rate/A)^(1/n), and (Y + H ep)(1 + (eta rate)^(1/n)) (Perzyna 1966), for any step."""
     creep = EosStrength(EOS, Norton.given(G, 0.2, 4.0, Q=1000.0, T=500.0))

@@ -33,6 +33,7 @@ from karamelo_py.points.laws.damages import (
     initiation,
     integrity,
 )
+from karamelo_py.points.laws.eos import ratio_at_pressure
 from karamelo_py.points.laws.further import (
     chained,
     further_after,
@@ -160,6 +161,14 @@ class EosStrength(NamedTuple):
         laws = {
             k: law for component in (eos, strength, *parts) for k, law in component.laws.items()
         }
+        if strengths.elastic_ratio.defined(type(laws["strength"])) and not (
+            ratio_at_pressure.defined(type(laws["eos"]))
+        ):
+            raise ScriptError(
+                f"pressure makes strength '{strength.id}' flow, which a gas cannot do",
+                argument="eos",
+                expected="the eos of a solid or of a liquid",
+            )
         further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
         elastic = Absent() if strain == "rate" else Logarithmic()
         return cls(**laws, strain=elastic, further=chained(further))

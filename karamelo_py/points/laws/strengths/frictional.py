@@ -17,7 +17,7 @@ from karamelo_py.compiler import point_function, where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import parameter
-from karamelo_py.points.laws.eos import bulk_modulus, initial_energy, pressure, ratio_at_pressure
+from karamelo_py.points.laws.eos import at_pressure, bulk_modulus, initial_energy, pressure
 from karamelo_py.points.laws.strengths import (
     FrictionTrial,
     elastic_ratio,
@@ -93,7 +93,7 @@ def respond_by_friction(strength, law, kin, step, memories):
     extra = fbar_fraction(strength, memory) * step.extra
     if memory.Js > 1 and p_point + extra > 0:
         # Separation closes before the point sustains pressure.
-        closed = ratio_at_pressure(law.eos, -warm - extra, heat)
+        closed, _ = at_pressure(law.eos, elastic, memories.energy, -warm - extra, heat)
         memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
         elastic = elastic_part(strength, memory, step.j)
         p_point = pressure(law.eos, elastic, memories.energy, heat) + warm
@@ -106,7 +106,8 @@ def respond_by_friction(strength, law, kin, step, memories):
     work = inner(new, plastic)
     if reached != p:
         # The volume that carries the new pressure is elastic, the rest plastic.
-        after = ratio_at_pressure(law.eos, p_point + (reached - p) - warm, heat)
+        p_after = p_point + (reached - p) - warm
+        after, _ = at_pressure(law.eos, elastic, memories.energy, p_after, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
             memory = memory._replace(Js=step.j / (memory.Jp * after))
         else:

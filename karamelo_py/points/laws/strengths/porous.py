@@ -1,12 +1,12 @@
 """Strengths crushable-foam and gurson."""
 
-from math import pi, sqrt
+from math import inf, log, pi, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler import any_lane, point_function, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.points.kinematics import von_mises
-from karamelo_py.points.laws.eos import bulk_modulus, pressure, ratio_at_pressure
+from karamelo_py.points.laws.eos import at_pressure, bulk_modulus, pressure
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yield_surface
@@ -15,6 +15,7 @@ from karamelo_py.script.errors import ScriptError
 
 MOST_PASSES = 80  # of Newton's method, safeguarded by bisection
 DENSE = 0.999999  # of the strain of densification
+NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
 
 class CrushableFoam(NamedTuple):
@@ -99,8 +100,9 @@ class Gurson(NamedTuple):
     (q/Ym)^2 + 2 q1 f cosh(3 q2 p/(2 Ym)) is at most 1 + (q1 f)^2; flow is associated and (1 - f) Ym
     dem the plastic work (Gurson 1977; Tvergaard & Needleman 1984, Acta Metall. 32, 157-169). Voids:
     df = (1 - f) dev + fn/(sn sqrt(2 pi)) exp(-((em - en)/sn)^2/2) dem. From fc on, f in the surface
-    grows by (1/q1 - fc)/(ff - fc) of df. Each step uses the matrix and f at its beginning. Dump
-    columns: ep (em), f, Jp (plastic volume ratio).
+    grows by (1/q1 - fc)/(ff - fc) of df. Each step uses the matrix and f at its beginning.
+    Compression closes voids, even of failed metal, which then is sound again; without voids, metal
+    yields by q = Ym. Dump columns: ep (em), f, Jp (plastic volume ratio).
 
     See Also
     --------
@@ -159,6 +161,12 @@ def grown(strength, memory, flow):
     """Return the memory after a `PlasticStep`, except the plastic volume ratio."""
 
 
+@point_function(otherwise=True)
+def most_recovered(strength, memory):
+    """Return the elastic volume ratio after a step over the trial's, at most."""
+    return inf
+
+
 @elastic_ratio.on(CrushableFoam)
 @elastic_ratio.on(Gurson)
 def _elastic_ratio_porous(strength, memory, j):
@@ -179,7 +187,8 @@ def _respond_porous(strength, law, kin, step, memories):
     slip = (q_trial - q) / (3 * strength.G)
     # The volume that carries the new pressure is elastic, the rest plastic.
     moved = p != p_trial
-    after = where(moved, ratio_at_pressure(law.eos, p - warm, heat), elastic)
+    after, _ = at_pressure(law.eos, elastic, memories.energy, p - warm, heat)
+    after = min(where(moved, after, elastic), elastic * most_recovered(strength, memory))
     opening = logarithm(elastic / after)
     work = q * slip - p * opening
     memory = grown(strength, memory, PlasticStep(x, work, opening, p < 0))._replace(
@@ -189,12 +198,14 @@ def _respond_porous(strength, law, kin, step, memories):
 
 
 def foam_flow(strength, ep):
-    some = ep > 0
+    # The curve goes on along its tangent at DENSE.
+    some, dense = ep > 0, DENSE * strength.e
     ratio = min(where(some, ep, 1) / strength.e, DENSE)
     pores = where(some, power(ratio, strength.beta), 0)
     room = 1 - min(pores, DENSE)
-    slope = strength.a * strength.beta * pores / (room * where(some, ep, 1))
-    return strength.Y + strength.H * ep - strength.a * logarithm(room), strength.H + slope
+    slope = strength.a * strength.beta * pores / (room * where(some, min(ep, dense), 1))
+    Y = strength.Y + strength.H * ep - strength.a * logarithm(room)
+    return Y + slope * max(ep - dense, 0), strength.H + slope
 
 
 @returned.on(CrushableFoam)
@@ -244,13 +255,18 @@ def matrix(strength, ep):
     return strength.Y * power(1 + ep / strength.e, strength.n)
 
 
+@most_recovered.on(Gurson)
+def _most_recovered_gurson(strength, memory):
+    return 1 / (1 - memory.f)  # by closing all voids
+
+
 @returned.on(Gurson)
 def _returned_gurson(strength, memory, trial):
     Y, c = matrix(strength, memory.ep), voids(strength, memory.f)
     b = 1.5 * strength.q2 / Y
     size = abs(trial.p)
     # acosh of (1 + c^2)/(2 c) is -ln c; from there on q is 0.
-    highest = -logarithm(max(c, 1e-12)) / b
+    highest = where(c > NO_VOIDS, -logarithm(max(c, NO_VOIDS)) / b, size)
     top = min(size, highest)
     q, _, _ = on_gurson(Y, c, b, top)
     outside = (trial.q > q) | (size > highest)
@@ -271,13 +287,16 @@ def _returned_gurson(strength, memory, trial):
         if not any_lane(moves):
             break
     q, _, _ = on_gurson(Y, c, b, x)
+    # Voids that close within the step leave the matrix and its pressure.
+    least = where(trial.p > 0, size + trial.K * logarithm(1 - memory.f), 0)
+    q, x = where(x < least, Y, q), max(x, least)
     p = where(trial.p < 0, -x, x)
     return where(outside, min(q, trial.q), trial.q), where(outside, p, trial.p), x - x
 
 
 def on_gurson(Y, c, b, p):
     """Return q on the yield surface at pressure p, sinh and cosh of b p."""
-    grown = exponential(b * p)
+    grown = exponential(min(b * p, -log(NO_VOIDS)))
     sinh, cosh = 0.5 * (grown - 1 / grown), 0.5 * (grown + 1 / grown)
     return Y * sqrt(max(1 + c * c - 2 * c * cosh, 0)), sinh, cosh
 

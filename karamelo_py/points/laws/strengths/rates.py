@@ -1,6 +1,6 @@
 """Strengths steinberg-guinan, mts, norton and perzyna."""
 
-from math import inf, tanh
+from math import inf, log, tanh
 from typing import NamedTuple
 
 from karamelo_py.compiler import where
@@ -129,7 +129,7 @@ class Norton(NamedTuple):
     in_lanes = True
 
     G: float
-    A: float
+    log_A: float  # A, or a rate of creep, may be too small for single precision
     n: float
     Q: float
     initial_temperature: float
@@ -138,28 +138,27 @@ class Norton(NamedTuple):
     def given(
         cls, G: AboveZero, A: AboveZero, n: AboveZero, *, Q: FromZero = 0.0, T: AboveZero = 293.0
     ):
-        return cls(G, A, n, Q, T)
+        return cls(G, log(A), n, Q, T)
 
 
 remembers(Norton, ep=0.0)
 shear_response.on(Norton)(radial_return)
 
 
-def power_of_rate(rate, factor, n, increment):
+def power_of_rate(rate, n, increment):
     some = increment > 0
-    value = where(some, factor * power(where(some, rate, 1), 1 / n), 0)
+    value = where(some, power(where(some, rate, 1), 1 / n), 0)
     return value, value / (n * where(some, increment, 1))
-
-
-def creep_rate(strength, heat):
-    T = temperature_or(heat, strength.initial_temperature)
-    return strength.A * exponential(-strength.Q / max(T, 1e-6))
 
 
 @flow_stress.on(Norton)
 def _flow_stress_norton(strength, before, increment, dt):
-    rate = increment / (dt * creep_rate(strength, before.heat))
-    return power_of_rate(rate, 1, strength.n, increment)
+    some = increment > 0
+    T = temperature_or(before.heat, strength.initial_temperature)
+    log_rate = logarithm(where(some, increment, 1)) - logarithm(dt)
+    log_q = (log_rate - strength.log_A + strength.Q / max(T, 1e-6)) / strength.n
+    q = where(some, exponential(log_q), 0)
+    return q, q / (strength.n * where(some, increment, 1))
 
 
 @first_guess.on(Norton)
@@ -215,7 +214,7 @@ shear_response.on(Perzyna)(radial_return)
 @flow_stress.on(Perzyna)
 def _flow_stress_perzyna(strength, before, increment, dt):
     still = strength.Y + strength.H * (before.memory.ep + increment)
-    over, slope = power_of_rate(strength.eta * increment / dt, 1, strength.n, increment)
+    over, slope = power_of_rate(strength.eta * increment / dt, strength.n, increment)
     return still * (1 + over), strength.H * (1 + over) + still * slope
 
 
