@@ -198,7 +198,7 @@ def _respond_porous(strength, law, kin, step, memories):
 
 
 def foam_flow(strength, ep):
-    # The curve goes on along its tangent at DENSE.
+    # Beyond DENSE the curve continues along its tangent.
     some, dense = ep > 0, DENSE * strength.e
     ratio = min(where(some, ep, 1) / strength.e, DENSE)
     pores = where(some, power(ratio, strength.beta), 0)
