@@ -11,11 +11,12 @@ from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.language.arguments import Named
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import Space, tensor
+from karamelo_py.points.kinematics import Line, PlaneStrain, Space, tensor
 from karamelo_py.points.laws.hencky import Hencky
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.mullins import Mullins, distortional_energy
 from karamelo_py.points.laws.neo_hookean import NeoHookean
+from karamelo_py.points.laws.thin import Thin
 from karamelo_py.points.laws.viscoelastic import Viscoelastic, Wlf
 
 SPACE, G = Space(), 1e6 / 2.8
@@ -196,6 +197,39 @@ def test_a_loop_loses_its_area_once_and_warms_the_rubber():
     assert laws.temperature(law, SPACE, state) == pytest.approx(lost / (1000 * 2000), rel=1e-9)
 
 
+WARM = NeoHookean.given(1000, 1e6, 0.4, 2000, 0.2)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        Mullins(WARM, 2.0, 1e5, 0.1),
+        Viscoelastic.given(Elastic(WARM), 0.3, 0.01),
+        Viscoelastic.given(Elastic(Mullins(WARM, 2.0, 1e5, 0.1)), 0.3, 0.01),
+    ],
+    ids=["mullins", "viscoelastic", "both"],
+)
+@pytest.mark.parametrize("kin", [PlaneStrain(), Line()], ids=["plate", "bar"])
+def test_columns_of_thin_rubber_are_its_energy_and_temperature(law, kin):
+    thin = Thin(law)
+    assert laws.can(law, laws.dissipated_energy) and laws.can(thin, laws.dissipated_energy)
+    assert not laws.can(thin, laws.with_stress)
+    state = laws.initial_state(thin, kin, 1.0)
+    for stretch in (0.5, -0.3):
+        state = stretched_by(thin, kin, state, [stretch, 0, 0])
+    lost = laws.dissipated_energy(thin, kin, state)
+    shown = {name: laws.shown(tag, thin, kin, state) for name, tag in laws.columns_of(thin).items()}
+    assert lost > 1000 and shown["dissipated"] == lost
+    assert shown["T"] == laws.temperature(thin, kin, state) > 1e-3
+
+
+def test_a_bar_counts_what_softening_loses(run_interpreted):
+    script = BAR.replace("viscoelastic, rubber, 0.3, 0.005", "mullins, rubber, 2, 1e-3")
+    log = run_interpreted(script).log
+    total = log["Ek"] + log["Es"] + log["Ed"]
+    assert log["Ed"][-1] > 0.1 * total[0] and np.allclose(total, total[0], rtol=0.05)
+
+
 def test_the_tangent_of_softened_rubber():
     """Against differences of fourth order; the wave speed bounds it."""
     state = stretched_by(SOFTENS, SPACE, laws.initial_state(SOFTENS, SPACE, 1.0), [0.5, -0.2, -0.2])
@@ -299,11 +333,13 @@ def test_constants_that_no_body_has(run_interpreted, line, says):
         ("rubber, 1, 9", "r = 1 would leave less than no stress"),
         ("rubber, 2, -9", "above 0"),
         ("stiff, 2, 9", "no energy that could soften"),
+        ("warm, 2, 9", "no energy that could soften"),
         ("wood, 2, 9", "no isotropic elastic solid"),
     ],
 )
 def test_rubber_that_cannot_soften(run_interpreted, line, says):
     others = "material(wood, orthotropic, 1, 9, 1, 1, 0.3, 0.3, 0.4, 1, 1, 1)\n"
     others += "material(stiff, linear, 1, 9, 0.3)\n"
+    others += "material(warm, linear, 1, 9, 0.3, 450, 0)\n"
     said = run_interpreted(f"{RUBBER}{others}material(m, mullins, {line})\n", status=1).err
     assert says in said and "^" in said

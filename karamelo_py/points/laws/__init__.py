@@ -28,7 +28,6 @@ class LawTraits(NamedTuple):
     rings: bool = True  # vibrates if it has a shear modulus
     any_speed: bool = False  # may move many times faster than its waves: gases
     least_density: float = 10.0  # kg/m^3; a lower density suggests wrong units
-    wraps: bool = False  # supports what the wrapped law does
 
 
 def law_traits(component: Any) -> LawTraits:
@@ -57,9 +56,22 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the point function is defined for the law or one of its parts."""
-    kinds = (kind for kind in law_kind(law) if not law_traits(kind).wraps)
-    return any(function.defined(kind) for kind in kinds)
+    """Return True if the law or a part has the point function and does not merely hand it on."""
+    kinds = (kind for kind in law_kind(law) if function.defined(kind))
+    return any(function.find((kind,)) not in _handing_on for kind in kinds)
+
+
+_handing_on: set[Callable] = set()
+
+
+def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
+    """Decorate the implementation for a law that wraps another, which must have the function."""
+
+    def register(implementation: Callable) -> Callable:
+        _handing_on.add(implementation)
+        return function.on(outer)(implementation)
+
+    return register
 
 
 def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
@@ -69,7 +81,7 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
     """
 
     def register(function: Callable, changes: bool) -> None:
-        @function.on(outer)
+        @hands_on(function, outer)
         def _of_law_within(law, *arguments):
             within = getattr(law, component)
             if len(arguments) < 2:
@@ -80,12 +92,16 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
             return state._replace(**{kept: made}) if changes else made
 
     for function in functions:
-        register(function, function in (with_temperature, warmed, lit))
-    if shown_by in functions:
+        register(function, function in (with_temperature, with_stress, warmed, lit))
 
-        @of_part.on(outer)
-        def _of_part_within(law, tag):
-            return Within(tag)
+
+def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
+    """Do as `hand_on`, and show the columns of the law within."""
+    hand_on(outer, component, kept, functions, kin)
+
+    @within.on(outer)
+    def _within(law, kinematics, state):
+        return getattr(law, component), kinematics if kin is None else kin, getattr(state, kept)
 
 
 _columns: dict[type, dict[str, NamedTuple]] = {}
@@ -98,24 +114,22 @@ def column(component: type, name: str, source: Callable | NamedTuple) -> None:
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
     """Map names of columns, the parts' first, to tags for `shown`."""
-    kinds = reversed(law_kind(law)[1:])
-    tags = {name: tag for kind in kinds for name, tag in _columns.get(kind, {}).items()}
-    return {name: of_part(law, tag) for name, tag in tags.items()} | _columns.get(type(law), {})
+    tags: dict[str, NamedTuple] = {}
+    for part in reversed([part for part in law if isinstance(part, tuple)]):
+        tags |= columns_of(part)
+    if within.defined(type(law)):
+        tags = {name: Within(tag) for name, tag in tags.items()}
+    return tags | _columns.get(type(law), {})
 
 
-@point_function(otherwise=True)
-def of_part(law, tag):
-    return tag
+@point_function()
+def within(law, kin, state):
+    """Return the law that a law wraps, with its kinematics and state."""
 
 
 @point_function()
 def shown(tag, law, kin, state):
     pass
-
-
-@point_function(otherwise=True)
-def shown_by(law, kin, state, tag):
-    return shown(tag, law, kin, state)
 
 
 class Within(NamedTuple):
@@ -124,7 +138,7 @@ class Within(NamedTuple):
 
 @shown.on(Within)
 def _shown_within(tag, law, kin, state):
-    return shown_by(law, kin, state, tag.column)
+    return shown(tag.column, *within(law, kin, state))
 
 
 def number(function: Callable) -> Callable:

@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import I, Space, dev, tensor
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.thermoelastic import heated_by
-from karamelo_py.points.laws.viscoelastic import ElasticMaterial
+from karamelo_py.points.laws.viscoelastic import ElasticMaterial, around_elastic
 from karamelo_py.script.errors import ScriptError
 
 SPACE = Space()
@@ -65,7 +65,7 @@ class Mullins(NamedTuple):
 
     in_lanes = True
     scalarised = ("softened",)
-    traits = LawTraits(rebounds=True, wraps=True)
+    traits = LawTraits(rebounds=True)
 
     elastic: Any
     r: float
@@ -143,11 +143,6 @@ def _kirchhoff_stress_mullins(law, kin, state):
     return state.eta * tau + (1 - state.eta) * mean * I
 
 
-@laws.cauchy_stress.on(Mullins)
-def _cauchy_stress_mullins(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / laws.jacobian(law, kin, state)
-
-
 @laws.dissipated_energy.on(Mullins)
 def _dissipated_energy_mullins(law, kin, state):
     return softened(law, state.peak - state.peak, state.peak)[2]
@@ -164,24 +159,11 @@ def _energy_density_mullins(law, kin, state):
     return whole - (1 - state.eta) * W + phi - laws.dissipated_energy(law, kin, state)
 
 
-def _stiffened(function):
-    @function.on(Mullins)
-    def _speed_mullins(law, kin, state):
-        # unloading from the peak also changes eta
-        s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic)).largest_row_sum()
-        _, slope, _ = softened(law, state.peak, state.peak)
-        elastic = function(law.elastic, kin, state.elastic)
-        return elastic + slope * s * s * laws.specific_volume(law)
+def _stiffening(law, kin, state):
+    # unloading from the peak also changes eta
+    s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic)).largest_row_sum()
+    _, slope, _ = softened(law, state.peak, state.peak)
+    return slope * s * s * laws.specific_volume(law)
 
 
-for _function in (laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part):
-    _stiffened(_function)
-
-
-laws.hand_on(
-    Mullins, "elastic", "elastic", (
-        laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
-        laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
-        laws.with_temperature,
-    ),
-)  # fmt: skip
+around_elastic(Mullins, _stiffening)

@@ -23,7 +23,6 @@ class Saturated(NamedTuple):
     kozeny: float  # 1: permeability follows the porosity; 0: constant
 
     in_lanes = True
-    traits = laws.LawTraits(wraps=True)
 
 
 class State(NamedTuple):
@@ -50,18 +49,13 @@ def _advance_in_run(law, kin, state, step):
     return state._replace(skeleton=laws.advance_fbar(law.law, kin, state.skeleton, step))
 
 
-laws.hand_on(
+laws.wraps(
     Saturated, "law", "skeleton", (
         laws.jacobian, laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain,
         laws.energy_density, laws.dissipated_energy, laws.damage, laws.damage_initiation,
-        laws.plastic_strain, laws.specific_volume, laws.shear_part, laws.by_rates, laws.shown_by,
+        laws.plastic_strain, laws.specific_volume, laws.shear_part, laws.by_rates, laws.with_stress,
     ),
 )  # fmt: skip
-
-
-@laws.with_stress.on(Saturated)
-def _with_stress_saturated(law, kin, state, stress):
-    return state._replace(skeleton=laws.with_stress(law.law, kin, state.skeleton, stress))
 
 
 def _terms(law, kin, state, of_skeleton):

@@ -154,7 +154,7 @@ def _elastic_strain_thermoelastic(law, kin, state):
     return laws.elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
 
 
-@laws.with_stress.on(Thermoelastic)
+@laws.hands_on(laws.with_stress, Thermoelastic)
 def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)

@@ -24,7 +24,6 @@ class Thin(NamedTuple):
     law: Any
 
     in_lanes = True
-    traits = laws.LawTraits(wraps=True)
     trials = 3  # small increments
 
 
@@ -81,12 +80,11 @@ def _advance_thin(law, kin, state, dl, dt):
     return State(new, state.across * (1 + q))
 
 
-laws.hand_on(
+laws.wraps(
     Thin, "law", "whole", (
         laws.jacobian, laws.energy_density, laws.dissipated_energy, laws.damage,
-        laws.damage_initiation, laws.temperature, laws.plastic_strain,
-        laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
-        laws.with_temperature, laws.warmed, laws.lit,
+        laws.damage_initiation, laws.temperature, laws.plastic_strain, laws.specific_volume,
+        laws.heat_capacity, laws.conductivity, laws.with_temperature, laws.warmed, laws.lit,
     ), WHOLE,
 )  # fmt: skip
 
@@ -129,7 +127,7 @@ for _function in (laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain
     _in_body(_function)
 
 
-@laws.with_stress.on(Thin)
+@laws.hands_on(laws.with_stress, Thin)
 def _with_stress_thin(law, kin, state, stress):
     s = WHOLE.Symmetric._make((*stress, *nothing(WHOLE)[len(stress) :]))
     return state._replace(whole=laws.with_stress(law.law, WHOLE, state.whole, s))

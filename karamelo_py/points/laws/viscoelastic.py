@@ -24,7 +24,7 @@ from karamelo_py.points.kinematics import (
     tensor,
     tr,
 )  # fmt: skip
-from karamelo_py.points.laws import Absent, LawTraits, law_traits
+from karamelo_py.points.laws import Absent, law_traits
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import ScriptError
@@ -147,7 +147,6 @@ class Viscoelastic(NamedTuple):
     """
 
     in_lanes = True
-    traits = LawTraits(wraps=True)
 
     elastic: Any
     branches: Any
@@ -268,17 +267,11 @@ def _kirchhoff_stress_viscoelastic(law, kin, state):
     return tau - lost_stress(law, kin, dev(tau), state.branches)
 
 
-@laws.cauchy_stress.on(Viscoelastic)
-def _cauchy_stress_viscoelastic(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / laws.jacobian(law, kin, state)
-
-
 @laws.energy_density.on(Viscoelastic)
 def _energy_density_viscoelastic(law, kin, state):
     return laws.energy_density(law.elastic, kin, state.elastic) - state.gone
 
 
-@laws.dissipated_energy.on(Branch)
 @laws.dissipated_energy.on(Viscoelastic)
 def _dissipated_energy_viscoelastic(law, kin, state):
     return state.loss + laws.dissipated_energy(law.elastic, kin, state.elastic)
@@ -287,29 +280,39 @@ def _dissipated_energy_viscoelastic(law, kin, state):
 laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)
 
 
-def _with_lost_stress(function):
-    @function.on(Viscoelastic)
-    def _speed_viscoelastic(law, kin, state):
-        # elastic stiffness, plus the elastic stress that the body lacks
-        s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
-        lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
-        return function(law.elastic, kin, state.elastic) + 2 * lost * laws.specific_volume(law)
+def around_elastic(outer, stiffening):
+    """Let `outer` answer as its elastic law; `stiffening` raises the squared wave speed."""
+    laws.wraps(
+        outer, "elastic", "elastic", (
+            laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
+            laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.with_temperature,
+        ),
+    )  # fmt: skip
+
+    @laws.cauchy_stress.on(outer)
+    def _cauchy_stress(law, kin, state):
+        return laws.kirchhoff_stress(law, kin, state) / laws.jacobian(law, kin, state)
+
+    def stiffen(function):
+        @function.on(outer)
+        def _stiffened(law, kin, state):
+            return function(law.elastic, kin, state.elastic) + stiffening(law, kin, state)
+
+    for function in (laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part):
+        stiffen(function)
 
 
-for _function in (laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part):
-    _with_lost_stress(_function)
+def _stiffening(law, kin, state):
+    # the elastic stress that the body lacks
+    s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
+    lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
+    return 2 * lost * laws.specific_volume(law)
 
 
-laws.hand_on(
-    Viscoelastic, "elastic", "elastic", (
-        laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
-        laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.shown_by,
-        laws.with_temperature,
-    ),
-)  # fmt: skip
+around_elastic(Viscoelastic, _stiffening)
 
 
-@laws.with_stress.on(Viscoelastic)
+@laws.hands_on(laws.with_stress, Viscoelastic)
 def _with_stress_viscoelastic(law, kin, state, stress):
     s = symmetric_tensor(kin, stress)
     left = 1 - relaxed_part(law.branches)
