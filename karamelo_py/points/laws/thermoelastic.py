@@ -87,8 +87,15 @@ def expansion_pressure(law, state):
     return thermal_pressure(law.heat, (state.T,))[0]
 
 
+@point_function(otherwise=True)
 def is_warm(law):
-    return isinstance(law, Thermoelastic) or (hasattr(law, "elastic") and is_warm(law.elastic))
+    """Return True, constant when compiled, if an elastic law has a temperature."""
+    return False
+
+
+@is_warm.on(Thermoelastic)
+def _is_warm_thermoelastic(law):
+    return True
 
 
 def heated_by(law, kin, state, loss):

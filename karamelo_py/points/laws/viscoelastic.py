@@ -286,6 +286,7 @@ def around_elastic(outer, stiffening):
         outer, "elastic", "elastic", (
             laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
             laws.specific_volume, laws.heat_capacity, laws.conductivity, laws.with_temperature,
+            is_warm,
         ),
     )  # fmt: skip
 

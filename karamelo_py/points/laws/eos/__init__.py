@@ -41,6 +41,12 @@ def crush_work(eos, before, after, step):
 
 
 @point_function(otherwise=True)
+def crushed_strain(eos, before, after):
+    """Return the volume strain of pores crushed between two memories."""
+    return 0
+
+
+@point_function(otherwise=True)
 def ignited(eos, memory, since):
     """Return (memory,) of an explosive a time `since` after lighting, else ()."""
     return ()

@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import any_lane, round_off, where
-from karamelo_py.compiler.powers import power
+from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.points.laws import column, shown, specific_volume
 from karamelo_py.points.laws.eos import (
     at_pressure,
@@ -11,6 +11,7 @@ from karamelo_py.points.laws.eos import (
     compressed,
     compression_energy,
     crush_work,
+    crushed_strain,
     initial_energy,
     initial_loss,
     pressure,
@@ -163,6 +164,11 @@ def _crush_work_p_alpha(eos, before, after, step):
     work *= pressure(eos, step.before, before, ()) + pressure(eos, step.j, after, ())
     stored = compression_energy(eos, step.j, after) - compression_energy(eos, step.before, before)
     return where(after.alpha < before.alpha, max(work - stored, 0), 0)
+
+
+@crushed_strain.on(PAlpha)
+def _crushed_strain_p_alpha(eos, before, after):
+    return logarithm(before.alpha / after.alpha)
 
 
 @pressure.on(PAlpha)

@@ -11,6 +11,7 @@ from karamelo_py.points.laws.eos import (
     at_pressure,
     bulk_modulus,
     compressed,
+    crushed_strain,
     pressure,
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero, reference_rate
@@ -81,6 +82,7 @@ class JohnsonHolmquist2(NamedTuple):
     """
 
     in_lanes = True
+    crushing_breaks = False  # crushed pores count as damage
 
     G: AboveZero
     A: AboveZero
@@ -158,6 +160,7 @@ class Concrete(NamedTuple):
 
     in_lanes = True
     beta = 0.0
+    crushing_breaks = True
 
     G: AboveZero
     A: AboveZero
@@ -235,13 +238,6 @@ def _limits_concrete(strength, p, factor):
     return *ends, failure
 
 
-def pores_crushed(strength, before, after):
-    """Return the volume strain of pores that counts as damage."""
-    if not (isinstance(strength, Concrete) and hasattr(after, "alpha")):
-        return 0
-    return logarithm(before.alpha / after.alpha)
-
-
 @respond.on(Concrete)
 @respond.on(JohnsonHolmquist2)
 def _respond_johnson_holmquist(strength, law, kin, step, memories):
@@ -258,7 +254,9 @@ def _respond_johnson_holmquist(strength, law, kin, step, memories):
     intact, broken, failure = limits(strength, p, rate_factor(strength, step))
     q, flow = von_mises(trial), intact - memory.damage * (intact - broken)
     x = max(q - flow, 0) / (3 * strength.G)
-    lost = x + pores_crushed(strength, memories.energy, energy)
+    lost = x
+    if strength.crushing_breaks:
+        lost = x + crushed_strain(law.eos, memories.energy, energy)
     damage = min(memory.damage + lost / failure, 1)
     weaker = intact - damage * (intact - broken)
     # shear energy released beyond the plastic work
