@@ -1,5 +1,8 @@
 """Laws given by their stored energy: closed forms, other laws, and what is refused."""
 
+import os
+import subprocess
+import sys
 from math import sqrt
 
 import numpy as np
@@ -498,3 +501,31 @@ def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
     line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
     said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err
     assert "loses its stiffness in swelling at a stretch of 0." in said
+
+
+def test_a_formula_with_fibres_needs_no_other_material(tmp_path):
+    """In a new process, which has imported no material but this one."""
+    (tmp_path / "in.fibres").write_text(
+        "method(tlmpm, FLIP, linear, 1)\ndimension(2, 0, 1, 0, 1, 0.5)\n"
+        "region(box, block, 0, 1, 0, 1)\n"
+        "material(m, hyperelastic, 1, (I1 - 3 - 2*log(J)) + (J - 1)^2 + (I4 - 1)^2, "
+        "fibre=(1, 1, 0))\n"
+        "solid(s, region, box, 1, m, 0.5)\nrun(1)\n"
+    )
+    main = "import sys; from karamelo_py.app.cli import main; sys.exit(main(['in.fibres']))"
+    done = subprocess.run(
+        [sys.executable, "-c", main], cwd=tmp_path, capture_output=True, text=True,
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_laws_with_fibres_are_not_wrapped(run_interpreted):
+    script = (
+        "method(tlmpm, FLIP, linear, 1)\ndimension(2, 0, 1, 0, 1, 0.5)\n"
+        "material(m, hyperelastic, 1, (I1 - 3 - 2*log(J)) + (J - 1)^2 + (I4 - 1)^2, "
+        "fibre=(1, 1, 0))\nmaterial(w, {}, m, 2, 1)\n"
+    )
+    for wrapper in ("mullins", "viscoelastic"):
+        err = run_interpreted(script.format(wrapper), status=1).err
+        assert "is no isotropic elastic solid" in err

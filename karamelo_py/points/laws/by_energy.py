@@ -59,16 +59,6 @@ class OfInvariants(ByEnergy):
     __slots__ = ()
 
 
-class OfFibres(OfInvariants):
-    """Adds I4 = a0.C a0 and I6 = b0.C b0 for the unit vectors a0, b0 of two families."""
-
-    __slots__ = ()
-    directions = ("a1", "a2", "a3", "b1", "b2", "b3")
-    along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
-    twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
-    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
-
-
 class OfStretches(ByEnergy):
     __slots__ = ()
     scalarised = ("kirchhoff_stress", "wave_speed_squared", "shear_part", "energy_density")
@@ -105,6 +95,8 @@ def law_of(
     if energy.names.intersection(STRETCHES):
         names, kind, term = STRETCHES, OfStretches, replaced(term, IN_STRETCHES)
     elif directions:
+        from karamelo_py.points.laws.fibres import OfFibres  # also defines its point functions
+
         kind = OfFibres
     writer = ProgramWriter((*names, *FIBRES))
     first = [derivative(term, name) for name in names]

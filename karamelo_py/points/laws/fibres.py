@@ -1,25 +1,35 @@
 """Stress and stiffness of fibres in hyperelastic laws, and material holzapfel."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.laws.by_energy import (
     FIELDS,
-    OfFibres,
+    OfInvariants,
     invariants,
     shear_of_matrix,
     stiffness_of_matrix,
     stress_of_matrix,
     variables,
 )
-from karamelo_py.points.laws.formulas import evaluated
+from karamelo_py.points.laws.formulas import Code, evaluated
 from karamelo_py.points.laws.hyperelastic import VOLUME, Direction, Fields, ready
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 LEANS = 1e-9
 FIRST = len(FIELDS)  # index of a direction's first component
+
+
+class OfFibres(OfInvariants):
+    """Adds I4 = a0.C a0 and I6 = b0.C b0 for the unit vectors a0, b0 of two families."""
+
+    __slots__ = ()
+    directions = ("a1", "a2", "a3", "b1", "b2", "b3")
+    along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
+    twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
+    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
 
 
 class Holzapfel(OfFibres, Fields):
