@@ -89,6 +89,21 @@ def test_beyond_full_compaction_it_is_the_solid():
     assert pressure_of(ROCK, SPACE, state) == pytest.approx(K * (1 - 0.75 * ALPHA), rel=1e-9)
 
 
+@pytest.mark.parametrize("steps", [50, 400])
+def test_pores_of_soil_are_crushed_as_without_shear(steps):
+    """Without dilatancy plastic flow leaves the volume, and pressure, to the crush curve."""
+    law = ROCK._replace(strength=MohrCoulomb.given(8.0, 0.02, 30.0))
+    alpha, J = on_crush_curve(0.3)
+    ratio = J ** (1 / steps) - 1
+    state, work = worked(law, SPACE, start(law, SPACE), np.diag([ratio, 0, 0]), steps)
+    assert state.m.strength.ep > 0.04
+    assert state.m.strength.Jp == pytest.approx(1, abs=1e-9)
+    assert pressure_of(law, SPACE, state) == pytest.approx(0.3, rel=1e-6)
+    assert state.m.energy.alpha == pytest.approx(alpha, rel=1e-7)
+    lost, stored = (f(law, SPACE, state) for f in (dissipated_energy, energy_density))
+    assert lost + stored == pytest.approx(work, rel=1e-2)
+
+
 # Alumina AD-995: Johnson & Holmquist 1993; Cronin et al. 2003, table 1.
 ALUMINA = JohnsonHolmquist2(90.16, 0.93, 0.6, 0.31, 0.6, 0.0, 1.0, 0.2, 2.79, 1.46, 0.005, 1.0)
 BULK = 130.95

@@ -17,7 +17,14 @@ from karamelo_py.compiler import point_function, where
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import inner
 from karamelo_py.points.laws import parameter
-from karamelo_py.points.laws.eos import at_pressure, bulk_modulus, initial_energy, pressure
+from karamelo_py.points.laws.eos import (
+    VolumeStep,
+    at_pressure,
+    bulk_modulus,
+    compressed,
+    initial_energy,
+    pressure,
+)
 from karamelo_py.points.laws.strengths import (
     FrictionTrial,
     elastic_ratio,
@@ -89,15 +96,18 @@ def respond_by_friction(strength, law, kin, step, memories):
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_part(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
-    p_point = pressure(law.eos, elastic, memories.energy, heat) + warm
+    # with the pores that the trial crushes
+    energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
+    p_point = pressure(law.eos, elastic, energy, heat) + warm
     extra = fbar_fraction(strength, memory) * step.extra
     if memory.Js > 1 and p_point + extra > 0:
         # Separation closes before the point sustains pressure.
         closed, _ = at_pressure(law.eos, elastic, memories.energy, -warm - extra, heat)
         memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
         elastic = elastic_part(strength, memory, step.j)
-        p_point = pressure(law.eos, elastic, memories.energy, heat) + warm
-    K = bulk_modulus(law.eos, elastic, memories.energy, heat)
+        energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
+        p_point = pressure(law.eos, elastic, energy, heat) + warm
+    K = bulk_modulus(law.eos, elastic, energy, heat)
     lowest = lowest_pressure(strength, memory.ep)
     p = p_point + extra
     new, reached = pressure_response(strength, kin, FrictionTrial(trial, p, K), memory.ep)
