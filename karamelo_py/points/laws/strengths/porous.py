@@ -6,7 +6,13 @@ from typing import NamedTuple
 from karamelo_py.compiler import any_lane, point_function, round_off, where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.points.kinematics import von_mises
-from karamelo_py.points.laws.eos import at_pressure, bulk_modulus, pressure
+from karamelo_py.points.laws.eos import (
+    VolumeStep,
+    at_pressure,
+    bulk_modulus,
+    compressed,
+    pressure,
+)
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yield_surface
@@ -179,8 +185,9 @@ def _respond_porous(strength, law, kin, step, memories):
     memory, heat = memories.strength, memories.heat
     elastic = step.j / memory.Jp
     warm = sum(thermal_pressure(law.temperature, heat))
-    p_trial = pressure(law.eos, elastic, memories.energy, heat) + warm
-    K = bulk_modulus(law.eos, elastic, memories.energy, heat)
+    energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
+    p_trial = pressure(law.eos, elastic, energy, heat) + warm
+    K = bulk_modulus(law.eos, elastic, energy, heat)
     trial = elastic_trial(strength.G, step.s, step.strain)
     q_trial = von_mises(trial)
     q, p, x = returned(strength, memory, Trial(q_trial, p_trial, K))
