@@ -11,6 +11,7 @@ from karamelo_py.points.kinematics import PlaneStrain, Space
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
+    columns_of,
     dissipated_energy,
     energy_density,
     initial_state,
@@ -81,6 +82,7 @@ def test_the_rock_yields_where_the_joints_do_not_slip():
     more = {"matrix_cohesion": 2e6, "matrix_phi": 40.0}
     assert pressed(rock(20, **more), steps=4) == pytest.approx(strength, rel=4e-3)
     assert pressed(rock(60, **more)) == pytest.approx(jaeger(60), rel=4e-3)
+    assert set(columns_of(rock(60, **more))) == {"slip", "opening", "dissipated", "ep"}
 
 
 @every_kinematics

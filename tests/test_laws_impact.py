@@ -14,6 +14,7 @@ from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import (
     advance,
     cauchy_stress,
+    columns_of,
     damage,
     damage_initiation,
     dissipated_energy,
@@ -417,6 +418,7 @@ def test_damage_by_formula_is_the_built_in(built_in, formula, brittleness):
         law = EosStrength(LinearPressure(1 / 8.9, 140.0), Plastic(48.0, 1.0), damage=part)
         state = stretched(law, SPACE, start(law, SPACE), np.diag([0.003, 0, 0]), 60, 1e-4)
         found.append([damage(law, SPACE, state), damage_initiation(law, SPACE, state)])
+        assert {"damage", "damage_init"} < columns_of(law).keys()
     assert found[1] == pytest.approx(found[0], rel=1e-9)
     assert found[0][0] > 0 and found[0][1] > 0.5
 

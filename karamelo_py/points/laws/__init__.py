@@ -108,8 +108,16 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
 def column(component: type, name: str, source: Callable | NamedTuple) -> None:
-    """Declare an output column by a `number` or a tag of `shown`."""
+    """Declare an output column by a `number` or a tag of `shown`.
+
+    Derived classes have it, unless they declare columns themselves.
+    """
     _columns.setdefault(component, {})[name] = source if isinstance(source, tuple) else source.tag
+
+
+def no_columns(component: type) -> None:
+    """Declare that a class has no columns, whatever its bases have."""
+    _columns[component] = {}
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
@@ -119,7 +127,8 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
         tags |= columns_of(part)
     if within.defined(type(law)):
         tags = {name: Within(tag) for name, tag in tags.items()}
-    return tags | _columns.get(type(law), {})
+    bases = type(law).__mro__
+    return tags | next((_columns[kind] for kind in bases if kind in _columns), {})
 
 
 @point_function()

@@ -367,3 +367,4 @@ for _kind in (Jointed, YieldingBetween):
     laws.column(_kind, "opening", opening)
     laws.column(_kind, "dissipated", laws.dissipated_energy)
 laws.column(YieldingBetween, "ep", laws.plastic_strain)
+laws.no_columns(RockBetweenJoints)

@@ -229,10 +229,11 @@ class DamageFormula(ByRate, DamageFields):
         codes["style"] = "formula"
         codes["in_lanes"] = in_lanes(codes["rate"])
         fields = {"brittleness": brittleness, "initial_temperature": T}
-        made = writer.law(ByRate, fields, codes)
-        column(type(made), "damage", damage)
-        column(type(made), "damage_init", damage_initiation)
-        return made
+        return writer.law(ByRate, fields, codes)
+
+
+column(ByRate, "damage", damage)
+column(ByRate, "damage_init", damage_initiation)
 
 
 @initial_damage.on(ByRate)

@@ -149,5 +149,4 @@ def _stretch_across_thin(law, state):
     return state.across
 
 
-for _kind in (Thin, ThinInLargeIncrements):
-    laws.column(_kind, "thickness", thickness)
+laws.column(Thin, "thickness", thickness)
