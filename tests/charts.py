@@ -34,6 +34,15 @@ def _texts(axes):
     yield axes.title
 
 
+# Quantities without a unit, apart from ratios.
+DIMENSIONLESS = re.compile(r"cells|shear|damage|density, pressure|.*strain|.*error.*|.* / .*")
+
+
+def has_unit(label):
+    """Return True for a label that ends with a unit or names a number."""
+    return bool(re.search(r"\([^()]+\)$", label) or DIMENSIONLESS.fullmatch(label))
+
+
 def faults(figure):
     """What is wrong with a figure, in words."""
     figure.canvas.draw()
@@ -43,7 +52,7 @@ def faults(figure):
         for axis, name in ((axes.xaxis, "x"), (axes.yaxis, "y")):
             label = axis.label.get_text()
             bar = axes.get_label() == "<colorbar>"
-            if label and not re.search(r"\([^()]+\)$", label):
+            if label and not has_unit(label):
                 found.append(f"no unit: {label!r}")
             if not label and not bar:
                 found.append(f"no label along {name}")

@@ -32,11 +32,11 @@ from karamelo_py.points.laws.by_energy import (
     value_at,
 )
 from karamelo_py.points.laws.elastic import State
-from karamelo_py.points.laws.fibres import Holzapfel
 from karamelo_py.points.laws.formulas import with_numbers
 from karamelo_py.points.laws.hyperelastic import (
     ArrudaBoyce,
     Gent,
+    Holzapfel,
     MooneyRivlin,
     Ogden,
     SaintVenantKirchhoff,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import pytest
-from charts import contrast, faults
+from charts import contrast, faults, has_unit
 from verification import run_scene
 
 from comparisons import __main__
@@ -112,7 +112,7 @@ def test_charts_name_their_units():
     axes = [one for line in commands for one in re.findall(r'-axes "([^"]+)"', line)]
     labels += [label for pair in axes for label in pair.split(",") if label]
     assert len(labels) > 100
-    assert [label for label in labels if not re.search(r"\([^()]+\)$", label)] == []
+    assert [label for label in labels if not has_unit(label)] == []
 
 
 def test_faults_of_charts_are_found():

@@ -31,7 +31,8 @@ def test_a_rate_that_takes_no_part_may_be_zero(run_interpreted):
 
 
 @pytest.mark.parametrize(
-    ("rates", "says"), [(("0", 0.1), "C = 0.1 is not 0"), (("1", 0, "0.2", "0"), "d4 = 0.2")]
+    ("rates", "says"),
+    [(("0", 0.1), "a number above 0, or C = 0"), (("1", 0, "0.2", "0"), "d4 = 0.2")],
 )
 def test_a_rate_that_takes_part_is_above_zero(run_interpreted, rates, says):
     assert says in run_interpreted(scene(*rates), status=1).err

@@ -27,7 +27,7 @@ Json = dict[str, Any]
 
 
 @cache
-def surroundings() -> Json:
+def _machine() -> Json:
     versions = {"python": platform.python_version(), "karamelo-py": karamelo_py.__version__}
     versions |= {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
@@ -36,6 +36,11 @@ def surroundings() -> Json:
         "system": f"{platform.system()} {platform.release()}",
         "versions": versions,
     }
+
+
+def surroundings() -> dict[str, Any]:
+    """Return what a result may depend on, and the date."""
+    return {"date": datetime.now().astimezone().isoformat(timespec="seconds"), **_machine()}
 
 
 def processor() -> str:
@@ -112,7 +117,6 @@ class RunRecord:
             "wall_s": time.perf_counter() - self._begun,
             "runs": self.runs,
             "messages": self.messages,
-            "date": datetime.now().astimezone().isoformat(timespec="seconds"),
             **surroundings(),
         }
         with suppress(ScriptError):  # other output reports a full disk

@@ -77,13 +77,17 @@ IN_STRETCHES = {
 
 
 def law_of(
-    rho: float, energy: Expression, directions: Sequence[float] = (), T: float = 293.0
+    rho: float,
+    energy: Expression,
+    directions: Sequence[float] = (),
+    T: float = 293.0,
+    kind: type[ByEnergy] = OfInvariants,
 ) -> NamedTuple:
     """Build the law with this stored energy per reference volume.
 
     `directions` holds unit vectors a0 and b0 if the formula contains I4 or I6, `T` the temperature
-    at rest. Raise ScriptError for operations without a derivative, stress or no stiffness at rest,
-    and formulas that distinguish principal directions.
+    at rest; `kind` is the class of a law of invariants. Raise ScriptError for operations without a
+    derivative, stress or no stiffness at rest, and formulas that distinguish principal directions.
     """
     term = replaced(energy, {"I3": to_power(Expression.seed("J"), 2)})
     check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
@@ -91,13 +95,9 @@ def law_of(
     slopes = [derivative(stretched, name) for name in STRETCHES]
     curves = [derivative(slopes[0], name) for name in STRETCHES[:2]]
     lam, G, at_rest = _judged(stretched, slopes, curves)
-    names, kind = INVARIANTS, OfInvariants
+    names = INVARIANTS
     if energy.names.intersection(STRETCHES):
         names, kind, term = STRETCHES, OfStretches, replaced(term, IN_STRETCHES)
-    elif directions:
-        from karamelo_py.points.laws.fibres import OfFibres  # also defines its point functions
-
-        kind = OfFibres
     writer = ProgramWriter((*names, *FIBRES))
     first = [derivative(term, name) for name in names]
     second = [derivative(first[names.index(a)], b) for k, a in enumerate(names) for b in names[k:]]

@@ -1,4 +1,4 @@
-"""Stress and stiffness of fibres in hyperelastic laws, and material holzapfel."""
+"""Stress and stiffness of fibres in hyperelastic laws."""
 
 from typing import Any, ClassVar
 
@@ -15,8 +15,6 @@ from karamelo_py.points.laws.by_energy import (
     variables,
 )
 from karamelo_py.points.laws.formulas import Code, evaluated
-from karamelo_py.points.laws.hyperelastic import VOLUME, Direction, Fields, ready
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
 
 LEANS = 1e-9
 FIRST = len(FIELDS)  # index of a direction's first component
@@ -30,55 +28,6 @@ class OfFibres(OfInvariants):
     along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
     twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
     mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
-
-
-class Holzapfel(OfFibres, Fields):
-    """Soft tissue such as arteries, with two families of fibres (Holzapfel, Gasser, Ogden).
-
-    Parameters
-    ----------
-    rho
-        Density before deformation.
-    G
-        Shear modulus of the matrix.
-    k1
-        Stiffness of the fibres, a stress.
-    k2
-        Exponent of their stiffening.
-    K
-        Bulk modulus.
-    fibre, fibre2
-        Directions of one or two families at rest; in axisymmetry (radius, axis, hoop).
-
-    Example
-    -------
-    material(artery, holzapfel, 1100, 3e3, 2.36e3, 0.84, 1e6, fibre=(0, 1, 2), fibre2=(0, -1, 2))
-
-    Notes
-    -----
-    W = G/2 (I1 J^(-2/3) - 3) + K/2 (J - 1)^2 + k1/(2 k2) sum (exp(k2 <I - 1>^2) - 1), with the
-    squared stretches I = I4, I6 of the fibres, which are slack in compression: <x> = max(x, 0)
-    (Holzapfel, Gasser & Ogden 2000, J. Elasticity 61, 1-48; with whole stretches, Nolan et al.
-    2014).
-
-    See Also
-    --------
-    hyperelastic, transverse
-    """
-
-    __slots__ = ()
-    syntax = "rho, G, k1, k2, K, fibre=(x, y, z)[, fibre2=(x, y, z)]"
-
-    @classmethod
-    def given(
-        cls, rho: AboveZero, G: AboveZero, k1: FromZero, k2: AboveZero, K: AboveZero, *,
-        fibre: Direction, fibre2: Direction | None = None,
-    ) -> Any:  # fmt: skip
-        families = ("I4", "I6") if fibre2 else ("I4",)
-        fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in families]
-        formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
-        directions = (*fibre, *(fibre2 or fibre))
-        return ready(rho, formula, directions, G=G, k1=k1, k2=k2, K=K)
 
 
 def _leans(law: Any, scene: Any) -> bool:

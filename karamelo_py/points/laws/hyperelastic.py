@@ -15,6 +15,7 @@ from karamelo_py.points.laws.by_energy import (
     OfInvariants,
     law_of,
 )
+from karamelo_py.points.laws.fibres import OfFibres
 from karamelo_py.points.laws.formulas import FormulaOf, with_numbers
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.thermoelastic import expanding
@@ -133,11 +134,13 @@ class HyperelasticFormula(OfInvariants, Fields):
                 raise ScriptError(message, argument=option, expected=f"a formula with {name}")
         one = fibre or fibre2
         unit = (*(fibre or one), *(fibre2 or one)) if one else ()
-        return expanding(law_of(rho, energy, unit, T), cp, kappa, alpha, T)
+        kind = OfFibres if unit else OfInvariants
+        return expanding(law_of(rho, energy, unit, T, kind), cp, kappa, alpha, T)
 
 
 def ready(rho: float, formula: str, directions: Sequence[float] = (), **numbers: float) -> Any:
-    return law_of(rho, with_numbers(formula, **numbers), directions)
+    kind = OfFibres if directions else OfInvariants
+    return law_of(rho, with_numbers(formula, **numbers), directions, kind=kind)
 
 
 VOLUME = "K/2*(J - 1)^2"
@@ -375,3 +378,52 @@ class Ogden(OfInvariants, Fields):
             parts.append(f"m{k}/a{k}*(({powers})*J^(-a{k}/3) - 3)")
             numbers |= {f"m{k}": mu, f"a{k}": alpha}
         return ready(rho, " + ".join(parts), **numbers)
+
+
+class Holzapfel(OfFibres, Fields):
+    """Soft tissue such as arteries, with two families of fibres (Holzapfel, Gasser, Ogden).
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    G
+        Shear modulus of the matrix.
+    k1
+        Stiffness of the fibres, a stress.
+    k2
+        Exponent of their stiffening.
+    K
+        Bulk modulus.
+    fibre, fibre2
+        Directions of one or two families at rest; in axisymmetry (radius, axis, hoop).
+
+    Example
+    -------
+    material(artery, holzapfel, 1100, 3e3, 2.36e3, 0.84, 1e6, fibre=(0, 1, 2), fibre2=(0, -1, 2))
+
+    Notes
+    -----
+    W = G/2 (I1 J^(-2/3) - 3) + K/2 (J - 1)^2 + k1/(2 k2) sum (exp(k2 <I - 1>^2) - 1), with the
+    squared stretches I = I4, I6 of the fibres, which are slack in compression: <x> = max(x, 0)
+    (Holzapfel, Gasser & Ogden 2000, J. Elasticity 61, 1-48; with whole stretches, Nolan et al.
+    2014).
+
+    See Also
+    --------
+    hyperelastic, transverse
+    """
+
+    __slots__ = ()
+    syntax = "rho, G, k1, k2, K, fibre=(x, y, z)[, fibre2=(x, y, z)]"
+
+    @classmethod
+    def given(
+        cls, rho: AboveZero, G: AboveZero, k1: FromZero, k2: AboveZero, K: AboveZero, *,
+        fibre: Direction, fibre2: Direction | None = None,
+    ) -> Any:  # fmt: skip
+        families = ("I4", "I6") if fibre2 else ("I4",)
+        fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in families]
+        formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
+        directions = (*fibre, *(fibre2 or fibre))
+        return ready(rho, formula, directions, G=G, k1=k1, k2=k2, K=K)
