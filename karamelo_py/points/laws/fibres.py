@@ -2,7 +2,6 @@
 
 from typing import Any, ClassVar
 
-from karamelo_py.language.rules import known_failure
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.laws.by_energy import (
@@ -15,6 +14,7 @@ from karamelo_py.points.laws.by_energy import (
     variables,
 )
 from karamelo_py.points.laws.formulas import Code, evaluated
+from karamelo_py.points.laws.leaning import warn_of_leaning
 
 LEANS = 1e-9
 FIRST = len(FIELDS)  # index of a direction's first component
@@ -36,12 +36,10 @@ def _leans(law: Any, scene: Any) -> bool:
     return any(abs(a[i] * a[j] + b[i] * b[j]) > LEANS for i, j in pairs)
 
 
-known_failure(
+warn_of_leaning(
     OfFibres,
-    "directions out of the plane",
-    when=_leans,
-    reason="the fibres of material '{owner.id}' lean: the body would shear out of its plane, which "
-    "{scene.d}D prevents",
+    "fibres",
+    _leans,
     cure="a 3D scene, fibres along x, y or z, or two families that mirror each other",
 )
 

@@ -11,7 +11,6 @@ from karamelo_py.compiler import any_lane, implements, round_off, shared, where
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.compiler.slopes import Dual, value_of
 from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.rules import known_failure
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import (
@@ -28,6 +27,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.eos_strength import Strength
+from karamelo_py.points.laws.leaning import warn_of_leaning
 from karamelo_py.points.laws.orthotropic import (
     INDEX,
     STIFFNESS,
@@ -290,12 +290,10 @@ def couples(law: Any, scene: Any) -> bool:
     return max(parts) > COUPLED
 
 
-known_failure(
+warn_of_leaning(
     YieldingByHill,
-    "directions out of the plane",
-    when=couples,
-    reason="the axes of material '{owner.id}' lean: the body would shear out of its plane, which "
-    "{scene.d}D prevents",
+    "axes",
+    couples,
     cure="a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)",
 )
 

@@ -4,7 +4,6 @@ from math import radians, sqrt, tan
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import where
-from karamelo_py.language.rules import known_failure
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import (
     I,
@@ -19,6 +18,7 @@ from karamelo_py.points.kinematics import (
     unit,
 )
 from karamelo_py.points.laws import Absent
+from karamelo_py.points.laws.leaning import warn_of_leaning
 from karamelo_py.points.laws.orthotropic import axes
 from karamelo_py.points.laws.parameters import (
     AboveZero,
@@ -183,13 +183,12 @@ def leans(law: Any, scene: Any) -> bool:
     return {1: sum(parts) > 1, 2: parts[2] and sum(parts) > 1, 3: False}[scene.d]
 
 
-known_failure(
+warn_of_leaning(
     Jointed,
-    "joints out of the plane",
-    when=leans,
-    reason="the joints of material '{owner.id}' lean: the body would shear out of its plane, which "
-    "{scene.d}D prevents",
+    "joints",
+    leans,
     cure="a 3D scene, or a normal in the xy plane or along z (in 2D, tilt 0 or 90)",
+    title="joints",
 )
 
 

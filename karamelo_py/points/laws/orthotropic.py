@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.language.rules import known_failure
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, inner, total
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
+from karamelo_py.points.laws.leaning import warn_of_leaning
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
@@ -202,12 +202,10 @@ def _is_round_directional(law):
     return max(map(abs, (*apart, *coupled))) <= COUPLED * law.fastest
 
 
-known_failure(
+warn_of_leaning(
     Directional,
-    "directions out of the plane",
-    when=couples,
-    reason="the axes of material '{owner.id}' lean: the body would shear out of its plane, which "
-    "{scene.d}D prevents",
+    "axes",
+    couples,
     cure="a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)",
 )
 

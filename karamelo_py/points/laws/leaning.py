@@ -1,0 +1,20 @@
+"""Warning about directions of a law that lean out of the plane or line of a scene."""
+
+from collections.abc import Callable
+from typing import Any
+
+from karamelo_py.language.rules import known_failure
+
+
+def warn_of_leaning(
+    kind: type, of: str, when: Callable[[Any, Any], bool], cure: str, title: str = "directions"
+) -> None:
+    """Name the scenes in which a law of `kind` would shear out of the plane: `when(law, scene)`."""
+    known_failure(
+        kind,
+        f"{title} out of the plane",
+        when=when,
+        reason=f"the {of} of material '{{owner.id}}' lean: the body would shear out of its plane, "
+        "which {scene.d}D prevents",
+        cure=cure,
+    )
