@@ -432,7 +432,7 @@ def put_rows(i, fate, rows, room):
 
 def of_nodes(row: Any) -> Callable:
     task, at, length = row.task, row.at or (lambda s: s), row.length or kick
-    made = task if callable(task) else lambda s: task
+    made = row.make or (lambda s: task)
 
     def visit_node(i, fate, s, use):
         if use[i] > 0:

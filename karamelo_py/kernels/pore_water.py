@@ -60,17 +60,13 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s))
 
 
-for _function, _task in ((share_forces, pores.ShareForces), (make_flux, pores.MakeFlux)):
-    _function.goes_through, _function.says = _task.goes_through, _task.says  # type: ignore[attr-defined]
-
-
 COMPANY = {
     MassMomentum: Company(then=(pores.WaterMomentum(),)),
     InternalForce: Company(then=(pores.WaterForce(),)),
     MomentumAgain: Company(then=(pores.WaterMomentumAgain(),)),
-    NodalUpdate: Company(before=(AtWater(), NodeTask(share_forces))),
+    NodalUpdate: Company(before=(AtWater(), NodeTask(pores.ShareForces, make=share_forces))),
     Move: Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),)),
-    Strain: Company(before=(NodeTask(make_flux),), first=(pores.Seep(),)),
+    Strain: Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),)),
 }
 
 

@@ -76,7 +76,7 @@ def _work_of_loads(row, s, step):
 
 @take.on(table.NodeTask, Processor)
 def _node_task(row, s, step):
-    task = row.task(s) if callable(row.task) else row.task
+    task = row.make(s) if row.make else row.task
     here = row.at(s) if row.at else s
     sweep_nodes(step.mode, task, here, (row.length or clocks.kick)(s))
 

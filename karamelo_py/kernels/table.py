@@ -73,11 +73,12 @@ class Scatter(NamedTuple):
 
 
 class NodeTask(NamedTuple):
-    """A task at every node in use: a tag, or a function of the setup that returns one."""
+    """A task at every node in use."""
 
-    task: Any
+    task: Any  # a tag, or the class of those that `make` returns
     at: Any = None  # function of the setup: one with other nodes
     length: Any = None  # function of the setup: the time interval, not `kick`
+    make: Any = None  # function of the setup that returns the tag
 
 
 class EachNode(NamedTuple):
@@ -247,13 +248,9 @@ def _says_sweep(row: Sweep, setup: Any) -> str:
     return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
 
 
-def says_of(task: Any) -> str | None:
-    return getattr(task, "says", None)
-
-
 _SAYS: dict[type, Any] = {
     Sweep: _says_sweep,
-    NodeTask: lambda row, setup: says_of(row.task),
+    NodeTask: lambda row, setup: row.task.says,
 }
 
 
@@ -318,7 +315,7 @@ def _rows_of_scene(row, s):
 
 @in_scene.on(NodeTask)
 def _after_others(row, s):
-    return (row,) if row.at or callable(row.task) else (*company_of(row.task, s).before, row)
+    return (row,) if row.at or row.make else (*company_of(row.task, s).before, row)
 
 
 @in_scene.on(Sweep)
@@ -416,7 +413,7 @@ def average_stress(s: Setup) -> tuple:
 
 def corrected(s: Setup) -> tuple:
     is_corrected = field(s.nodes.fields, Acceleration) is not None
-    return (NodeTask(correct_acceleration), *hold_axis(s)) if is_corrected else ()
+    return (NodeTask(CorrectAcceleration, make=correct_acceleration), *hold_axis(s)) if is_corrected else ()
 
 
 def update_velocity(s: Setup) -> tuple:
@@ -440,9 +437,6 @@ def light_node(s):
     courant = motion.rate * s.control.values[arrays.DT] / step.spacing
     masses = min(s.kin.dimension * courant * courant, 1.0)
     return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
-
-
-light_node.goes_through = nodes.UpdateToVelocity.goes_through  # type: ignore[attr-defined]
 
 
 def seams(task: type) -> Any:

@@ -13,6 +13,9 @@ from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.traits import SchemeTraits
 
 
+LIMITED = NodeTask(UpdateToVelocity, make=light_node)
+
+
 class USL(NamedTuple):
     """Update the stress after the forces, with the gradient of the updated nodal velocity.
 
@@ -39,7 +42,7 @@ class USL(NamedTuple):
         table.BEGIN,
         table.SUMS,
         *table.ACCELERATE,
-        NodeTask(light_node),
+        LIMITED,
         table.SERIES,
         *table.MOVE,
         table.Gather(Strain()),
@@ -77,9 +80,6 @@ def any_node(s):
     return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
 
 
-any_node.goes_through = UpdateToVelocity.goes_through  # type: ignore[attr-defined]
-
-
 class USLUnlimited(NamedTuple):
     """usl as first published, without the limit at light nodes.
 
@@ -93,5 +93,5 @@ class USLUnlimited(NamedTuple):
 
     traits = SchemeTraits(courant=USL.traits.courant, leading=MUSL())
     rows = tuple(
-        table.NodeTask(any_node) if row == NodeTask(light_node) else row for row in USL.rows
+        NodeTask(UpdateToVelocity, make=any_node) if row == LIMITED else row for row in USL.rows
     )

@@ -20,7 +20,6 @@ from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.step import DONE, Fused, StepKind, begin, step
 from karamelo_py.kernels.sums import columns_of
 from karamelo_py.kernels.sweep import sum_buffers, sweep_nodes, sweep_points
-from karamelo_py.kernels.table import says_of
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.lower.memory import node_fields, nodes_in_use, point_fields
@@ -149,7 +148,7 @@ class Solved(NamedTuple):
 
 
 def _name(*tags: Any) -> str:
-    return ", ".join(says_of(tag) or type(tag).__name__ for tag in tags)
+    return ", ".join(tag.says or type(tag).__name__ for tag in tags)
 
 
 @sweep_points.on(Timed)

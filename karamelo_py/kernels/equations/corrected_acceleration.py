@@ -95,6 +95,3 @@ def _strides(grids, kin, n):
 
 def correct_acceleration(s: arrays.Setup) -> CorrectAcceleration:
     return CorrectAcceleration(real(s.basis.traits.spread, s.nodes.sums[0, MASS]), s.grids)
-
-
-correct_acceleration.goes_through = CorrectAcceleration.goes_through  # type: ignore[attr-defined]

@@ -1,6 +1,6 @@
 """Tasks at nodes between two visits of the points."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function, real
 from karamelo_py.compiler.fields import SummedField, field
@@ -13,9 +13,11 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
     """Do `task` at node `n`; nodes without mass stay at rest."""
 
 
-def node_task(tag: type) -> type:
+def node_task(tag: Any) -> Any:
     """Register the function ``at_node`` of a task."""
     at_node.on(tag)(vars(tag)["at_node"])
+    if "says" not in vars(tag):
+        tag.says = ""
     return tag
 
 

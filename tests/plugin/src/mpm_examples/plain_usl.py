@@ -16,9 +16,6 @@ def updated(s):
     return UpdateToVelocity(real(0, s.nodes.sums[0, MASS]))
 
 
-updated.goes_through = UpdateToVelocity.goes_through
-
-
 class PlainUSL(NamedTuple):
     """Update stress last, as in the textbook: nothing is done about nodes with little mass.
 
@@ -32,7 +29,7 @@ class PlainUSL(NamedTuple):
         AtPoints(INITIAL_INTEGRATE, 0),
         SUMS,  # mass, momentum and force to the nodes
         *ACCELERATE,  # their update, and the fixes on nodes
-        NodeTask(updated),
+        NodeTask(UpdateToVelocity, make=updated),
         SERIES,
         *MOVE,  # velocities back to the points, which move
         Gather(Strain()),  # their stress, from the same velocity of the nodes
