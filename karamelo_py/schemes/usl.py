@@ -12,7 +12,6 @@ from karamelo_py.points.transfers import gradient_weight
 from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.traits import SchemeTraits
 
-
 LIMITED = NodeTask(UpdateToVelocity, make=light_node)
 
 
