@@ -412,8 +412,9 @@ def average_stress(s: Setup) -> tuple:
 
 
 def corrected(s: Setup) -> tuple:
-    is_corrected = field(s.nodes.fields, Acceleration) is not None
-    return (NodeTask(CorrectAcceleration, make=correct_acceleration), *hold_axis(s)) if is_corrected else ()
+    if field(s.nodes.fields, Acceleration) is None:
+        return ()
+    return (NodeTask(CorrectAcceleration, make=correct_acceleration), *hold_axis(s))
 
 
 def update_velocity(s: Setup) -> tuple:
