@@ -39,6 +39,7 @@ TOOLS = (
     "exact",
     "faces",
     "lines",
+    "peers",
     "pictures",
     "results",
     "row",
