@@ -359,6 +359,22 @@ SCENES = {
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
     "ground": block(2, *EDGES, size=SIZE),
+    "stages": block(
+        2, "region(more, block, 0.3, 0.5, 0.5, 0.6)",
+        "solid(fill, region, more, 2, rubber, 0.1)",
+        "group(fill, particles, region, more, all)", "deactivate(fill)",
+        "fix(u, displacement, all)", "dump(d, all, particle, 2, d.*.txt, x, y, ux, uy)",
+        *SWAYS[:-1],
+        "run(4)", "activate(fill)", "run(4)", size=SIZE,
+    ),
+    "inflow": block(
+        2, "region(nozzle, block, 0.1, 0.2, 0.3, 0.5)",
+        "solid(jet, region, nozzle, 2, rubber, 0.1)",
+        "fix(feed, inflow, jet, 2, 0, until=0.1)", "region(end, block, 0.55, INF, INF, INF)",
+        "fix(out, outflow, all, end, every=3)", "dump(d, all, particle, 2, d.*.txt, id, x, y, vx)",
+        "set_output(1)", "log_modify(custom, step, time, feed_points, feed_mass, feed_x, out_mass)",
+        "run(30)", size=SIZE,
+    ).replace("linear, 2, 100", "linear, 2, 500"),
     "corrected accelerations": block(
         2, "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
         "fix(hold, velocity_nodes, low, NULL, 0)", *SWAYS, transfer="APIC", size=SIZE,

@@ -97,8 +97,8 @@ def test_in_pieces(run_interpreted):
 
 @pytest.mark.parametrize(
     "scene",
-    few(["flow in the total frame", "deleted", "points that go", "wall that rubs"],
-        "deleted", "wall that rubs"),
+    few(["flow in the total frame", "deleted", "points that go", "wall that rubs", "stages",
+         "inflow"], "deleted", "wall that rubs"),
 )  # fmt: skip
 def test_goes_on_from_a_file(run_interpreted, scene):
     """Also with a file of the other: what a card does not know of, such as tiles, is made anew."""

@@ -9,12 +9,13 @@ from karamelo_py.language.by_dimension import Forms
 from karamelo_py.language.signature import Argument
 from karamelo_py.output.fields import ColumnFormula
 from karamelo_py.scene.boundary import take_away
-from karamelo_py.scene.group import ALL, ParticleGroup
+from karamelo_py.scene.group import ALL
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import per_direction
 from karamelo_py.scene.placement import MAX_POINTS, Placement
 from karamelo_py.scene.region import Region, check_radius
-from karamelo_py.scene.solid import Solid, warn_of_coinciding
+from karamelo_py.scene.replacing import chosen_of, refuse_chosen, replace_points
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError, render_message
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import vector
@@ -82,7 +83,7 @@ def delete_particles(
             hint = "leave out the solid, and delete_particles"
             raise ScriptError(message, argument="chosen", hint=hint)
     for solid, inside in members.items():
-        replace_points(hub, solid, _chosen(solid, ~inside))
+        replace_points(hub, solid, chosen_of(solid, ~inside))
 
 
 def _delete_where(hub: Hub, solids: Solids, condition: ColumnFormula) -> None:
@@ -154,7 +155,7 @@ def translate_particles(
 
 
 def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
-    moved = _chosen(solid, np.ones(solid.count, np.bool_))
+    moved = chosen_of(solid, np.ones(solid.count, np.bool_))
     x0 = moved.x0 + step
     if not hub.domain.contains(x0).all():
         message = f"points of solid '{solid.id}' would leave the domain"
@@ -167,45 +168,6 @@ def _move(hub: Hub, solid: Solid, step: np.ndarray) -> None:
         hi = np.maximum(moved.hi, (x0 + moved.half_size).max(axis=0))
     corners = None if moved.corners is None else moved.corners + step[:, None, :]
     replace_points(hub, solid, moved._replace(x0=x0, lo=lo, hi=hi, corners=corners))
-
-
-def _chosen(solid: Solid, kept: np.ndarray) -> Placement:
-    volume = solid.volume0 / solid.domain.depth(solid.x0[:])
-    return Placement(
-        x0=solid.x0[kept],
-        volume=volume[kept],
-        half_size=solid.half_size[kept],
-        lo=solid.lo,
-        hi=solid.hi,
-        shape=solid.shape,
-        corners=None if solid.corners is None else solid.corners[kept],
-    )
-
-
-def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
-    """Refuse if groups of points or contacts store the numbers that would change."""
-    later = [one for one in hub.solids.values() if one.index >= solid.index]
-    affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
-    for group in hub.groups.values():
-        if isinstance(group, ParticleGroup) and any(map(group.touches, later)):
-            affected.append(("group", "chosen from", group))
-    if affected:
-        kind, made, item = affected[0]
-        message = f"{kind} '{item.id}' was {made} points that would be replaced or renumbered"
-        expected = f"{kind}({item.id}, ...) after {command}"
-        raise ScriptError(message, argument="solid", expected=expected)
-
-
-def replace_points(
-    hub: Hub, solid: Solid, placement: Placement, *, may_be_empty: bool = False
-) -> None:
-    before = solid.count
-    solid.put(hub, placement, may_be_empty=may_be_empty)
-    for other in hub.solids.values():
-        if other.index > solid.index:
-            other.first_id += solid.count - before
-    hub.forget_simulation()
-    warn_of_coinciding(hub, solid, solid.id)
 
 
 FORMS = Forms(

@@ -85,6 +85,11 @@ class Field(NamedTuple):
     columns = ()
 
     @staticmethod
+    def shown(values: np.ndarray, table: Any) -> np.ndarray:
+        """Return what the columns show (n, components), of the values in a table of points."""
+        return values
+
+    @staticmethod
     def needed(tag: Any) -> bool:
         """Return True if points of a law, or nodes of a basis, have this field."""
         return True
@@ -118,6 +123,10 @@ def is_kept(kind: type) -> bool:
 
 def columns_of(kind: type) -> tuple[str, ...]:
     return _trait(kind, "columns")
+
+
+def shown_by(kind: type, values: np.ndarray, table: Any) -> np.ndarray:
+    return _trait(kind, "shown")(values, table)
 
 
 def start_of(kind: type) -> Any:

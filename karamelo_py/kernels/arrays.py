@@ -10,7 +10,12 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from karamelo_py.compiler import noinline
-from karamelo_py.compiler.fields import as_rows_of_points, name_of, some_points
+from karamelo_py.compiler.fields import (
+    as_rows_of_points,
+    name_of,
+    rows_of_points,
+    some_points,
+)
 from karamelo_py.kernels.records import row
 from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
@@ -169,6 +174,15 @@ def some_of(block: Block, rows: np.ndarray) -> Block:
     """Return the block with the points `rows` in this order, not yet sorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
+
+
+def joined_points(points: Points, parts: Sequence[Sequence[np.ndarray]]) -> Points:
+    """Return points like `points`, from `parts` with all their arrays, one after another."""
+    count = sum(arrays[0].shape[-1] for arrays in parts)
+    made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    for array, same in zip(made, zip(*parts, strict=True), strict=True):
+        np.concatenate(same, axis=-1, out=array)
+    return made_of(points, made)
 
 
 class NoHooks(NamedTuple):

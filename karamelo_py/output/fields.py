@@ -8,8 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from karamelo_py.compiler import fields
-from karamelo_py.compiler.fields import rows_of_points
-from karamelo_py.kernels.arrays import Block, Points, Setup, arrays_of, made_of, matter_of, some_of
+from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, matter_of, some_of
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
@@ -149,6 +148,21 @@ class Fields(PointTable):
         local = [one for one in results if one is not None]
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
+    def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
+        """Return numbers of the points nearer to one of `x` (n, d) than `half` (n, d) along all
+        axes."""
+        from scipy.spatial import KDTree
+
+        size, found = half.min(axis=0), []
+        tree = KDTree(x / size)
+        for some in self.some(None):
+            if some.count:
+                place = some.position / size
+                distance, _ = tree.query(place, distance_upper_bound=1.0, p=inf)
+                found.append(some.numbers[np.isfinite(distance)])
+        of_all = self.comm.allgather(np.concatenate([np.empty(0, np.int64), *found]))
+        return np.sort(np.concatenate(of_all))
+
     def seen(self, say: Callable, *arguments: object) -> list:
         return self.comm.allgather(say(self.simulation, *arguments))
 
@@ -184,7 +198,7 @@ class Fields(PointTable):
                 if gathered is None:
                     continue
                 blocks = [
-                    block._replace(points=_joined(block.points, parts))
+                    block._replace(points=joined_points(block.points, parts))
                     for block, parts in zip(blocks, zip(*gathered, strict=True), strict=True)
                 ]
             parts = [Part(block, None, block.points.id - first) for block in blocks]
@@ -235,14 +249,6 @@ class Fields(PointTable):
 
 def ranges(count: int) -> Iterator[tuple[int, int]]:
     return ((first, min(first + PIECE, count)) for first in range(0, count, PIECE))
-
-
-def _joined(points: Points, parts: list[list[np.ndarray]]) -> Points:
-    count = sum(arrays[0].shape[-1] for arrays in parts)
-    made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
-    for array, same in zip(made, zip(*parts, strict=True), strict=True):
-        np.concatenate(same, axis=-1, out=array)
-    return made_of(points, made)
 
 
 def _kinetic(s: Setup, block: Block) -> np.ndarray:

@@ -202,7 +202,7 @@ class PointTable:
         if name in (of_fields := declared_columns(self.hub, "point_fields")):
             kind, k = of_fields[name]
             if (array := self._rows.declared(kind)) is not None:
-                return _column(array, k)
+                return _column(fields.shown_by(kind, array, self), k)
         elif name in named_sets(self.hub):
             return members(self.hub, name, self.numbers)
         return np.zeros(self.count)

@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.threads import Serial, Threaded, new_team
-from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks
+from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, NoHooks, some_of
 from karamelo_py.kernels.clock import all_well, step_size
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import SumsToVelocity
@@ -94,6 +94,9 @@ class SceneArrays:
         self.present = np.ones(self.count, np.bool_)  # by id, False for deleted points
         if state is not None:
             self.present[: state.count] = state.present
+        self.present[hub.waiting[hub.waiting >= (state.count if state else 0)]] = False
+        if len(hub.waiting):
+            self.keep_present()
         self.threads = self.tiles.threads = thread_count(hub, self.count)
         self._team = new_team(self.threads)
         self.mode = Threaded(self._team.ctypes.data) if self.threads > 1 else Serial()
@@ -103,6 +106,13 @@ class SceneArrays:
         self.version = 0  # grows when fields change without a step
         self.rollback: RollbackPoint | None = None  # of the last run
         self.mapped = False  # the nodes show the present state
+
+    def keep_present(self) -> None:
+        blocks = (
+            some_of(block, np.flatnonzero(self.present[block.points.id]))
+            for block in self.setup.blocks
+        )
+        self.setup = self.setup._replace(blocks=tuple(blocks))
 
     def fits(self, hub: Hub) -> bool:
         return self.key == scene_key(hub)
@@ -215,6 +225,11 @@ class SceneArrays:
 
     def bring(self) -> None:
         """Bring the whole state here, with points in the order of their tiles."""
+        sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
+        if self.comm.allreduce_max(np.array([sorted_before]))[0] and np.isinf(
+            self.control.motion[0].drift
+        ):
+            self.sort()  # points have gone or come since
 
     def show_on_nodes(self) -> None:
         """Map the present state to the nodes unless a step has done so."""

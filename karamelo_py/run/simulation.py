@@ -8,13 +8,22 @@ from functools import cached_property
 import numpy as np
 from numba import config
 
-from karamelo_py.kernels.arrays import Hooks, NoHooks, Setup, Tag, some_of
+from karamelo_py.kernels.arrays import (
+    Hooks,
+    NoHooks,
+    Points,
+    Setup,
+    Tag,
+    arrays_of,
+    joined_points,
+)
 from karamelo_py.kernels.hooks import POINT_STAGES
 from karamelo_py.kernels.step import DONE, SORT, Fused, Staged, StepKind, advance, run_steps
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.run.energy import EnergyWatch
 from karamelo_py.run.light_nodes import stable_share
 from karamelo_py.run.lower.bodies import check_bodies
+from karamelo_py.run.lower.build import points_at_rest
 from karamelo_py.run.lower.hooks import ActingFixes, FixesOfRun, views_of
 from karamelo_py.run.lower.walls import mark_sides
 from karamelo_py.run.mpi.whole import PointsMoved
@@ -110,16 +119,38 @@ class Simulation(SceneArrays):
             add_to(self.control.totals, WORK, -(kinetic + stored))
         self.energy_watch.without(stored)
         self.present[ids] = False
-        blocks = (
-            some_of(block, np.flatnonzero(self.present[block.points.id]))
-            for block in self.setup.blocks
-        )
-        self.setup = self.setup._replace(blocks=tuple(blocks))
+        self.keep_present()
         self.tiles.unsort(self.control)
         # Balance and rate remain from the last step: the same whether or not a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
+
+    def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
+        """Add absent points (ascending ids) in their initial state; return their energy.
+
+        `prepare` may change their velocities and positions, block by block. The energy balance
+        books their energy as work.
+        """
+        if self.comm.leads:  # the next sort hands them over
+            blocks = []
+            made = points_at_rest(self.hub, self.setup, ids)
+            for block, points in zip(self.setup.blocks, made, strict=True):
+                if prepare is not None:
+                    prepare(points)
+                parts = [[array for _, array in arrays_of(of)] for of in (block.points, points)]
+                blocks.append(block._replace(points=joined_points(block.points, parts)))
+            self.setup = self.setup._replace(blocks=tuple(blocks))
+        self.present[ids] = True
+        self.tiles.unsort(self.control)
+        super().changed()
+        group = ParticleGroup(self.hub)
+        group.take([ids])
+        kinetic, *inner = (self.points.total(name, group) for name in TAKEN_ALONG[1:])
+        if self.comm.leads:
+            add_to(self.control.totals, WORK, kinetic + sum(inner))
+        self.energy_watch.without(-sum(inner))
+        return kinetic + sum(inner)
 
     @property
     def step_kind(self) -> StepKind:

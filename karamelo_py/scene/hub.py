@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+import numpy as np
+
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.language import registry
 from karamelo_py.language.faults import as_script_error
@@ -202,6 +204,8 @@ class Hub:
         self.elements = Catalogue("element", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
+        # Ids of points that are absent at the start, and of those that a script has deactivated.
+        self.waiting, self.inactive = np.empty((2, 0), np.int64)
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)

@@ -329,6 +329,19 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
     return other
 
 
+def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[arrays.Points]:
+    """Return the points `ids` (ascending) in their initial state, as in the blocks of `setup`."""
+    span = int(ids[0]), int(ids[-1]) + 1
+    real = PRECISIONS[hub.settings.precision]
+    kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")
+    found = []
+    for solids, block in zip(solids_alike(hub, span), setup.blocks, strict=True):
+        points, _ = lower_points(hub, solids, setup.kin, kinds, real)
+        rows = np.flatnonzero(np.isin(points.id, ids))
+        found.append(arrays.some_of(block._replace(points=points), rows).points)
+    return found
+
+
 def point_kinds(hub: Hub) -> tuple[type, ...]:
     return fields.declared(owners_of_fields(hub), "point_fields")
 

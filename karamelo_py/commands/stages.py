@@ -1,0 +1,123 @@
+"""Commands for the stages of a job: points that are absent for a time."""
+
+import numpy as np
+
+from karamelo_py.output.point_table import from_solids, places_before
+from karamelo_py.scene.boundary import take_away
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import named
+from karamelo_py.script.errors import ScriptError, plural, render_message
+
+
+def deactivate(hub: Hub, group: ParticleGroup) -> None:
+    """Take points out of a scene: an excavation, or fill that comes later.
+
+    Parameters
+    ----------
+    group
+        Group of points. They have no mass, no stress and no place until they are activated.
+
+    Example
+    -------
+    group(pit, particles, region, box, all)
+    deactivate(pit)
+
+    Notes
+    -----
+    Before the first run or between runs. Output, groups and fixes then lack the points; their
+    numbers do not change. Between runs, their mass and energy are printed, and the energy balance
+    counts the energy as work.
+
+    See Also
+    --------
+    activate, delete_particles, fix geostatic_stress
+    """
+    ids = _members(hub, group)
+    hub.inactive = np.union1d(hub.inactive, ids)
+    if not hub.has_run:
+        hub.waiting = np.union1d(hub.waiting, ids)
+        hub.forget_simulation()
+        return
+    if _skipped(hub):
+        return
+    ids = ids[hub.simulation.present[ids]]
+    if not len(ids):
+        hub.warn(f"all points of group '{group.id}' are inactive already")
+        return
+    mass, energy = take_away(hub, ids, hub.mark)
+    _say(hub, ids, "deactivated", mass, energy)
+
+
+def activate(hub: Hub, group: ParticleGroup) -> None:
+    """Put deactivated points into a scene: fill, a lift of a dam, a strut.
+
+    Parameters
+    ----------
+    group
+        Group of points that were deactivated.
+
+    Example
+    -------
+    group(lift, particles, region, box, all)
+    deactivate(lift)
+    activate(lift)
+
+    Notes
+    -----
+    The points come in at their first places, at rest, without stress, with the mass, the
+    temperature and the state of their material at the start. For stress in them, define a fix
+    initial_stress or geostatic_stress of the group afterwards. A warning says if other points are
+    where they go.
+
+    See Also
+    --------
+    deactivate, solid, fix initial_stress, fix inflow
+    """
+    ids = np.intersect1d(_members(hub, group), hub.inactive)
+    hub.inactive = np.setdiff1d(hub.inactive, ids)
+    if not len(ids) and not hub.rehearsing:
+        hub.warn(
+            f"all points of group '{group.id}' are active already",
+            hint=f"deactivate({group.id}) before",
+        )
+    if not hub.has_run:
+        hub.waiting = np.setdiff1d(hub.waiting, ids)
+        hub.forget_simulation()
+    if not hub.has_run or _skipped(hub) or not len(ids):
+        return
+    simulation = hub.simulation
+    ids = ids[~simulation.present[ids]]
+    halves = from_solids(hub, ids, lambda solid, rows: solid.half_size[rows], hub.domain.dimension)
+    hit = hub.fields.near(places_before(hub, ids), 0.9 * halves)
+    if len(hit):
+        hub.warn(
+            f"{plural(len(hit), 'point')} are where points of group '{group.id}' come in, such as "
+            f"{named(hub, int(hit[0]))}: there is twice the mass",
+            hint="deactivate them before, or activate points above them",
+        )
+    energy = simulation.insert(ids)
+    simulation.changed()
+    new = ParticleGroup(hub)
+    new.take([ids])
+    _say(hub, ids, "activated", simulation.points.total("mass", new), energy)
+
+
+def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
+    ids = group.members
+    if not len(ids) and not hub.rehearsing:
+        raise ScriptError(
+            f"group '{group.id}' has no points", argument="group", expected="a group with points"
+        )
+    return ids
+
+
+def _skipped(hub: Hub) -> bool:
+    """Return True in a rehearsal or replay, whose state is another one."""
+    return hub.rehearsing or hub.interpreter.replay is not None
+
+
+def _say(hub: Hub, ids: np.ndarray, done: str, mass: float, energy: float) -> None:
+    count = plural(len(ids), "point")
+    words = f"{count} {done}, with a mass of {mass:.6g} and an energy of {energy:.6g}"
+    hub.console.say(render_message("note", words))

@@ -1,0 +1,50 @@
+"""Fix displacement: displacements from a stage of a job on."""
+
+import numpy as np
+
+from karamelo_py.compiler.fields import Field, vector
+from karamelo_py.output.point_table import PointTable
+from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import Fix, PointsView
+
+
+class EarlierDisplacement(Field):
+    """Displacement at the stage from which it is measured."""
+
+    shape = vector
+    columns = ("ux", "uy", "uz")
+
+    @staticmethod
+    def shown(values: np.ndarray, table: PointTable) -> np.ndarray:
+        return table.position - table.reference_position - values
+
+
+class Displacement(Fix):
+    """Measure displacements from the positions at the next step: 0 after gravity has acted.
+
+    Example
+    -------
+    fix(u, displacement, all)
+
+    Notes
+    -----
+    Points have the columns ux, uy, uz then, in dumps, probes, pictures and formulas of columns.
+    delete_fix and a further fix displacement measure from a later stage. For points outside the
+    group, and points that come in later, they are measured from the first position.
+
+    See Also
+    --------
+    fix geostatic_stress, deactivate, compute probe
+    """
+
+    published = ()
+    point_fields = (EarlierDisplacement,)
+    first_step_only = True
+    point_by_point = True
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+
+    def initial_integrate(self, points: PointsView) -> None:
+        points[EarlierDisplacement] = points.position - points.reference_position
