@@ -411,12 +411,16 @@ def _tried(lines, dimension, folder):
             interpreter.run_text(f"material(wet, linear, 1000, 1000, 0.3)\n{wet}")
         kind = (
             "nodes"
-            if words[2] in ("absorbing", "body_force", "pore_pressure") or "_nodes" in line
+            if words[2] in ("absorbing", "body_force", "ground_motion", "pore_pressure")
+            or "_nodes" in line
             else "particles"
         )
-        if words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
+        if words[2] == "inflow":
+            h = STAGES[dimension][0].split()[-1]
+            interpreter.run_text(f"solid({words[3]}, region, disk, 2, steel, {h}, 0)")
+        elif words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
             place = "wall"
-            if words[2] == "absorbing":
+            if words[2] in ("absorbing", "ground_motion"):
                 place, x = "edge", {1: 9}.get(dimension, 0.3)
                 more = ", INF, INF" * (dimension - 1)
                 interpreter.run_text(f"region(edge, block, {x}, {x}{more})")
