@@ -415,10 +415,8 @@ def _tried(lines, dimension, folder):
             or "_nodes" in line
             else "particles"
         )
-        if words[2] == "inflow":
-            h = STAGES[dimension][0].split()[-1]
-            interpreter.run_text(f"solid({words[3]}, region, disk, 2, steel, {h}, 0)")
-        elif words[0] in ("fix", "compute") and words[3] not in ("all", "v_x"):
+        named = words[0] in ("fix", "compute") and words[2] != "inflow"
+        if named and words[3] not in ("all", "v_x"):
             place = "wall"
             if words[2] in ("absorbing", "ground_motion"):
                 place, x = "edge", {1: 9}.get(dimension, 0.3)

@@ -48,15 +48,15 @@ class Inflow(VelocityNodes):
 
     Example
     -------
-    fix(feed, inflow, jet, 1, 0, until=0.5)
+    fix(feed, inflow, s1, 1, 0, until=0.5)
 
     Notes
     -----
     Nodes of the inlet have the velocity. A layer of points enters at its upstream end whenever the
     last one has moved by the distance of the layers. Whole layers enter, so the mass is exact to
-    the last digit. The layers repeat the solid, and ids follow the order of entry. The points are made
-    with the fix, before the first run, and wait; `until` says how many. The energy balance counts
-    the energy of entering points as work.
+    the last digit. The layers repeat the solid, and ids follow the order of entry. The points are
+    made with the fix, before the first run, and wait; `until` says how many. The energy balance
+    counts the energy of entering points as work.
 
     Publishes the force on the nodes of the inlet as ID_x, ID_y, ID_z, and the number and mass of
     the points that have entered as ID_points and ID_mass.
