@@ -179,7 +179,7 @@ def some_of(block: Block, rows: np.ndarray) -> Block:
 def joined_points(points: Points, parts: Sequence[Sequence[np.ndarray]]) -> Points:
     """Return points like `points`, from `parts` with all their arrays, one after another."""
     count = sum(arrays[0].shape[-1] for arrays in parts)
-    made = [rows_of_points((*a.shape[:-1], count), a.dtype) for _, a in arrays_of(points)]
+    made = [rows_of_points((*a.shape[:-1], count), a.dtype.type) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
         np.concatenate(same, axis=-1, out=array)
     return made_of(points, made)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from karamelo_py.language.scene import Scene
 from karamelo_py.scene.group import ParticleGroup
+from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.placement import Placement
 from karamelo_py.scene.solid import Solid, warn_of_coinciding
 from karamelo_py.script.errors import ScriptError
@@ -23,7 +23,7 @@ def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
     )
 
 
-def refuse_chosen(hub: Scene, solid: Solid, command: str) -> None:
+def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
     """Refuse if groups of points or contacts store the numbers that would change."""
     later = [one for one in hub.solids.values() if one.index >= solid.index]
     affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
@@ -42,7 +42,7 @@ def refuse_chosen(hub: Scene, solid: Solid, command: str) -> None:
 
 
 def replace_points(
-    hub: Scene, solid: Solid, placement: Placement, *, may_be_empty: bool = False
+    hub: Hub, solid: Solid, placement: Placement, *, may_be_empty: bool = False
 ) -> None:
     before = solid.count
     solid.put(hub, placement, may_be_empty=may_be_empty)

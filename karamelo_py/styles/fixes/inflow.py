@@ -31,7 +31,8 @@ class Inlet(Region):
     def contains(self, x: np.ndarray) -> np.ndarray:
         d = self.dimension
         lo, hi = self.box_lo[:d] - self.tolerance, self.box_hi[:d] + self.tolerance
-        return ((x[:, :d] >= lo) & (x[:, :d] <= hi)).all(axis=1)
+        outside: np.ndarray = (x[:, :d] < lo) | (x[:, :d] > hi)
+        return np.logical_not(outside.any(axis=1))
 
 
 class Inflow(VelocityNodes):
