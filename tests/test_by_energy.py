@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from itertools import pairwise
 from math import sqrt
 
 import numpy as np
@@ -518,6 +519,60 @@ def test_a_formula_with_fibres_needs_no_other_material(tmp_path):
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+RING = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, -1, 1, -1, 1, 0.5)
+    region(all, block, INF, INF, INF, INF)
+    material(m, hyperelastic, 1, (I1 - 3 - 2*log(J)) + (J - 1)^2 + 3*(I4 - 1)^2, fibre={})
+"""
+
+
+def test_each_point_has_its_own_fibres(run_interpreted):
+    """tau = 2 (b - I) + 2 J (J - 1) I + 12 (I4 - 1) a a (Holzapfel 2000, equation 6.212)."""
+    script = (
+        RING.format("(-y0, 2*x0, 0)")
+        + """
+        solid(s, region, all, 1, m, 0.5)
+        group(nodes, nodes, region, all, all)
+        fix(pull, velocity_nodes, nodes, 2*x0 + 0.5*y0, -y0)
+        dump(d, all, particle, 1, d.*.LAMMPS, x0, y0, fibre_x, fibre_y, s11, s22, s12)
+        set_dt(0.1)
+        run(1)
+        """
+    )
+    last = run_interpreted(script).snapshots("d")[-1]
+    names = ("x0", "y0", "fibre_x", "fibre_y", "s11", "s22", "s12")
+    x, y, ax, ay, *stress = [last[name] for name in names]
+    a = np.array([-y, 2 * x]) / np.hypot(y, 2 * x)
+    assert len(x) == 16 and np.allclose([ax, ay], a, atol=1e-6)
+    F = np.array([[1.2, 0.05], [0, 0.9]])
+    a, J = F @ a, np.linalg.det(F)
+    isotropic = 2 * (F @ F.T - np.eye(2)) + 2 * J * (J - 1) * np.eye(2)
+    tau = isotropic[..., None] + 12 * ((a * a).sum(axis=0) - 1) * a[:, None] * a[None]
+    assert np.allclose(stress, [tau[0, 0] / J, tau[1, 1] / J, tau[0, 1] / J], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("fibre", "says", "marked"),
+    [
+        ("(x0 - 0.25, y0 - 0.25, 0)", "(0, 0, 0) at the point x0 = 0.25, y0 = 0.25", "(x0"),
+        ("(sqrt(x0), 1, 0)", "(nan, 1, 0) at the point", "(sqrt"),
+        ("(x0, time, 0)", "cannot depend on time", "time"),
+        ("(1, 0, x0)", "shear out of its plane", "material"),
+    ],
+)
+def test_formulas_that_are_no_direction(run_interpreted, fibre, says, marked):
+    script = RING.format(fibre) + "    solid(s, region, all, 1, m, 0.5)\n    run(0)\n"
+    err = run_interpreted(script, status=int(marked != "material")).err
+    line, marks = next(pair for pair in pairwise(err.splitlines()) if {*pair[1]} == {*" |^"})
+    assert says in err and line[marks.index("^") :].startswith(marked)
+
+
+def test_an_element_has_no_place(run_interpreted):
+    script = RING.format("(-y0, x0, 0)") + "    load_path(p, 1, exx=0.1)\n    element(e, m, p)\n"
+    assert "differ from point to point" in run_interpreted(script, status=1).err
 
 
 def test_laws_with_fibres_are_not_wrapped(run_interpreted):

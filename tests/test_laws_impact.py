@@ -247,6 +247,24 @@ def test_foam_is_on_its_yield_surface(steps):
         assert lost + stored == pytest.approx(work, rel=2e-2)
 
 
+@pytest.mark.parametrize(
+    ("strength", "sides"),
+    [(FOAM, -0.2), (MohrCoulomb.given(4.0, 1e-3, 30, 30), 0.6)],
+)
+def test_volume_energy_is_what_unloading_gives_back(strength, sides):
+    """Jp K (1 - Je)^2/2: the pressure works on the volume that plastic flow has left."""
+    K = 0.9
+    law = EosStrength(LinearPressure(4.0, K), strength)
+    F = 1e-3 * np.diag([-1.0, sides, sides])
+    state, work = worked(law, SPACE, start(law, SPACE), F, 300)
+    Jp = state.J / (1 - pressure_of(law, SPACE, state) / K)
+    exact = Jp * 0.5 * pressure_of(law, SPACE, state) ** 2 / K
+    assert abs(Jp - 1) > 0.02
+    assert volume_energy(law, state.J, state.m) == pytest.approx(exact, rel=1e-9)
+    known = energy_density(law, SPACE, state) + dissipated_energy(law, SPACE, state)
+    assert known == pytest.approx(work, rel=2e-3)
+
+
 def test_foam_is_pressed_with_its_plastic_poissons_ratio(run_interpreted):
     script = """eos(f, linear, 0.25, 0.4)
 strength(f, crushable-foam, 0.4, 1.7e-3, 0.1, 1e-3)

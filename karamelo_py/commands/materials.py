@@ -12,6 +12,7 @@ from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
 from karamelo_py.points.laws import can, constrained_velocity
 from karamelo_py.points.laws.doubts import doubts
+from karamelo_py.points.laws.placed import place_of
 from karamelo_py.points.laws.thin import ThinInLargeIncrements
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.run.lower.check_plugins import try_law
@@ -268,6 +269,9 @@ def element(
     if can(material.law, constrained_velocity):
         message = f"material '{material.id}' is rigid: it has no strain and no stress"
         raise ScriptError(message, argument="material", expected="a material that deforms")
+    if place_of(material.whole):
+        message = f"the directions of material '{material.id}' differ from point to point"
+        raise ScriptError(message, argument="material", expected="directions given by numbers")
     law, kin = material.filled, KINEMATICS.get(kinematics)
     if kin is None:
         law = ThinInLargeIncrements(material.whole)

@@ -88,11 +88,11 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
                 return function(within, *arguments)
             kinematics, state, *others = arguments
             first = kinematics if kin is None else kin
-            made = function(within, first, getattr(state, kept), *others)
+            made = function(law_here(law, within, state), first, getattr(state, kept), *others)
             return state._replace(**{kept: made}) if changes else made
 
     for function in functions:
-        register(function, function in (with_temperature, with_stress, warmed, lit))
+        register(function, function in (advance, with_temperature, with_stress, warmed, lit))
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
@@ -101,7 +101,8 @@ def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = N
 
     @within.on(outer)
     def _within(law, kinematics, state):
-        return getattr(law, component), kinematics if kin is None else kin, getattr(state, kept)
+        first = kinematics if kin is None else kin
+        return law_here(law, getattr(law, component), state), first, getattr(state, kept)
 
 
 _columns: dict[type, dict[str, NamedTuple]] = {}
@@ -129,6 +130,12 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
         tags = {name: Within(tag) for name, tag in tags.items()}
     bases = type(law).__mro__
     return tags | next((_columns[kind] for kind in bases if kind in _columns), {})
+
+
+@point_function(otherwise=True)
+def law_here(law, within, state):
+    """Return the law `within` another, with numbers that differ from point to point."""
+    return within
 
 
 @point_function()

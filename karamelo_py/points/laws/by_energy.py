@@ -43,7 +43,6 @@ class ByEnergy(OfDeformation):
     __slots__ = ()
     traits = LawTraits(rebounds=True)
     in_lanes = True
-    directions: ClassVar[tuple[str, ...]] = ()  # fields with components of fibres at rest
     start: ClassVar[int]  # index of the formula's first number
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
@@ -79,15 +78,16 @@ IN_STRETCHES = {
 def law_of(
     rho: float,
     energy: Expression,
-    directions: Sequence[float] = (),
+    directions: tuple = (),
     T: float = 293.0,
     kind: type[ByEnergy] = OfInvariants,
 ) -> NamedTuple:
     """Build the law with this stored energy per reference volume.
 
-    `directions` holds unit vectors a0 and b0 if the formula contains I4 or I6, `T` the temperature
-    at rest; `kind` is the class of a law of invariants. Raise ScriptError for operations without a
-    derivative, stress or no stiffness at rest, and formulas that distinguish principal directions.
+    `directions` are :class:`~karamelo_py.points.laws.fibres.Fibres` if the formula contains I4 or
+    I6, `T` the temperature at rest; `kind` is the class of a law of invariants. Raise ScriptError
+    for operations without a derivative, stress or no stiffness at rest, and formulas that
+    distinguish principal directions.
     """
     term = replaced(energy, {"I3": to_power(Expression.seed("J"), 2)})
     check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
@@ -109,8 +109,9 @@ def law_of(
     if directions:
         codes |= _along_fibres(term, writer)
     codes["in_lanes"] = kind.in_lanes and in_lanes(codes["energy"])
-    values = (1 / rho, lam, G, at_rest, *directions)
-    fields = dict(zip((*FIELDS, *kind.directions), values, strict=True))
+    fields: dict[str, Any] = dict(zip(FIELDS, (1 / rho, lam, G, at_rest), strict=True))
+    if directions:
+        fields["directions"] = directions
     return writer.law(kind, fields, codes, T=T)
 
 

@@ -16,7 +16,9 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.by_energy import ByEnergy, first_instability
 from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
+from karamelo_py.points.laws.placed import Placed
 from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
+from karamelo_py.points.laws.thermoelastic import Thermoelastic
 
 SLOW = 0.01  # wave speed in m/s or mm/ms if density and modulus are exchanged
 SMALL = 2.0  # degrees; a smaller friction angle is likely in radians
@@ -47,6 +49,8 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
         yield from _doubts_of_expansion(alpha, "the coefficient of linear expansion")
     if isinstance(law, EosStrength):
         yield from _doubts_of_parts(law, state)
+    while isinstance(law, Thermoelastic | Placed):
+        law = law.elastic
     if isinstance(law, ByEnergy) and (unstable := first_instability(law)):
         path, stretch = unstable
         yield (

@@ -161,7 +161,8 @@ class EosStrength(NamedTuple):
         laws = {
             k: law for component in (eos, strength, *parts) for k, law in component.laws.items()
         }
-        if strengths.elastic_ratio.defined(type(laws["strength"])) and not (
+        volumes = strengths.elastic_ratio, strengths.inelastic_ratio
+        if any(one.defined(type(laws["strength"])) for one in volumes) and not (
             ratio_at_pressure.defined(type(laws["eos"]))
         ):
             raise ScriptError(
@@ -338,11 +339,17 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     memories = zip((m.strength, memory), volumes, strict=False)
     elastic = [strengths.elastic_ratio(law.strength, old, j) for old, j in memories]
     elastic = eos.VolumeStep(*elastic, dt)
-    energy = eos.compressed(law.eos, m.energy, elastic, work + viscous_work)
+    heating = work + viscous_work
+    for inelastic in strengths.inelastic_ratio(law.strength, memory):
+        heating /= inelastic
+    energy = eos.compressed(law.eos, m.energy, elastic, heating)
     crushed = eos.crush_work(law.eos, m.energy, energy, elastic)
+    for inelastic in strengths.inelastic_ratio(law.strength, memory):
+        crushed = inelastic * crushed
     flow = strengths.equivalent_plastic_strain(law.strength, memory)
     flow -= strengths.equivalent_plastic_strain(law.strength, m.strength)
     now = m._replace(energy=energy, viscous=viscous, strength=memory)
+    work -= energy_of_swelling(law, J, m.strength, now)
     intact = State(J, s, now)
     damage = damage_after_flow(law, intact, flow, volumes)
     heat = heated(law.temperature, m.heat, (work + crushed) * laws.specific_volume(law.eos))
@@ -370,17 +377,49 @@ def intact_pressure(law, j, m):
     return further_pressure(law.further, m.further, p)
 
 
+def energy_of_swelling(law, j, before, m):
+    """Return the elastic energy of a plastic change of volume, which changes what is stored."""
+    ratios = [strengths.inelastic_ratio(law.strength, memory) for memory in (before, m.strength)]
+    elastic, energy = strengths.elastic_ratio(law.strength, m.strength, j), 0
+    for old, new in zip(*ratios, strict=True):
+        energy += (new - old) * energy_to_unload(law, elastic, m)
+    return energy
+
+
 def volume_energy(law, j, m):
     """Return the volumetric energy of the intact material at its temperature."""
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
-    energy = eos.compression_energy(law.eos, elastic, m.energy)
-    energy += strengths.added_energy(law.strength, law, elastic, m)
-    energy -= eos.stored_heat(law.eos, sum(m.loss))
+    energy = energy_of_elastic_volume(law, elastic, m)
+    for inelastic in strengths.inelastic_ratio(law.strength, m.strength):
+        # The pressure works on the volume after plastic flow.
+        energy += (inelastic - 1) * energy_to_unload(law, elastic, m)
+    return energy
+
+
+def energy_to_unload(law, elastic, m):
+    """Return the energy per elastic volume that a release of the pressure gives back."""
+    energy = energy_of_elastic_volume(law, elastic, m)
+    if len(m.heat):
+        # without pressure a warm point is larger than at rest
+        warm = warm_pressure(law, elastic, m)
+        K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
+        energy += 0.5 * warm * warm * elastic / K
+    return energy
+
+
+def warm_pressure(law, elastic, m):
     warm = sum(thermal_pressure(law.temperature, m.heat))
     if len(m.heat):  # the equation of state's thermal pressure
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
-    return energy + warm * (1 - elastic)
+    return warm
+
+
+def energy_of_elastic_volume(law, elastic, m):
+    energy = eos.compression_energy(law.eos, elastic, m.energy)
+    energy += strengths.added_energy(law.strength, law, elastic, m)
+    energy -= eos.stored_heat(law.eos, sum(m.loss))
+    return energy + warm_pressure(law, elastic, m) * (1 - elastic)
 
 
 def full_pressure(law, j, m):

@@ -1,11 +1,12 @@
 """Stress and stiffness of fibres in hyperelastic laws."""
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
 
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.laws.by_energy import (
-    FIELDS,
     OfInvariants,
     invariants,
     shear_of_matrix,
@@ -15,38 +16,51 @@ from karamelo_py.points.laws.by_energy import (
 )
 from karamelo_py.points.laws.formulas import Code, evaluated
 from karamelo_py.points.laws.leaning import warn_of_leaning
+from karamelo_py.points.laws.placed import DirectionShown, Placed, directions_in
 
 LEANS = 1e-9
-FIRST = len(FIELDS)  # index of a direction's first component
+
+
+class Fibres(NamedTuple):
+    """Components of the unit vectors a0 and b0 of two families at rest."""
+
+    in_lanes = True
+
+    a1: Any
+    a2: Any
+    a3: Any
+    b1: Any
+    b2: Any
+    b3: Any
 
 
 class OfFibres(OfInvariants):
-    """Adds I4 = a0.C a0 and I6 = b0.C b0 for the unit vectors a0, b0 of two families."""
+    """Adds I4 = a0.C a0 and I6 = b0.C b0 for two families, with a field `directions`."""
 
     __slots__ = ()
-    directions = ("a1", "a2", "a3", "b1", "b2", "b3")
     along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
     twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
     mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
 
 
-def _leans(law: Any, scene: Any) -> bool:
-    a, b = law[FIRST : FIRST + 3], law[FIRST + 3 : FIRST + 6]
-    pairs = {1: ((0, 1), (0, 2), (1, 2)), 2: ((0, 2), (1, 2)), 3: ()}[scene.d]
-    return any(abs(a[i] * a[j] + b[i] * b[j]) > LEANS for i, j in pairs)
+def _leans(directions: Any, d: int) -> bool:
+    a, b = directions[:3], directions[3:]
+    pairs = {1: ((0, 1), (0, 2), (1, 2)), 2: ((0, 2), (1, 2)), 3: ()}[d]
+    return any(np.max(abs(a[i] * a[j] + b[i] * b[j])) > LEANS for i, j in pairs)
 
 
-warn_of_leaning(
-    OfFibres,
-    "fibres",
-    _leans,
-    cure="a 3D scene, fibres along x, y or z, or two families that mirror each other",
-)
+INSTEAD = "a 3D scene, fibres along x, y or z, or two families that mirror each other"
+warn_of_leaning(OfFibres, "fibres", lambda law, scene: _leans(law.directions, scene.d), INSTEAD)
+
+
+def _lean_somewhere(law: Any, scene: Any) -> bool:
+    rows = directions_in(law, scene)
+    return bool(len(rows)) and _leans(rows.T, scene.d)
 
 
 def fibre(law, F, family):
     """Return a0 a0 of a family, with the components of C."""
-    a = law[FIRST + 3 * family : FIRST + 3 * family + 3]
+    a = law.directions[3 * family : 3 * family + 3]
     made = F.symmetric
     return made._make([a[i] * a[j] for i, j in made.places])
 
@@ -102,6 +116,27 @@ def _shear_part_of_fibres(law, kin, state):
     at = variables(law, state.F, b)
     both = shear_of_matrix(law, b, at) + stiffness_of_fibres(law, b, at)
     return both * law.specific_volume
+
+
+class PlacedFibre(Placed):
+    """One family by formulas of place."""
+
+    __slots__ = ()
+
+
+class PlacedFibres(PlacedFibre):
+    """Two families, of which one is by formulas of place, or both."""
+
+    __slots__ = ()
+
+
+warn_of_leaning(PlacedFibre, "fibres", _lean_somewhere, INSTEAD)
+
+
+for _axis, _letter in enumerate("xyz"):
+    laws.column(PlacedFibre, f"fibre_{_letter}", DirectionShown(_axis))
+    laws.column(PlacedFibres, f"fibre_{_letter}", DirectionShown(_axis))
+    laws.column(PlacedFibres, f"fibre2_{_letter}", DirectionShown(3 + _axis))
 
 
 @laws.is_round.on(OfFibres)

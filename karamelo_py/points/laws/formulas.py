@@ -116,7 +116,7 @@ class ProgramWriter:
                 self._append(operand, made)
             made.append((operation, None))
 
-    def law(self, kind: type, fields: dict[str, float], codes: dict[str, Any], **named: float):
+    def law(self, kind: type, fields: dict[str, Any], codes: dict[str, Any], **named: float):
         """Return a NamedTuple of `kind` with `fields` and numbers; `named` numbers may change."""
         numbers = [key if isinstance(key, str) else f"number{k}" for key, k in self.numbers.items()]
         name = f"{kind.__name__}_{sha256(repr((codes, numbers)).encode()).hexdigest()[:16]}"

@@ -2,7 +2,6 @@
 
 from collections import namedtuple
 from collections.abc import Sequence
-from math import hypot
 from typing import Any, ClassVar
 
 from karamelo_py.language.arguments import Argument
@@ -15,29 +14,15 @@ from karamelo_py.points.laws.by_energy import (
     OfInvariants,
     law_of,
 )
-from karamelo_py.points.laws.fibres import OfFibres
+from karamelo_py.points.laws.fibres import Fibres, OfFibres, PlacedFibre, PlacedFibres
 from karamelo_py.points.laws.formulas import FormulaOf, with_numbers
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.placed import Direction, Vector, nominal, placed
 from karamelo_py.points.laws.thermoelastic import expanding
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
 SEEDS = (*INVARIANTS, "I3", *FIBRES, *STRETCHES, "T")
-
-
-class Direction:
-    """Script argument: a unit vector from ``(x, y, z)``."""
-
-    script_kind: ClassVar[str] = "a direction (x, y, z)"
-
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> tuple[float, ...]:
-        values = [one.value(hub) for one in argument.listed()]
-        components = [one for one in values if isinstance(one, float)]
-        if len(values) != 3 or len(components) != 3 or not any(components):
-            message = f"'{argument.text}' is no direction"
-            raise ScriptError(message, mark=argument.mark, expected="(x, y, z), not (0, 0, 0)")
-        return tuple(one / hypot(*components) for one in components)
 
 
 class EnergyFormula(FormulaOf):
@@ -76,7 +61,7 @@ class HyperelasticFormula(OfInvariants, Fields):
         fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Script
         variables are numbers. At rest I1 = I2 = 3, the others 1.
     fibre, fibre2
-        Directions of the fibres at rest, for I4 and I6.
+        Directions of the fibres at rest, for I4 and I6: numbers, or formulas of x0, y0, z0.
     cp, kappa, alpha
         Heat capacity per mass, conductivity and coefficient of linear expansion of a material with
         a temperature, as for neo-hookean.
@@ -87,6 +72,7 @@ class HyperelasticFormula(OfInvariants, Fields):
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
     material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(1, 1, 0))
+    material(ring, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(-y0, x0, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
     material(warm, hyperelastic, 1000, 700*T*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2, cp=2000, kappa=0.2)
 
@@ -133,14 +119,28 @@ class HyperelasticFormula(OfInvariants, Fields):
                 message = f"the energy does not contain {name}"
                 raise ScriptError(message, argument=option, expected=f"a formula with {name}")
         one = fibre or fibre2
-        unit = (*(fibre or one), *(fibre2 or one)) if one else ()
-        kind = OfFibres if unit else OfInvariants
-        return expanding(law_of(rho, energy, unit, T, kind), cp, kappa, alpha, T)
+        fibres = (fibre or one, fibre2 or one) if one else ()
+        return of_energy(rho, energy, fibres, T, (cp, kappa, alpha))
 
 
-def ready(rho: float, formula: str, directions: Sequence[float] = (), **numbers: float) -> Any:
-    kind = OfFibres if directions else OfInvariants
-    return law_of(rho, with_numbers(formula, **numbers), directions, kind=kind)
+def of_energy(
+    rho: float,
+    energy: Expression,
+    fibres: Sequence[Vector | Direction] = (),
+    T: float = 293.0,
+    heat: tuple = (None, None, 0.0),
+) -> Any:
+    """Return a law with the directions of two families of `fibres`, if there are some."""
+    if not fibres:
+        return expanding(law_of(rho, energy, (), T), *heat, T=T)
+    law = expanding(law_of(rho, energy, Fibres(*nominal(*fibres)), T, OfFibres), *heat, T=T)
+    return placed(law, PlacedFibre if fibres[0] is fibres[1] else PlacedFibres, *fibres)
+
+
+def ready(
+    rho: float, formula: str, fibres: Sequence[Vector | Direction] = (), **numbers: float
+) -> Any:
+    return of_energy(rho, with_numbers(formula, **numbers), fibres)
 
 
 VOLUME = "K/2*(J - 1)^2"
@@ -396,7 +396,8 @@ class Holzapfel(OfFibres, Fields):
     K
         Bulk modulus.
     fibre, fibre2
-        Directions of one or two families at rest; in axisymmetry (radius, axis, hoop).
+        Directions of one or two families at rest: numbers, or formulas of x0, y0, z0; in
+        axisymmetry (radius, axis, hoop).
 
     Example
     -------
@@ -425,5 +426,4 @@ class Holzapfel(OfFibres, Fields):
         families = ("I4", "I6") if fibre2 else ("I4",)
         fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in families]
         formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
-        directions = (*fibre, *(fibre2 or fibre))
-        return ready(rho, formula, directions, G=G, k1=k1, k2=k2, K=K)
+        return ready(rho, formula, (fibre, fibre2 or fibre), G=G, k1=k1, k2=k2, K=K)

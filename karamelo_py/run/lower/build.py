@@ -30,6 +30,7 @@ from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
+from karamelo_py.points.laws.placed import with_directions
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.transfers import flip_coefficient, lost_fractions, stores_moment
 from karamelo_py.run import periodic
@@ -376,7 +377,7 @@ def lower_points(
         state = laws.initial_state(law, kin, real(1))
         if solid.T0 is not None:
             state = laws.with_temperature(law, kin, state, real(solid.T0))
-        return np.array(flat(state), real)[:, None]
+        return with_directions(state, np.array(flat(state), real)[:, None], hub.values, solid)
 
     states = (at_rest(s, law_in(k, real)) for s, k in zip(solids, law_of_solids, strict=True))
     places = joined((method.places(kin, s, real).T for s in solids), real)

@@ -99,8 +99,16 @@ def no_loss_yet(strength, template):
 
 
 @point_function(otherwise=True)
+def inelastic_ratio(strength, memory):
+    """Return (ratio,), the part of the volume ratio that is plastic or that of gaps, or ()."""
+    return ()
+
+
+@point_function(otherwise=True)
 def elastic_ratio(strength, memory, j):
     """Return the elastic part of the volume ratio j, which determines pressure."""
+    for inelastic in inelastic_ratio(strength, memory):
+        j = j / inelastic
     return j
 
 

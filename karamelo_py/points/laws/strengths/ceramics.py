@@ -18,7 +18,7 @@ from karamelo_py.points.laws.parameters import AboveZero, FromZero, reference_ra
 from karamelo_py.points.laws.strengths import (
     added_energy,
     added_pressure,
-    elastic_ratio,
+    inelastic_ratio,
     remembers,
     respond,
 )
@@ -183,10 +183,10 @@ remembers(Concrete, ep=0.0, damage=0.0, bulking=0.0, opened=1.0)
 remembers(JohnsonHolmquist2, ep=0.0, damage=0.0, bulking=0.0, opened=1.0)
 
 
-@elastic_ratio.on(Concrete)
-@elastic_ratio.on(JohnsonHolmquist2)
-def _elastic_ratio_johnson_holmquist(strength, memory, j):
-    return j / memory.opened
+@inelastic_ratio.on(Concrete)
+@inelastic_ratio.on(JohnsonHolmquist2)
+def _inelastic_ratio_johnson_holmquist(strength, memory):
+    return (memory.opened,)
 
 
 @added_pressure.on(JohnsonHolmquist2)

@@ -29,6 +29,7 @@ from karamelo_py.points.laws.strengths import (
     FrictionTrial,
     elastic_ratio,
     fbar_fraction,
+    inelastic_ratio,
     pressure_response,
     remembers,
     respond,
@@ -86,15 +87,15 @@ def sines(strength, friction, dilation):
     return friction, dilation
 
 
-def elastic_part(strength, memory, j):
-    return j / (memory.Jp * memory.Js)
+def plastic_and_gaps(strength, memory):
+    return (memory.Jp * memory.Js,)
 
 
 def respond_by_friction(strength, law, kin, step, memories):
     """Return the stress to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
-    elastic = elastic_part(strength, memory, step.j)
+    elastic = elastic_ratio(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
     # with the pores that the trial crushes
     energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
@@ -104,7 +105,7 @@ def respond_by_friction(strength, law, kin, step, memories):
         # Separation closes before the point sustains pressure.
         closed, _ = at_pressure(law.eos, elastic, memories.energy, -warm - extra, heat)
         memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
-        elastic = elastic_part(strength, memory, step.j)
+        elastic = elastic_ratio(strength, memory, step.j)
         energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
         p_point = pressure(law.eos, elastic, energy, heat) + warm
     K = bulk_modulus(law.eos, elastic, energy, heat)
@@ -129,7 +130,7 @@ def respond_by_friction(strength, law, kin, step, memories):
 def frictional(strength: type) -> None:
     """Give `strength` (with ``G`` and the fields of `surface`) its memory and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
-    elastic_ratio.on(strength)(elastic_part)
+    inelastic_ratio.on(strength)(plastic_and_gaps)
     respond.on(strength)(respond_by_friction)
     fbar_fraction.on(strength)(fraction_by_dilatancy)
     warn = partial(known_failure, strength)

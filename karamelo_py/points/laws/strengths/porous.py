@@ -14,7 +14,7 @@ from karamelo_py.points.laws.eos import (
     pressure,
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
-from karamelo_py.points.laws.strengths import elastic_ratio, remembers, respond
+from karamelo_py.points.laws.strengths import inelastic_ratio, remembers, respond
 from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yield_surface
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
@@ -173,10 +173,10 @@ def most_recovered(strength, memory):
     return inf
 
 
-@elastic_ratio.on(CrushableFoam)
-@elastic_ratio.on(Gurson)
-def _elastic_ratio_porous(strength, memory, j):
-    return j / memory.Jp
+@inelastic_ratio.on(CrushableFoam)
+@inelastic_ratio.on(Gurson)
+def _inelastic_ratio_porous(strength, memory):
+    return (memory.Jp,)
 
 
 @respond.on(CrushableFoam)

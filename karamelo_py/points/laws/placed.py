@@ -1,0 +1,216 @@
+"""Directions of a law by formulas of place: numbers of each point, stored in its state.
+
+A law that allows it has a field ``directions``, a NamedTuple of numbers; `Placed` wraps it and
+replaces them by the point's. A :class:`Place` in the law has the formulas. The state starts with
+nominal directions; `with_directions` sets each point's when a scene is lowered.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from karamelo_py.compiler.tuples import count_in
+from karamelo_py.language.arguments import Argument
+from karamelo_py.language.scene import Scene
+from karamelo_py.points import laws
+from karamelo_py.points.laws.thermoelastic import Thermoelastic, warmed_elastic
+from karamelo_py.script.errors import Mark, ScriptError
+from karamelo_py.script.expressions import FIRST, Expression
+from karamelo_py.script.values import Values
+
+Vector = tuple[float, ...]
+SOME = 1000  # points of a solid whose directions are judged before a run
+
+
+class Direction:
+    """Script argument: a direction ``(x, y, z)`` of numbers or of formulas of x0, y0, z0.
+
+    Numbers give a unit vector, formulas a `Direction`.
+    """
+
+    script_kind: ClassVar[str] = "a direction (x, y, z)"
+
+    def __init__(self, formulas: tuple[Expression, ...], mark: Mark | None):
+        self.formulas = formulas
+        self.mark = mark
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> "Vector | Direction":
+        values = [one.value(hub) for one in argument.listed()]
+        formulas = tuple(Expression(one) for one in values if not isinstance(one, str))
+        if len(values) != 3 or len(formulas) != 3:
+            raise ScriptError(
+                f"'{argument.text}' is no direction",
+                mark=argument.mark,
+                expected="(x, y, z), not (0, 0, 0)",
+            )
+        for part, one in zip(argument.listed(), formulas, strict=True):
+            if others := one.names - FIRST:
+                raise ScriptError(
+                    f"a direction at rest cannot depend on {min(others)}",
+                    mark=part.mark,
+                    expected="a number, or a formula of x0, y0, z0",
+                )
+        if any(one.names for one in formulas):
+            return cls(formulas, argument.mark)
+        return unit_vector([one.constant for one in formulas], argument)
+
+    def at(self, values: Values, x0: np.ndarray) -> np.ndarray:
+        """Return unit vectors (n, 3) at positions `x0` (n, d)."""
+        a = [one.evaluate_points(values, x0) for one in self.formulas]
+        size = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+        if not (wrong := ~(np.isfinite(size) & (size > 0))).any():
+            return np.stack(a, axis=1) / size[:, None]
+        k = int(np.flatnonzero(wrong)[0])
+        place = ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0[k], strict=False))
+        raise ScriptError(
+            f"the direction is ({', '.join(f'{one[k]:g}' for one in a)}) at the point {place}",
+            mark=self.mark,
+            expected="three numbers at every point, not all 0",
+        )
+
+
+def unit_vector(components: Sequence[float], argument: Argument) -> Vector:
+    size = hypot(*components)
+    if not 0 < size < np.inf:
+        raise ScriptError(
+            f"'{argument.text}' is no direction",
+            mark=argument.mark,
+            expected="(x, y, z), not (0, 0, 0)",
+        )
+    return tuple(one / size for one in components)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Formulas of the directions of a law; in kernels a number that nothing reads."""
+
+    of: tuple[Vector | Direction, ...]
+
+    def __float__(self) -> float:
+        return 0.0
+
+    def rows(self, values: Values, x0: np.ndarray) -> np.ndarray:
+        """Return the numbers (n, k) of the law's field ``directions`` at `x0` (n, d)."""
+        return np.hstack(
+            [
+                one.at(values, x0) if isinstance(one, Direction) else np.tile(one, (len(x0), 1))
+                for one in self.of
+            ]
+        )
+
+
+def placed(law: Any, kind: "type[Placed]", *of: Vector | Direction) -> Any:
+    """Return `law`, or a `kind` of `Placed` with it if some of its directions are formulas."""
+    if not any_formula(of):
+        return law
+    if isinstance(law, Thermoelastic):
+        return law._replace(elastic=placed(law.elastic, kind, *of))
+    return kind(law, Place(of))
+
+
+def nominal(*of: Vector | Direction) -> Vector:
+    """Return the numbers of directions, or x for all if some are formulas."""
+    return sum(((1.0, 0.0, 0.0) if any_formula(of) else one for one in of), ())
+
+
+def any_formula(of: Sequence[Vector | Direction]) -> bool:
+    return any(isinstance(one, Direction) for one in of)
+
+
+def directions_in(law: "Placed", scene: Any) -> np.ndarray:
+    """Return the directions (n, k) of some points of a scene with this law."""
+    rows = [
+        law.place.rows(scene.hub.values, solid.places[: min(solid.count, SOME)])
+        for solid in scene.hub.solids.values()
+        if place_of(solid.material.law) is law.place
+    ]
+    return np.vstack(rows) if rows else np.empty((0, 0))
+
+
+def place_of(law: Any) -> Place | None:
+    """Return the formulas of a law or of one that it wraps."""
+    return next((one.place for one in laws.law_parts(law) if isinstance(one, Placed)), None)
+
+
+def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any) -> np.ndarray:
+    """Return the state (k, 1) of a solid at rest, or (k, n) if the directions of points differ."""
+    place = place_of(solid.material.law)
+    if place is None:
+        return column
+    rows = place.rows(values, solid.x0).T
+    first, columns = index_of_directions(state), np.repeat(column, solid.count, axis=1)
+    columns[first : first + len(rows)] = rows
+    return columns
+
+
+def index_of_directions(state: tuple) -> int:
+    """Return the place of a point's first direction in its flat state, or -1."""
+    before = 0
+    for item in state:
+        if isinstance(state, State) and item is state.here:
+            return before
+        inside = index_of_directions(item) if isinstance(item, tuple) else -1
+        if inside >= 0:
+            return before + inside
+        before += count_in(item) if isinstance(item, tuple) else 1
+    return -1
+
+
+class Placed(NamedTuple):
+    """A law whose ``directions`` differ from point to point."""
+
+    in_lanes = True
+    traits = laws.LawTraits(rebounds=True)
+
+    elastic: Any
+    place: Place
+
+
+class State(NamedTuple):
+    elastic: Any
+    here: Any  # directions of the point
+
+
+@laws.initial_state.on(Placed)
+def _initial_state_placed(law, kin, template):
+    return State(laws.initial_state(law.elastic, kin, template), law.elastic.directions)
+
+
+@laws.law_here.on(Placed)
+def _law_here_placed(law, within, state):
+    return within._replace(directions=state.here)
+
+
+laws.wraps(
+    Placed, "elastic", "elastic", (
+        laws.advance, laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
+        laws.kirchhoff_stress, laws.cauchy_stress, laws.wave_speed_squared, laws.wave_speed_bound,
+        laws.shear_part, laws.energy_density, laws.elastic_strain, laws.dissipated_energy,
+        laws.damage, laws.damage_initiation, laws.plastic_strain,
+    ),
+)  # fmt: skip
+
+
+class DirectionShown(NamedTuple):
+    """Output column of a component of the point's directions."""
+
+    index: int
+
+
+@laws.shown.on(DirectionShown)
+def _shown_direction(tag, law, kin, state):
+    return state.here[tag.index]
+
+
+@laws.is_round.on(Placed)
+def _is_round_placed(law):
+    return False
+
+
+@warmed_elastic.on(Placed)
+def _warmed_elastic_placed(law, T):
+    return law._replace(elastic=warmed_elastic(law.elastic, T))
