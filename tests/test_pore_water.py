@@ -230,7 +230,7 @@ REFUSED = {
     "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",
     "method(ulcpdi, FLIP, linear, 1, R4)": "method ulcpdi",
     "method(ulmpm, FLIP, linear, 1)\nscheme(usl)": "scheme usl",
-    "method(ulmpm, FLIP, linear, 1)\nscheme(quasi-static)": "scheme quasi-static",
+    "method(ulmpm, FLIP, linear, 1)\nscheme(newmark)": "scheme newmark",
     "method(ulmpm, FLIP, linear, 1)\nanti_volumetric_locking(true)": "anti_volumetric_locking",
     "method(ulmpm, FLIP, linear, 1)\nboundary(reflect)": "boundary(reflect)",
     "method(ulmpm, FLIP, linear, 1)\nprecision(single)": "precision(single)",

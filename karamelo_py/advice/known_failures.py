@@ -237,7 +237,8 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
     change = any(
         not formula.is_constant for formulas in formulas_by_fix.values() for formula in formulas
     )
-    if hub.update.scheme.traits.inertia or hub.update.thermal or steps < 2 or change:
+    flows = hub.update.thermal or any(solid.material.fluid for solid in hub.solids.values())
+    if hub.update.scheme.traits.inertia or flows or steps < 2 or change:
         return
     loads, moves = [], False
     for fix, formulas in formulas_by_fix.items():

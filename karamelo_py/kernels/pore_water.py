@@ -78,4 +78,10 @@ class Water(NamedTuple):
     company = MappingProxyType(COMPANY)
 
 
+class SlowWater(NamedTuple):
+    """Water in load steps, whose equations are in `run.implicit.pore_water`."""
+
+    company = MappingProxyType({MassMomentum: COMPANY[MassMomentum]})
+
+
 impose_pore_pressure = imposing(with_pore_pressure)

@@ -30,6 +30,8 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
         yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.mark
+    if update.scheme.solver == "amg" and any(s.material.fluid for s in hub.solids.values()):
+        yield "solves water in pores directly, not with solver=amg", "solver=direct, or auto", None
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     kin = method.kinematics(hub)

@@ -22,6 +22,7 @@ from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
+from karamelo_py.run.implicit.pore_water import Seepage, is_wet
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool
 from karamelo_py.run.no_number import no_number
@@ -192,7 +193,7 @@ class LoadSteps:
             if loads is not None:
                 # Their work uses the mean of both, like Newmark's velocities.
                 loaded.loads[:] = 0.5 * (loads + loaded.loads)
-            equilibrium = self._equilibrium(dt, before if self.dynamic else None, after)
+            equilibrium = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(equilibrium)
             self._publish(equilibrium, hooks, dt)
             if not take_rows(self.scheme.close, s, simulation.mode, hooks):
@@ -205,6 +206,8 @@ class LoadSteps:
         finally:
             control.values[TIME] = time
         equilibrium.inertia.end(equilibrium.u)
+        if equilibrium.seepage is not None:
+            equilibrium.seepage.end(simulation.fixes.acting)
         finish(control)
         simulation.steps.anew()
         return equilibrium.iterations, equilibrium.residual
@@ -234,7 +237,7 @@ class LoadSteps:
         return s.nodes.sums[:, force : force + s.kin.dimension]
 
     def _equilibrium(
-        self, dt: float, before: np.ndarray | None, after: np.ndarray
+        self, hooks: Tag, dt: float, before: np.ndarray | None, after: np.ndarray
     ) -> "Equilibrium":
         """Find the displacements at which forces balance.
 
@@ -268,6 +271,7 @@ class LoadSteps:
         more = self.seconds, self.fixed_nodes
         newton = Newton(self.scheme, equations, ~bound, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
+        newton.seepage = Seepage(equations, hooks, dt) if is_wet(equations) else None
         try:
             jump = np.where(bound, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
@@ -293,7 +297,8 @@ class LoadSteps:
         self.unknowns = int(np.count_nonzero(~bound))
         self.corrections += iterations
         reaction = newton.reaction(u)
-        return Equilibrium(equations, inertia, pushing, u, fixed, reaction, iterations, residual)
+        solution = newton.seepage, u, fixed, reaction, iterations, residual
+        return Equilibrium(equations, inertia, pushing, *solution)
 
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         holding = [f for f in self.simulation.fixes.acting if "post_update_grid_state" in f.hooks()]
@@ -403,6 +408,7 @@ class Equilibrium(NamedTuple):
     equations: Equations
     inertia: Rest | Motion
     pushing: list[Contact | PushingTool]
+    seepage: Seepage | None
     u: np.ndarray
     fixed: np.ndarray  # components held by fixes
     reaction: np.ndarray

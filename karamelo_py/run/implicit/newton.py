@@ -12,6 +12,7 @@ from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import MOST_MOVED, Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
+from karamelo_py.run.implicit.pore_water import Seepage
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -80,6 +81,7 @@ class Newton:
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
         self.kept: dict = {}  # solver data between corrections
+        self.seepage: Seepage | None = None
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
 
@@ -100,6 +102,8 @@ class Newton:
         for iteration in range(scheme.iterations + 1):
             balance = self.balance(u)
             residual = float(np.linalg.norm(balance[free]) / self._size(u))
+            if self.seepage is not None:
+                residual = max(residual, self.seepage.residual(scheme.tolerance))
             if residual <= scheme.tolerance and not (iteration == 0 and np.any(jump)):
                 return u, iteration, residual
             if interrupted(iteration, residual):
@@ -114,6 +118,8 @@ class Newton:
         forces = self.external - self.inner
         for one in self.pushing:
             forces += one.forces()
+        if self.seepage is not None:
+            forces += self.seepage.forces()
         if self.ghost is not None:
             forces -= self.ghost @ u
         return self.inertia.balance(u, forces)
@@ -151,14 +157,17 @@ class Newton:
                 A = A + more
             b[~free.ravel()] = 0
             self.stiff = np.abs(A.diagonal()).reshape(free.shape)
-        if not np.any(free):
+        if not np.any(free) and self.seepage is None:
             return jump
         rigid = np.where(free[:, :, None], equations.rigid_motions, 0.0)
         accuracy = max(1e-10, min(1e-4, 0.1 * residual))
         try:
             with counted(self.seconds, "solution"):
                 options = rigid.reshape(len(b), -1), accuracy, self.kept
-                x = solvers.solve(self.scheme.solver, A, b, *options).reshape(free.shape)
+                if self.seepage is not None:
+                    x = self.seepage.solve(A, b, jump, free, self.kept).reshape(free.shape)
+                else:
+                    x = solvers.solve(self.scheme.solver, A, b, *options).reshape(free.shape)
         except solvers.Singular:
             raise Loose(SINGULAR, self._loosest(A)) from None
         except solvers.Unconverged:
@@ -197,6 +206,8 @@ class Newton:
             self.inner = equations.respond(u, self.dt)
         for one in self.pushing:
             one.respond(u)
+        if self.seepage is not None:
+            self.seepage.respond(u)
         if not np.all(np.isfinite(self.inner)):
             raise self._wrong(u)
         far = equations.furthest() / self.spacing

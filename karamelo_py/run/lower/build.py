@@ -246,7 +246,8 @@ def lower(
     )
     bodies = lower_bodies(hub, lattices) if fixes_of_bodies(hub) else NoBodies()
     fluids = (solid.material.fluid for solid in hub.solids.values())
-    water = next((fluid.tag for fluid in fluids if fluid is not None), Dry())
+    tag = "tag_in_load_steps" if hub.update.scheme.traits.implicit else "tag"
+    water = next((getattr(fluid, tag) for fluid in fluids if fluid is not None), Dry())
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
         averaging=method.averaging(hub), contact=contact, bodies=bodies,

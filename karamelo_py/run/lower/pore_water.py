@@ -16,7 +16,7 @@ UNDRAINED, DRAINED = 3e-4, 2.0  # c_v t / H^2
 RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
-          "basis": HATS_AND_SPLINES, "scheme": ("musl",), "kinematics": FLAT},
+          "basis": HATS_AND_SPLINES, "scheme": ("musl", "quasi-static"), "kinematics": FLAT},
     without=("heat", "delete", "reflect", "thin", "ranks", "gpu"),
     but={"single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
@@ -25,7 +25,7 @@ RESTRICTIONS = Restrictions(
 
 class PoreWater(NamedTuple):
     restrictions = RESTRICTIONS
-    tag = rows.Water()
+    tag, tag_in_load_steps = rows.Water(), rows.SlowWater()
     point_fields, node_fields = rows.Water.point_fields, rows.Water.node_fields
 
     n: float

@@ -1,0 +1,214 @@
+"""Pore water in load steps: displacements of the soil and nodal pressures together (u-p).
+
+Per node i and step, with the content w of water, Darcy's flux and the volume V of points:
+sum N_i V0 (w' - w) - dt sum V grad N_i . q = 0, q = -k (grad p - rho g). The pressure loads the
+soil with sum V p grad N_i. Backward Euler: stable for any step, of first order.
+
+Displacements and pressures of one basis oscillate where nothing drains. The difference of a
+pressure increment from its mean in the cell gets a compliance per volume, max(0, 3 / M -
+12 k dt / h^2) (Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements
+for coupled solid-deformation/fluid-diffusion"; Zhao & Choo 2020). It sums to 0: no water is lost.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+import scipy.sparse as sp
+
+from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.arrays import MASS, Block, Tag, of_force
+from karamelo_py.kernels.equations.pore_water import (
+    Flux,
+    GivenPressure,
+    RelativeVelocity,
+    WaterSums,
+)
+from karamelo_py.kernels.pore_water import AtWater
+from karamelo_py.kernels.step import take_rows
+from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
+from karamelo_py.points.laws.pore_water import Saturated, State, drag_per_volume, porosity
+from karamelo_py.run.implicit.equations import Equations, valid
+from karamelo_py.run.implicit.solvers import direct
+from karamelo_py.scene.modify import Fix
+
+EPS = 50 * float(np.finfo(float).eps)
+
+
+def is_wet(equations: Equations) -> bool:
+    return any(isinstance(block.laws, Saturated) for block in equations.blocks)
+
+
+class Seepage:
+    """Nodal pressures `p` (m,) of a step, and their equations.
+
+    Arrays of points have one entry per wet point, in the order of `wet`: blocks and their stencils.
+    """
+
+    def __init__(self, equations: Equations, hooks: Tag, dt: float):
+        s, self.d, self.dt = equations.s, equations.d, dt
+        self.equations, self.m = equations, len(equations.nodes)
+        self.wet = [
+            (block, seen)
+            for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True)
+            if isinstance(block.laws, Saturated)
+        ]
+        self._read_points()
+        self._read_stencils()
+        take_rows((AtWater(),), s, equations.mode, hooks)
+        sums, first = field(s.nodes.fields, WaterSums)[equations.nodes], of_force(s.kin)
+        self.weight = sums[:, first : first + self.d].astype(float)
+        mass = np.where(sums[:, MASS] > 0, sums[:, MASS], 1.0)[:, None]
+        density = self.rho * self.content / self.pores
+        self.gravity = density[:, None] * (self.N @ (self.weight / mass))
+        volumes = self.N.T @ self.volume
+        self.present = volumes > 0
+        volumes[~self.present] = 1.0
+        self.p = self.N.T @ (self.volume * self.before) / volumes
+        self.density = self.N.T @ (self.volume * density) / volumes
+        self.given = field(s.nodes.fields, GivenPressure)[equations.nodes, 0].astype(float)
+        self.open = self.present & ~np.isnan(self.given)
+        self._lay_out_flow()
+        self.respond(np.zeros((self.m, self.d)))
+
+    def _read_points(self) -> None:
+        kin, grids = self.equations.s.kin, self.equations.s.grids
+        columns = []
+        for block, _ in self.wet:
+            points, of = block.points, block.points.material
+            numbers = [np.asarray(column)[of] for column in block.laws[1:]]
+            law, records = Saturated(None, *numbers), _laws_of(block)
+            state = State(None, points.state[-2], points.state[-1])
+            n = porosity(law, kin, state)
+            mobility = n * n / drag_per_volume(law, kin, state) * state.content / state.pores
+            per_mass = np.array([float(specific_volume(one)) for one in records])[of]
+            M = np.array([_modulus(one.law, kin) for one in records])[of]
+            numbers = [law.n, law.K, law.rho, mobility, M, grids.spacing[points.grid]]
+            columns.append((per_mass * points.mass, *state[1:], *numbers))
+        every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
+        self.V0, self.content, self.pores, self.n, self.K, self.rho, self.mobility, M, h = every
+        self.before = self.K * np.log(self.content / self.pores)  # pressure
+        self.volume = self.V0 * (self.pores + 1 - self.n)
+        self.compliance = np.maximum(0, 3 / M - 12 * self.mobility * self.dt / (h * h))
+
+    def _read_stencils(self) -> None:
+        pieces = [(seen, valid(seen)) for _, seen in self.wet]
+        self.starts = np.cumsum(np.concatenate([[0], *(seen.count for seen, _ in pieces)]))
+        self.of = np.concatenate([seen.nodes[some] for seen, some in pieces])
+        slopes = [seen.gradients[some][:, : self.d] for seen, some in pieces]
+        self.slopes = np.concatenate(slopes)
+        self.N = self._of_nodes(np.concatenate([seen.weights[some] for seen, some in pieces]))
+        self.G = [self._of_nodes(g) for g in self.slopes.T]
+
+    def _of_nodes(self, data: np.ndarray) -> sp.csr_matrix:
+        return sp.csr_matrix((data, self.of, self.starts), (len(self.starts) - 1, self.m))
+
+    def _lay_out_flow(self) -> None:
+        """Find matrices of flow and of departures from cell means, and the pull of gravity."""
+        cells = np.concatenate([_cells(self.equations, block) for block, _ in self.wet])
+        cells = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
+        points = np.arange(len(cells))
+        within = sp.csr_matrix((np.ones(len(cells)), (points, cells)))
+        shares = within.T @ sp.diags(self.volume)
+        self.mean = within @ sp.diags(1 / np.bincount(cells, self.volume)) @ shares
+        self.D = (self.N - self.mean @ self.N).tocsr()
+        flow = self.dt * self.volume * self.mobility
+        self.L = sum((g.T @ sp.diags(flow) @ g for g in self.G), sp.csr_matrix((self.m, self.m)))
+        self.pull = sum(g.T @ (flow * f) for g, f in zip(self.G, self.gravity.T, strict=True))
+
+    def respond(self, u: np.ndarray) -> None:
+        """Update forces and balances after displacements (m, d) and pressures."""
+        at = self.N @ self.p
+        self._strain(u)
+        self.lift = self.volume * (1 + self.growth)
+        self.loads = (self.B.T @ (self.lift * at)).reshape(-1, self.d) + self.weight
+        ratio, rise = self.content / self.pores, np.expm1((at - self.before) / self.K)
+        more = (self.pores + 1 - self.n) * self.growth
+        self.pores_after = self.pores + more
+        self.gain = ratio * (more * (1 + rise) + self.pores * rise)
+        self.capacity = self.V0 * ratio * self.pores_after * (1 + rise) / self.K
+        departs = at - self.before
+        damped = self.D.T @ (self.volume * self.compliance * (departs - self.mean @ departs))
+        held, moved = self.N.T @ (self.V0 * self.gain), self.L @ self.p
+        self.rest = held + moved - self.pull + damped
+        self.size = max(float(np.linalg.norm(one)) for one in (held, moved, damped))
+
+    def _strain(self, u: np.ndarray) -> None:
+        d = self.d
+        H = np.stack([np.stack([g @ u[:, i] for g in self.G], 1) for i in range(d)], 1)
+        trace = np.trace(H, axis1=1, axis2=2)
+        # det(I + H) - 1, which loses no digits of small strains
+        growth = trace + 0.5 * (trace * trace - np.einsum("pij,pji->p", H, H))
+        self.growth = growth + (np.linalg.det(H) if d == 3 else 0.0)
+        back = np.repeat(np.linalg.inv(np.eye(d) + H), np.diff(self.starts), axis=0)
+        slopes = np.einsum("eji,ej->ei", back, self.slopes)[:, None, :]
+        shape = len(H), self.m * d
+        self.B = sp.bsr_matrix((slopes, self.of, self.starts), shape=shape).tocsr()
+
+    def forces(self) -> np.ndarray:
+        return self.loads
+
+    def residual(self, tolerance: float) -> float:
+        if np.any(self.p[self.open] != self.given[self.open]):
+            return np.inf
+        rest = float(np.linalg.norm(self.rest[~self.open]))
+        rounding = EPS * float(np.linalg.norm(self.N.T @ (self.V0 * self.content)))
+        return rest / max(self.size, rounding / tolerance, 1e-300)
+
+    def solve(
+        self, A: sp.spmatrix, b: np.ndarray, jump: np.ndarray, free: np.ndarray, kept: dict
+    ) -> np.ndarray:
+        """Correct the pressures; return the change of displacements (m d,)."""
+        Q = (self.B.T @ sp.diags(self.lift) @ self.N).tocsr()
+        slow = self.D.T @ sp.diags(self.volume * self.compliance) @ self.D
+        C = (self.L + slow + self.N.T @ sp.diags(self.capacity) @ self.N).tocsr()
+        step = np.where(self.open, self.given - self.p, 0.0)
+        into = -self.rest - C @ step - Q.T @ jump.ravel()
+        moves, seen = free.ravel().astype(float), (self.present & ~self.open).astype(float)
+        b = b + moves * (Q @ step)
+        unknown = sp.diags(seen)
+        Q = sp.diags(moves) @ Q @ unknown
+        C = unknown @ C @ unknown + sp.diags(1 - seen)
+        whole = sp.bmat([[A.tocsr(), -Q], [Q.T, C]], format="csr")
+        x = direct(whole, np.concatenate([b, seen * into]), kept)
+        self.p += x[len(b) :] + step
+        self.p[self.open] = self.given[self.open]
+        return x[: len(b)]
+
+    def end(self, fixes: Iterable[Fix]) -> None:
+        """Write the water of the points; let fixes publish what left through their nodes."""
+        first = 0
+        for block, seen in self.wet:
+            some = slice(first, first := first + len(seen.count))
+            n, state = self.pores_after[some], block.points.state
+            state[-2], state[-1] = self.content[some] + self.gain[some], n
+            flow = self.mobility * (self.gravity.T - np.stack([g @ self.p for g in self.G]))
+            w = field(block.points.fields, RelativeVelocity)
+            w[:] = flow[:, some] * (n + 1 - self.n[some]) / n
+        nodes = self.equations.nodes
+        left = np.where(self.open, -self.density * self.rest / self.dt, 0.0)
+        flux = field(self.equations.s.nodes.fields, Flux)
+        flux[nodes, self.d + 1] = left
+        for fix in fixes:
+            if Flux in fix.node_fields:
+                leaves = float(left[np.isin(nodes, fix.nodes)].sum())
+                fix.hub.values.set(f"{fix.id}_s", leaves)
+
+
+def _laws_of(block: Block) -> list[Tag]:
+    return [record(block.laws, k) for k in range(len(block.laws.n))]
+
+
+def _modulus(law: Tag, kin: Tag) -> float:
+    speed = wave_speed_squared(law, kin, initial_state(law, kin, 1.0))
+    return float(speed / specific_volume(law))
+
+
+def _cells(equations: Equations, block: Block) -> np.ndarray:
+    s, points = equations.s, block.points
+    grids, of = s.grids, points.grid
+    home = points.x[s.control.motion[0].now] if points.home is None else points.home
+    x = home[: equations.d].T
+    origin = np.stack([grids.x0[of], grids.y0[of], grids.z0[of]], 1)[:, : equations.d]
+    cells = np.floor((x - origin) * grids.inv_h[of][:, None] + 1e-9).astype(np.int64)
+    return np.column_stack([of, cells])

@@ -1,0 +1,261 @@
+"""Water in the pores in load steps (u-p), against exact solutions."""
+
+from math import cos, pi, radians
+
+import numpy as np
+import pytest
+from conftest import INPUTS
+
+from comparisons.results import read_dump
+
+scipy = pytest.importorskip("scipy")
+from scipy.integrate import solve_ivp  # noqa: E402
+from scipy.optimize import brentq  # noqa: E402
+from scipy.special import ellipk  # noqa: E402
+from test_pore_water import last, terzaghi  # noqa: E402
+
+pytestmark = pytest.mark.xdist_group("pore water in load steps")
+E, N0, K, SLOW = 1e7, 0.4, 2.2e9, 1e-9
+COLUMN = """
+    N = 16
+    method(tlmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(1, 0, 1, 1/N)
+    region(layer, block, 0, 1)
+    material(clay, {law})
+    pore_water(clay, n=0.4, permeability=1e-9{kozeny})
+    solid(clay, region, layer, 2, clay, 1/N, 0)
+    region(bottom, block, -INF, 1e-6)
+    region(top, block, 1 - 1e-6, INF)
+    group(bottom, nodes, region, bottom, all)
+    group(top, nodes, region, top, all)
+    fix(base, velocity_nodes, bottom, 0)
+    compute(rho, probe, all, rho)
+    compute(s, probe, all, s11)
+    compute(p, probe, all, pore_pressure, x=0)
+    {fixes}
+    set_output(1)
+    log_modify(custom, step, time, rho, s, p, {more}, base_x)
+    {steps}
+"""
+LOADED = """fix(load, force_nodes, top, -{0!r})
+    fix(drain, pore_pressure, top, 0)
+    fix(start, initial_pore_pressure, all, {0!r})"""
+
+
+def column(fixes, steps, *, law="linear, 1590, 1e7, 0", kozeny="", more="drain_s"):
+    """The layer with fixes and `steps`, (duration, count) of load steps or a text."""
+    if not isinstance(steps, str):
+        steps = "".join(f"set_dt({time / n!r})\n    run({n})\n    " for time, n in steps)
+    return COLUMN.format(law=law, kozeny=kozeny, more=more, fixes=fixes, steps=steps)
+
+
+def test_consolidation_over_years_is_that_of_terzaghi(run_script):
+    """Clay of 1e-9 m/s, a year to Tv = 30: 110 steps with errors of the first order in the step."""
+    cv = SLOW / 9810 * E * (K / N0) / (E + K / N0)
+    parts = [(0.01 / cv, 10), (0.09 / cv, 40), (0.9 / cv, 60)]
+    log = run_script(column(LOADED.format(1000.0), parts)).log
+    for T, U_within, p_within in ((0.1, 0.003, 0.005), (0.55, 0.005, 0.007), (1.0, 0.005, 0.006)):
+        at = np.argmin(abs(log["Time"] * cv - T))
+        U, p = terzaghi(log["Time"][at] * cv, 1 - 1 / 64)
+        assert abs(-log["s"][at] / 1000 - U) < U_within
+        assert abs(log["p"][at] / 1000 - p) < p_within
+    assert np.abs(log["base_x"][1:] - 1000).max() < 1e-5
+    settled = 1590 / log["rho"][0] - 1590 / log["rho"][-1]
+    relieved = N0 * (1000 - 2 / pi * log["p"][-1]) / K
+    left = np.sum(np.diff(log["Time"]) * log["drain_s"][1:]) / 1000
+    assert abs(left / (settled + relieved) - 1) < 1e-5
+
+
+def gibson(load, times, cells=100):
+    """Settlements of a clay of height 1 (Gibson, England & Hussey 1967), by finite differences.
+
+    In material coordinates, J' = (k(J) / (J gamma) u_a)_a with u = load + s(J), Kozeny's k and
+    the effective stress s = E/2 (J - 1/J) of a neo-Hookean skeleton.
+    """
+
+    def kozeny(J):
+        n = 1 - (1 - N0) / J
+        return n**3 / (1 - n) ** 2 / (N0**3 / (1 - N0) ** 2) * SLOW / 9810
+
+    def stress(J):
+        return E / 2 * (J - 1 / J)
+
+    end, h = brentq(lambda J: load + stress(J), 0.3, 1), 1 / cells
+
+    def rate(t, J):
+        u, flux = load + stress(J), np.zeros(cells + 1)
+        mean, top = (J[1:] + J[:-1]) / 2, (J[-1] + end) / 2
+        flux[1:-1] = kozeny(mean) / mean * np.diff(u) / h
+        flux[-1] = -kozeny(top) / top * u[-1] / (h / 2)
+        return np.diff(flux) / h
+
+    run = solve_ivp(rate, (0, times[-1]), np.ones(cells), "BDF", times, rtol=1e-8, atol=1e-10)
+    return 1 - run.y.mean(0), 1 - end
+
+
+def test_large_strains_settle_as_gibson_has_it(run_script):
+    """30 % of strain, within 0.2 % of the final settlement: k falls to 5 % where it is dry."""
+    cv, load = SLOW * E / 9810, 3.64e6
+    parts = [(0.001 / cv, 10), (0.009 / cv, 10), (0.09 / cv, 20), (0.9 / cv, 20)]
+    law, kozeny = "neo-hookean, 1590, 1e7, 0", ", kozeny=true"
+    log = run_script(column(LOADED.format(load), parts, law=law, kozeny=kozeny)).log
+    times = np.array([0.1, 0.55, 1.0]) / cv
+    exact, final = gibson(load, times)
+    assert abs(final - 0.2998) < 1e-3
+    for time, settled in zip(times, exact, strict=True):
+        at = np.argmin(abs(log["Time"] - time))
+        assert abs(log["Time"][at] / time - 1) < 1e-6
+        assert abs(1 - 1590 / log["rho"][at] - settled) < 0.0025 * final
+
+
+def test_the_head_of_a_permeameter_falls_exponentially(run_script):
+    """A standpipe of a tenth of the area: h = h0 exp(-k A t / (a L)); its water flows through."""
+    ratio, rate = 0.1, SLOW / 0.1
+    fixes = f"""fix(lid, velocity_nodes, all, 0)
+    fix(drain, pore_pressure, top, 0)
+    fix(pipe, pore_pressure, bottom, 9810*exp(-{rate}*time))"""
+    log = run_script(column(fixes, [(1 / rate, 50)], more="drain_s, pipe_s")).log
+    t, through = log["Time"], -log["pipe_s"]
+    flowed = np.cumsum(through[5:] * np.diff(t)[0]) / 1000 / ratio
+    fell = np.exp(-rate * (t[5:] - np.diff(t)[0])) - np.exp(-rate * t[5:])
+    assert abs(flowed[-1] / fell.sum() - 1) < 0.015
+    assert abs(log["drain_s"][-1] / through[-1] - 1) < 0.01
+
+
+def mandel(nu, k, force, a, b):
+    """Pressure p(x, t), settlements' terms, diffusivity (Mandel 1953; Cheng & Detournay 1988)."""
+    G = E / 2 / (1 + nu)
+    soil = 2 * G * (1 + nu) / 3 / (1 - 2 * nu)
+    whole = soil + K / N0
+    B, nuu = K / N0 / whole, (3 * whole - 2 * G) / 2 / (3 * whole + G)
+    c = 2 * k / 9810 * B**2 * G * (1 - nu) * (1 + nuu) ** 2 / 9 / (1 - nuu) / (nuu - nu)
+    r = (1 - nu) / (nuu - nu)
+    ends = [(pi * i + (1e-9 if i else 1e-3), pi * i + pi / 2 - 1e-12) for i in range(40)]
+    roots = np.array([brentq(lambda z: np.sin(z) - r * z * np.cos(z), *end) for end in ends])
+    A = np.sin(roots) / (roots - np.sin(roots) * np.cos(roots))
+    rates = roots**2 * c / a**2
+    p0 = force * B * (1 + nuu) / 3 / a
+    centre = lambda t: 2 * p0 * np.sum(A * (1 - np.cos(roots)) * np.exp(-rates * t))  # noqa: E731
+    terms = b * force * (1 - nuu) / G / a * A * np.cos(roots)
+    return centre, -b * force * (1 - nu) / 2 / G / a, terms, rates, c, p0
+
+
+@pytest.mark.parametrize("cells", [8, pytest.param(16, marks=pytest.mark.full)])
+def test_the_pressure_rises_first_as_mandel_and_cryer_found(run_script, cells):
+    """Between plates, the pressure at the centre rises by 11 % before it falls."""
+    centre, settled, terms, rates, c, p0 = mandel(0.2, 1e-8, 1e4, 1.0, 0.5)
+    first, now, before = 1e-4 / c, "exp(-{1!r}*time)", "exp(-{1!r}*max(time - dt, 0))"
+    sums = [f"({one})*({now} - {before})" for one in ["{0!r}"] * 12]
+    pairs = zip(sums, terms.tolist(), rates.tolist(), strict=False)
+    plate = " + ".join(text.format(term, rate) for text, term, rate in pairs)
+    at_once = settled + terms[:12].sum()
+    log = run_script(
+        f"""
+        N = {cells}
+        method(tlmpm, FLIP, linear, 1)
+        scheme(quasi-static)
+        dimension(2, 0, 1, 0, 0.5, 1/N)
+        region(layer, block, 0, 1, 0, 0.5)
+        material(clay, linear, 1590, 1e7, 0.2)
+        pore_water(clay, n=0.4, permeability=1e-8)
+        solid(clay, region, layer, 2, clay, 1/N, 0)
+        region(bottom, block, -INF, INF, -INF, 1e-6)
+        region(top, block, -INF, INF, 0.5 - 1e-6, INF)
+        region(left, block, -INF, 1e-6, -INF, INF)
+        region(right, block, 1 - 1e-6, INF, -INF, INF)
+        group(bottom, nodes, region, bottom, all)
+        group(top, nodes, region, top, all)
+        group(left, nodes, region, left, all)
+        group(right, nodes, region, right, all)
+        fix(base, velocity_nodes, bottom, NULL, 0)
+        fix(axis, velocity_nodes, left, 0, NULL)
+        fix(plate, velocity_nodes, top, NULL, ({plate} + {at_once}*(time < {1.5 * first}))/dt)
+        fix(drain, pore_pressure, right, 0)
+        compute(centre, probe, all, pore_pressure, x=0, y=0)
+        set_output(1)
+        log_modify(custom, step, time, centre, plate_y)
+        set_dt({first})
+        run(1)
+        set_dt({0.005 / c})
+        run(20)
+        """
+    ).log
+    exact = np.array([centre(t) for t in log["Time"][1:]])
+    assert 1.1 < exact.max() / p0 < 1.12
+    assert abs(log["centre"].max() / exact.max() - 1) < 0.002
+    assert np.abs(log["centre"][2:] / exact[1:] - 1).max() < 0.003
+    assert np.abs(log["plate_y"][2:] / -1e4 - 1).max() < 0.005
+
+
+@pytest.mark.parametrize("refine", [1, pytest.param(4, marks=pytest.mark.full)])
+def test_water_seeps_below_a_dam_as_harr_has_it(run_script, refine):
+    """q = k h K' / (2 K); the edges of the floor make the order one."""
+    m = np.tanh(pi / 4)
+    exact = ellipk(1 - m * m) / 2 / ellipk(m * m)
+    assert abs(exact - 0.5332) < 1e-4
+    result = run_script(INPUTS / "in.seepage", "-var", "refine", str(refine))
+    log = last(result)
+    assert 0.02 < (log["flux"] / exact - 1) * refine < 0.026
+    assert abs(log["drain_s"] / log["lake_s"] + 1) < 1e-7
+    points = read_dump(result.folder / "seepage.1.LAMMPS")[-1]
+    # By symmetry, half of the head is left at the centre.
+    middle = abs(points["x"] - 40) < 1
+    head = points["pore_pressure"] / 9810 + points["y"] - 10
+    assert abs(head[middle].mean() / 2 - 0.5) < 1e-3
+
+
+@pytest.mark.parametrize("cells", [10, pytest.param(20, marks=pytest.mark.full)])
+def test_a_footing_bears_more_if_water_has_time_to_leave(run_script, cells):
+    """Prandtl 1920, undrained: (2 + pi) c cos phi. Drained: with the friction and cohesion of
+    Drescher & Detournay (1993) for soil without dilatancy."""
+    phi = radians(20)
+    slope = np.sin(phi)  # tan of the friction along the slip surfaces
+    N_q = np.exp(pi * slope) * np.tan(pi / 4 + np.arctan(slope) / 2) ** 2
+    drained = (N_q - 1) / slope * cos(phi)
+    assert abs(drained - 13.0) < 0.05
+    words = ["-var", "refine", str(cells / 20), "-var", "steps"]
+    fast = run_script(INPUTS / "in.wet_footing", *words, "4").log
+    assert abs(fast["load"][-1] / ((2 + pi) * cos(phi)) - 1) < 0.05
+    slow = run_script(
+        INPUTS / "in.wet_footing", *words, "5", "-var", "T", "1e9", "-var", "v", "0.1"
+    ).log
+    assert abs(slow["load"].max() / drained - 1) < 0.05
+
+
+def test_a_restart_and_threads_change_no_bit(run_script):
+    steps = """set_dt(3e5)
+    run(3)
+    write_restart(half.h5)
+    run(2)
+    dump(d, all, particle, 1, d.*.txt, x, wx, s11, pore_pressure)
+    run(1)"""
+    text = column(LOADED.format(1000.0), steps)
+    kept = (run_script(text, folder="run").folder / "d.6.txt").read_text("utf-8")
+    again = run_script(text, "-restart", "half.h5", folder="run")
+    assert (again.folder / "d.6.txt").read_text("utf-8") == kept
+    threads = run_script(text, "--threads", "2", folder="threads")
+    assert (threads.folder / "d.6.txt").read_text("utf-8") == kept
+
+
+def test_water_and_soil_rest_under_gravity(run_script):
+    """In one step from nothing: the pressure is hydrostatic, the base carries both weights."""
+    fixes = """fix(weight, body_force, all, -9.81)
+    fix(drain, pore_pressure, top, 0)"""
+    log = last(run_script(column(fixes, [(1e10, 1)])))
+    assert abs(log["base_x"] / (9.81 * 1990) - 1) < 1e-9
+    assert abs(log["p"] / (9810 * (1 - 1 / 64)) - 1) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("scheme", "words"),
+    [
+        ("quasi-static, solver=amg", "solves water in pores directly"),
+        ("newmark", "does not support scheme newmark"),
+    ],
+)
+def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, scheme, words):
+    text = column(LOADED.format(1000.0), [(1.0, 1)]).replace("quasi-static", scheme)
+    err = run_interpreted(text, status=1).err
+    assert words in err
+    assert err.count("error:") == 1
