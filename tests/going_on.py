@@ -360,6 +360,14 @@ SCENES = {
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
     "ground": block(2, *EDGES, size=SIZE),
+    "shaken ground": block(
+        2, "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
+        "fix(edge, absorbing, low, rubber, ylo)", "fix(s, initial_stress, all, 1, 2, 0, 1, 0, 0)",
+        "fix(quake, ground_motion, low, 9*sin(90*time), NULL, through=edge)",
+        "fix(shock, ground_motion, low, NULL, 3)",
+        "set_output(1)", "log_modify(custom, step, quake_x, quake_vx, shock_y, shock_vy)", "run(4)",
+        size=SIZE,
+    ),
     "stages": block(
         2, "region(more, block, 0.3, 0.5, 0.5, 0.6)",
         "solid(fill, region, more, 2, rubber, 0.1)",

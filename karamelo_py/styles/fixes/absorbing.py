@@ -103,7 +103,7 @@ class Absorbing(Fix):
             message = f"the scene has no direction {side[0]}"
             expected = ", ".join(SIDES[: 2 * hub.domain.dimension])
             raise ScriptError(message, argument="side", expected=expected)
-        self.side = side
+        self.side, self.material = side, material
         self.formulas = tuple(map(Expression, (float(axis), *speeds(material))))
 
     def defined(self) -> None:
