@@ -45,7 +45,7 @@ PUSHES = [
 ]
 
 
-class Acceleration:
+class BaseAcceleration:
     """Script argument: a formula of the acceleration."""
 
     script_kind = "a formula of time, or the name of a file with the columns time and acceleration"
@@ -56,7 +56,7 @@ class Acceleration:
         self.constant = formula.constant if self.is_constant else nan
 
     @classmethod
-    def from_script(cls, hub: Hub, argument: Argument) -> "Acceleration":
+    def from_script(cls, hub: Hub, argument: Argument) -> "BaseAcceleration":
         text = argument.text.strip("\"'")
         if text.lower().endswith(ENDINGS) or text in hub.functions:
             return RecordedAcceleration(FileColumns.from_script(hub, argument), argument)
@@ -67,7 +67,7 @@ class Acceleration:
                 mark=argument.mark,
                 expected=cls.script_kind,
             )
-        return Acceleration(hub, formula)
+        return BaseAcceleration(hub, formula)
 
     def take(self, axis: str) -> None:
         """Choose the column of a direction."""
@@ -84,7 +84,7 @@ class Acceleration:
         return float(speed), float(a[2]), float((a[3] - a[2]) / step if step > 0 else 0.0)
 
 
-class RecordedAcceleration(Acceleration):
+class RecordedAcceleration(BaseAcceleration):
     """A record in a file, linear between its times."""
 
     is_constant, constant = False, nan
@@ -164,7 +164,7 @@ class GroundMotion(VelocityNodes):
         self,
         hub: Hub,
         group: NodeGroup,
-        *acceleration: Acceleration | None,
+        *acceleration: BaseAcceleration | None,
         through: str | None = None,
     ):
         self.records = per_direction(hub, "a", acceleration)
