@@ -538,7 +538,7 @@ def test_a_flyer_spalls_a_plate(run_script):
         ("eos(r, formula, 1, 3*J)", "the bulk modulus -3"),
         ("eos(r, formula, 1, 3*x)", "the pressure cannot depend on x"),
         ("eos(r, formula, 1, log(J - 1))", "the pressure at rest is"),
-        ("eos(r, formula, 1, abs(1 - J))", "abs is not possible in a law"),
+        ("eos(r, formula, 1, atan(1 - J))", "atan is not possible in a law"),
         ("eos(r, stiffened-gas, 1, 1, 6)", "gamma = 1 is impossible"),
         ("damage(d, formula, s2/3)", "unknown name 's2'"),
         ("damage(d, formula, floor(s1))", "floor is not possible in a law"),

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from laws import TURN, integrated, isochoric, mises, start, stress, stretched, worked
+from laws import (
+    TURN,
+    integrated,
+    isochoric,
+    mises,
+    pressure_of,
+    start,
+    stress,
+    stretched,
+    worked,
+)  # fmt: skip
 from tensors import every_kinematics, symmetric_flat
 from tensors import flat as matrix
 
@@ -25,6 +35,7 @@ from karamelo_py.points.laws import (
     kirchhoff_stress,
     plastic_strain,
     temperature,
+    wave_speed_squared,
     with_stress,
     with_temperature,
 )
@@ -338,6 +349,23 @@ def test_strength_of_steinberg_and_guinan():
         exact = hard * (1 + 0.028 * p * state.J ** (1 / 3) - 3.77e-2)
         assert mises(law, Space(), state) == pytest.approx(exact, rel=1e-10)
         assert (hard == 0.2) == (steps == 20)
+
+
+def test_shear_modulus_of_steinberg_and_guinan():
+    """G = G0 (1 + A p J^(1/3) - B (T - 300)), also in waves, and energy is conserved."""
+    part = SteinbergGuinan.given(48.0, 1.2, 36.0, 0.45, 6.0, 0.028, 3.77e-4, T=400.0)
+    law, kin = EosStrength(EOS, part), Space()
+    state, work = worked(law, kin, start(law, kin), -1e-3 * np.eye(3), 50)
+    p, J = pressure_of(law, kin, state), state.J
+    modulus = 48 * (1 + 0.028 * p * J ** (1 / 3) - 3.77e-2)
+    assert wave_speed_squared(law, kin, state) * RHO / J == pytest.approx(
+        K * J + 4 / 3 * modulus, rel=1e-10
+    )
+    state, more = worked(law, kin, state, isochoric(1e-4), 1)
+    assert mises(law, kin, state) == pytest.approx(3 * modulus * 1e-4, rel=1e-3)
+    state, last = worked(law, kin, state, np.diag([-1e-3, 1e-3, -5e-4]), 50)
+    stored, lost = (f(law, kin, state) for f in (energy_density, dissipated_energy))
+    assert stored + lost == pytest.approx(work + more + last, rel=1e-3)
 
 
 @pytest.mark.parametrize("n", [1.0, 3.0, 8.0])

@@ -60,6 +60,10 @@ def _derivative(term: Expression, name: str, slopes: list[Expression]) -> Expres
         return ONE
     if operation in OF_ONE:
         return times(OF_ONE[operation](operands[0], term), slopes[0])
+    if operation == "if":
+        return applied("if", operands[0], *slopes[1:])
+    if operation in ("<", "<=", ">", ">="):
+        return ZERO
     (a, b), (s, t) = operands, slopes
     if operation == "+":
         return plus(s, t)

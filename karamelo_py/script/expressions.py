@@ -6,7 +6,7 @@ constants folded.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -107,10 +107,6 @@ class Expression:
             return formula.GLOBAL, values.slot(_published(name, values))
 
         return terms.program(self, push)
-
-    def program_of(self, seeds: Sequence[str], depth: int) -> formula.Program:
-        """Compile a formula without published numbers for a stack of this depth."""
-        return terms.program(self, lambda name: (formula.POINT, seeds.index(name)), depth=depth)
 
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None

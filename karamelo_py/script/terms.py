@@ -137,23 +137,18 @@ def _bracketed(term: Term, level: int) -> str:
 _MOST_LEVELS = 60
 
 
-def program(
-    root: Term, push: Callable[[str], tuple[int, int]], *, depth: int | None = None
-) -> formula.Program:
+def program(root: Term, push: Callable[[str], tuple[int, int]]) -> formula.Program:
     """Compile a term to a stack program.
 
-    `push` gives the instruction that pushes a name: GLOBAL or POINT, and its index. With `depth`
-    the program stores no rows.
+    `push` gives the instruction that pushes a name: GLOBAL or POINT, and its index.
     """
-    return _Writer(root, push, depth).program()
+    return _Writer(root, push).program()
 
 
 class _Writer:
     """Compiles one program; equal terms have the same number."""
 
-    def __init__(self, root: Term, push: Callable[[str], tuple[int, int]], depth: int | None):
-        self.bare = depth is not None
-        self.depth = depth or programs.MAX_DEPTH
+    def __init__(self, root: Term, push: Callable[[str], tuple[int, int]]):
         self.push = push
         self.terms: list[tuple[str, tuple[int, ...], Any]] = []
         self.uses: list[int] = []
@@ -189,9 +184,7 @@ class _Writer:
 
     def _chosen(self) -> set[int]:
         """Choose terms with several users, or too deep for the stack."""
-        kept = set()
-        if not self.bare:
-            kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
+        kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):
             while True:
@@ -199,12 +192,8 @@ class _Writer:
                 asked = [i + (1 if o in kept else rows[o]) for i, o in enumerate(operands)]
                 deep = [0 if o in kept else levels[o] for o in operands]
                 rows[k], levels[k] = max(asked, default=1), 1 + max(deep, default=0)
-                if rows[k] <= self.depth and levels[k] <= _MOST_LEVELS:
+                if rows[k] <= programs.MAX_DEPTH and levels[k] <= _MOST_LEVELS:
                     break
-                if self.bare:
-                    raise ScriptError(
-                        "the formula is too long", expected=f"nested {self.depth} deep at most"
-                    )
                 kept.add(operands[deep.index(max(deep))])
         return kept
 

@@ -329,7 +329,7 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     dl, dt, extra = step
     before, s, m = state
     J = before * det(I + dl)
-    s, strain = rotated_with_point(law, kin, s, dl)
+    s, strain = rotated_with_point(law, kin, state, dl)
     step = StrainStep(s, strain, J, dt, extra)
     s, memory, work = strengths.respond(law.strength, law, kin, step, m)
     work = J * work * integrity_of(law, m.damage)
@@ -359,13 +359,18 @@ def _advance_fbar_eos_strength(law, kin, state, step):
     return State(J, s, now._replace(damage=damage, heat=heat, loss=loss, further=further))
 
 
-def rotated_with_point(law, kin, s, dl):
+def present(law, m):
+    return strengths.present(law.strength, m.strength)
+
+
+def rotated_with_point(law, kin, state, dl):
+    s = state.s
     if isinstance(law.strain, Absent):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
     # the difference contains the rotation of the old strain
-    e = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, s))
+    e = symmetric_tensor(kin, strengths.shear_strain(present(law, state.m), kin, s))
     return s, elastic_trial(law.strain, e, dl) - e
 
 
@@ -479,7 +484,7 @@ def released(law, kin, state, damage):
     if isinstance(law.damage, Absent):
         return 0
     J, s, m = state
-    shear = J * strengths.shear_energy(law.strength, kin, s)
+    shear = J * strengths.shear_energy(present(law, m), kin, s)
     tension = intact_pressure(law, J, m) < 0
     energy = shear + where(tension, volume_energy(law, J, m), 0)
     return (integrity(law.damage, m.damage) - integrity(law.damage, damage)) * energy
@@ -526,7 +531,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
     volume = laws.specific_volume(law.eos) * J
-    shear = 4 / 3 * strengths.shear_modulus(law.strength) * integrity_of(law, m.damage)
+    shear = 4 / 3 * strengths.shear_modulus(present(law, m)) * integrity_of(law, m.damage)
     squared = (modulus + shear) * volume - sound_lost_to_damage(law, J, m)
     squared = strengths.damped_speed_squared(law.strength, squared, 1 / volume)
     if isinstance(law.viscosity, Absent):
@@ -537,7 +542,7 @@ def _wave_speed_squared_eos_strength(law, kin, state):
 
 @laws.shear_part.on(EosStrength)
 def _shear_part_eos_strength(law, kin, state):
-    shear = 2 * strengths.shear_modulus(law.strength) * integrity_of(law, state.m.damage)
+    shear = 2 * strengths.shear_modulus(present(law, state.m)) * integrity_of(law, state.m.damage)
     return shear * laws.specific_volume(law.eos) * state.J
 
 
@@ -549,12 +554,12 @@ def _energy_density_eos_strength(law, kin, state):
     tension = intact_pressure(law, J, m) < 0
     fraction = integrity_of(law, m.damage)
     volume = where(tension, fraction * volume, volume)
-    return volume + J * (fraction * strengths.shear_energy(law.strength, kin, s))
+    return volume + J * (fraction * strengths.shear_energy(present(law, m), kin, s))
 
 
 @laws.elastic_strain.on(EosStrength)
 def _elastic_strain_eos_strength(law, kin, state):
-    strain = symmetric_tensor(kin, strengths.shear_strain(law.strength, kin, state.s))
+    strain = symmetric_tensor(kin, strengths.shear_strain(present(law, state.m), kin, state.s))
     elastic = strengths.elastic_ratio(law.strength, state.m.strength, state.J)
     return strain + 1 / 3 * log(elastic) * I
 

@@ -6,9 +6,10 @@ whole exponents.
 """
 
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from hashlib import sha256
-from math import cos, cosh, sin, sinh, sqrt, tan, tanh
+from math import cos, cosh, log, sin, sinh, sqrt, tan, tanh
 from typing import Any, ClassVar
 
 from karamelo_py.compiler import importable, real, where
@@ -17,9 +18,10 @@ from karamelo_py.compiler.powers import logarithm_near_one as logarithm
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.script import evaluation, syntax, terms
-from karamelo_py.script.derivatives import OF_ONE, is_number
+from karamelo_py.script.derivatives import OF_ONE, is_number, times
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import applied as of_operands
 from karamelo_py.script.parser import parse_text
 from karamelo_py.script.terms import Term
 
@@ -86,6 +88,37 @@ def check_operations(formula: Term, argument: str, allowed: set[str] = KNOWN) ->
                 argument=argument,
                 expected=f"a formula with + - * / ^ and {', '.join(sorted({*OF_ONE} - {'neg'}))}",
             )
+
+
+def _equal(a: Expression, b: Expression) -> Expression:
+    return times(of_operands(">=", a, b), of_operands("<=", a, b))
+
+
+def _not(a: Expression) -> Expression:
+    return _equal(a, Expression(0))
+
+
+PLAIN: dict[str, Callable] = {
+    "abs": lambda a: of_operands("max", a, of_operands("neg", a)),
+    "log10": lambda a: of_operands("/", of_operands("log", a), Expression(log(10))),
+    "log2": lambda a: of_operands("/", of_operands("log", a), Expression(log(2))),
+    "==": _equal,
+    "!=": lambda a, b: _not(_equal(a, b)),
+    "not": _not,
+    "&&": lambda a, b: _not(of_operands("max", _not(a), _not(b))),
+    "||": lambda a, b: _not(times(_not(a), _not(b))),
+}
+
+
+def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -> Expression:
+    """Return the formula in operations that laws know; raise ScriptError for others."""
+    results: dict[int, Expression] = {}
+    for one in terms.in_order(formula):
+        operands = [results[id(operand)] for operand in one.operands]
+        made = by.get(one.operation, partial(of_operands, one.operation))
+        results[id(one)] = made(*operands) if operands else one
+    check_operations(results[id(formula)], argument)
+    return results[id(formula)]
 
 
 class ProgramWriter:

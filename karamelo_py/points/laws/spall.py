@@ -13,9 +13,9 @@ from karamelo_py.points.laws.formulas import (
     Code,
     FormulaOf,
     ProgramWriter,
-    check_operations,
     evaluated,
     in_lanes,
+    plain,
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.temperatures import temperature_or
@@ -222,8 +222,7 @@ class DamageFormula(ByRate, DamageFields):
     def given(
         cls, rate: RateFormula, *, brittleness: AboveZero = 1e30, T: FromZero = 293.0
     ) -> NamedTuple:
-        term = rate
-        check_operations(term, "rate")
+        term = plain(rate, "rate")
         writer = ProgramWriter(RateFormula.names)
         codes: dict[str, Any] = {"rate": writer.code(term), "directed": "s1" in rate.names}
         codes["style"] = "formula"

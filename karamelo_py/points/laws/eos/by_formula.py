@@ -19,9 +19,9 @@ from karamelo_py.points.laws.formulas import (
     Code,
     FormulaOf,
     ProgramWriter,
-    check_operations,
     evaluated,
     in_lanes,
+    plain,
     with_numbers,
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
@@ -120,8 +120,7 @@ def eos_of(
     rho0: float, formula: Expression, initial: tuple[float, float], style: str
 ) -> NamedTuple:
     """Build it from initial E and T; raise ScriptError without a value or stiffness at rest."""
-    term = formula
-    check_operations(term, "p")
+    term = plain(formula, "p")
     slopes = [derivative(term, name) for name in NAMES[:2]]
     rest = dict(zip(NAMES, (1.0, *initial), strict=True))
     p, *at_rest = (terms.evaluated(one, rest.__getitem__) for one in (term, *slopes))

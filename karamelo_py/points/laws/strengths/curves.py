@@ -1,16 +1,21 @@
 """Strengths tabulated and formula."""
 
+from collections import namedtuple
 from pathlib import Path
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import implements, real, shared
-from karamelo_py.compiler.slopes import Dual, value_of
-from karamelo_py.language.arguments import Argument
-from karamelo_py.language.scene import Scene
+from karamelo_py.compiler import where
 from karamelo_py.language.signature import TableFile
-from karamelo_py.points.laws.formulas import FormulaOf
+from karamelo_py.points.laws.formulas import (
+    Code,
+    FormulaOf,
+    ProgramWriter,
+    evaluated,
+    in_lanes,
+    plain,
+)
 from karamelo_py.points.laws.parameters import AboveZero, FromZero, Numbers
 from karamelo_py.points.laws.strengths import remembers, respond, shear_response
 from karamelo_py.points.laws.strengths.hardening import (
@@ -19,10 +24,11 @@ from karamelo_py.points.laws.strengths.hardening import (
     respond_at_pressure,
     surroundings,
 )
+from karamelo_py.script.derivatives import derivative, to_power
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.formula import CONSTANT, POINT, SPREAD, UNIFORM
-from karamelo_py.script.operations import FIRST_BINARY, SELECT, of_one, of_two
 from karamelo_py.script.reading import read_text
+
+STEEPEST = 1e6  # slope of a flow stress over G
 
 
 class Tabulated(NamedTuple):
@@ -124,14 +130,10 @@ def _flow_stress_tabulated(strength, before, increment, dt):
 
 
 SEEDS = ("ep", "epdot", "T", "p", "J")
-DEPTH = 8  # of the stack, a tuple
 
 
 class FlowFormula(FormulaOf):
-    """Script argument: a flow stress.
-
-    Two numbers per instruction: the operation; a constant or the index of an input.
-    """
+    """Script argument: a flow stress."""
 
     script_kind: ClassVar[str] = "a formula of ep, epdot, T, p and J"
     names = SEEDS
@@ -141,20 +143,18 @@ class FlowFormula(FormulaOf):
         "pressure, volume ratio"
     )
 
-    @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Numbers:
-        formula = super().from_script(hub, argument)
-        program = formula.program_of(SEEDS, DEPTH)
-        instructions = []
-        for operation, operand in program.code:
-            op = int(operation) % UNIFORM
-            if op != SPREAD:
-                constant = op == CONSTANT
-                instructions += [op, program.constants[operand] if constant else operand]
-        return Numbers(tuple(map(float, instructions)))
+
+class ByFlow:
+    __slots__ = ()
+    start: ClassVar[int]
+    flow: ClassVar[Code]
+    slopes: ClassVar[tuple[Code, ...]]  # by ep and epdot
 
 
-class FlowStress(NamedTuple):
+FlowFields = namedtuple("FlowFields", ("G", "initial_temperature"))
+
+
+class FlowStress(ByFlow, FlowFields):
     """Flow stress from a formula of plastic strain, its rate and temperature.
 
     Parameters
@@ -175,31 +175,42 @@ class FlowStress(NamedTuple):
     Notes
     -----
     Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with finite-difference slopes. Y may fall by less than 3 G per unit of plastic strain; a
-    negative Y counts as 0. Formulas are interpreted, not compiled: ten times slower than a compiled
-    law.
+    with the exact slope. Y may fall by less than 3 G per unit of plastic strain; a negative Y
+    counts as 0. The formula is compiled, with numbers of the script as parameters.
 
     See Also
     --------
     johnson_cook, zerilli-armstrong, tabulated, temperature plastic_work
     """
 
-    G: float
-    program: Numbers
-    count: float
-    initial_temperature: float
+    __slots__ = ()
+    syntax = "G, Y[, T=293]"
 
     @classmethod
-    def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0):
-        law = cls(G, Y, len(Y) // 2, T)
+    def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0) -> Any:
+        term = plain(Y, "Y")
+        smooth = plain(
+            term, "Y", {"sqrt": lambda a: to_power(a, 0.5)}
+        )  # its slope at 0 is no fault
+        writer = ProgramWriter(SEEDS)
+        codes: dict[str, Any] = {
+            "flow": writer.code(term),
+            "slopes": tuple(writer.code(derivative(smooth, name)) for name in SEEDS[:2]),
+            "style": "formula",
+        }
+        codes["in_lanes"] = in_lanes(codes["flow"])
+        law = writer.law(ByFlow, {"G": G, "initial_temperature": T}, codes)
         _check_formula(law)
         return law
 
 
-def _check_formula(law: FlowStress) -> None:
+def _check_formula(law: Any) -> None:
     for ep in (0.0, 1e-3, 0.1, 1.0):
         for epdot in (0.0, 1.0, 1e4):
-            Y = value(law, ep, epdot, surroundings(law, ()))
+            try:
+                Y = evaluated(law.flow, law, (ep, epdot, *surroundings(law, ())))
+            except ArithmeticError:
+                Y = np.nan
             if np.isnan(Y) or np.inf == Y:
                 raise ScriptError(
                     f"the flow stress is {Y:g} where ep = {ep:g}, epdot = {epdot:g}, "
@@ -208,61 +219,21 @@ def _check_formula(law: FlowStress) -> None:
                     expected="a number for every plastic strain and rate from 0 on",
                     hint="max(epdot, 1) excludes a zero rate; T=... begins at another T",
                 )
-    if not value(law, 1e-6, 1.0, surroundings(law, ())) > 0:
+    if not evaluated(law.flow, law, (1e-6, 1.0, *surroundings(law, ()))) > 0:
         raise ScriptError("the flow stress is not above 0 at first", argument="Y")
 
 
-def value(strength, ep, epdot, around):
-    """Evaluate the formula in double precision."""
-    stack = (0.0,) * DEPTH  # top first
-    for k in range(int(strength.count)):
-        op = int(strength.program[2 * k])
-        operand = real(strength.program[2 * k + 1], 1.0)
-        if op == CONSTANT:
-            stack = (operand, *stack[:-1])
-        elif op == POINT:
-            seed = ep if operand == 0 else (epdot if operand == 1 else around.T)
-            seed = seed if operand < 3 else (around.p if operand == 3 else around.J)
-            stack = (real(seed, 1.0), *stack[:-1])
-        elif op < FIRST_BINARY:
-            stack = (of_one(op, stack[0]), *stack[1:])
-        elif op < SELECT:
-            stack = (of_two(op, stack[1], stack[0]), *stack[2:], 0.0)
-        else:
-            stack = (stack[1] if stack[2] != 0.0 else stack[0], *stack[3:], 0.0, 0.0)
-    return stack[0]
+remembers(ByFlow, ep=0.0)
+respond.on(ByFlow)(respond_at_pressure)
 
 
-remembers(FlowStress, ep=0.0)
-respond.on(FlowStress)(respond_at_pressure)
-
-
-@shared
-def with_slopes(flow, strength, ep, epdot, around):
-    return flow
-
-
-@implements(with_slopes, Dual)
-def _with_slopes_by_pressure(flow, strength, ep, epdot, around):
-    plain = value_of(around)
-    for name, size in (("p", 1e-4 * strength.G), ("J", 1e-6)):
-        at = getattr(plain, name)
-        ends = [value(strength, ep, epdot, plain._replace(**{name: at + h})) for h in (size, -size)]
-        flow = flow + (ends[0] - ends[1]) / (2 * size) * (getattr(around, name) - at)
-    return flow
-
-
-@flow_stress.on(FlowStress)
-def _flow_stress_flow_stress(strength, before, increment, dt):
+@flow_stress.on(ByFlow)
+def _flow_stress_by_flow(strength, before, increment, dt):
     around = surroundings(strength, before.heat)
-    plain = value_of(around)
-    near = 1e-6 * (increment + 1e-4)
-    # double precision, because the difference is small
-    here = real(before.memory.ep, 1.0) + increment
-    stress = max(value(strength, here, increment / dt, plain), 0.0)
-    beyond = max(value(strength, here + near, (real(increment, 1.0) + near) / dt, plain), 0.0)
-    flow = max(real(stress, increment), 0)
-    slope = real((beyond - stress) / near, increment)
-    flow = with_slopes(flow, strength, here, increment / dt, around)
-    # a slope of -3 G or less has no solution
-    return flow, max(slope, -2 * strength.G)
+    at = (before.memory.ep + increment, increment / dt, *around)
+    flow = evaluated(strength.flow, strength, at)
+    by_strain, by_rate = [evaluated(code, strength, at) for code in strength.slopes]
+    slope = by_strain + by_rate / dt
+    # A slope of -3 G or less has no solution; ep^0.3 has none at 0, nor has a kink.
+    slope = where(slope > -2 * strength.G, min(slope, STEEPEST * strength.G), -2 * strength.G)
+    return max(flow, 0), slope

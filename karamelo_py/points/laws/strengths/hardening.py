@@ -152,11 +152,15 @@ class Around(NamedTuple):
 
 def respond_at_pressure(strength, law, kin, step, memories):
     """Radial return with a flow stress at the pressure and volume after the step."""
+    around = around_flow(strength, law, step, memories)
+    return radial_return(strength, kin, step, memories.strength, around)
+
+
+def around_flow(strength, law, step, memories):
     heat = memories.heat
     p = pressure(law.eos, step.j, memories.energy, heat)
     p += sum(thermal_pressure(law.temperature, heat))
-    around = Around(temperature_or(heat, strength.initial_temperature), p, step.j)
-    return radial_return(strength, kin, step, memories.strength, around)
+    return Around(temperature_or(heat, strength.initial_temperature), p, step.j)
 
 
 def surroundings(strength, heat):
@@ -212,8 +216,9 @@ def plastic_increment(strength, q, memory, heat, dt):
 @implements(plastic_increment, Dual)
 def _plastic_increment_slopes(strength, q, memory, heat, dt):
     # The excess e(x, q, ...) vanishes: x' = -e' / (de/dx), with e' at fixed x.
-    x = plastic_increment(strength, value_of(q), value_of(memory), value_of(heat), dt)
+    plain = value_of(strength)  # the modulus may depend on pressure
+    x = plastic_increment(plain, value_of(q), value_of(memory), value_of(heat), dt)
     flow, hardening = flow_stress(strength, before_flow(strength, memory, heat), x, dt)
     excess = q - 3 * strength.G * x - flow
-    rise = 1 / (3 * strength.G + value_of(hardening))
+    rise = 1 / (3 * plain.G + value_of(hardening))
     return excess.chain(x, where(x > 0, rise, 0))

@@ -7,8 +7,15 @@ from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.points.kinematics import von_mises
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
-from karamelo_py.points.laws.strengths import remembers, respond, shear_response
+from karamelo_py.points.laws.strengths import (
+    present,
+    remembers,
+    respond,
+    shear_energy,
+    shear_response,
+)
 from karamelo_py.points.laws.strengths.hardening import (
+    around_flow,
     before_flow,
     elastic_trial,
     first_guess,
@@ -16,21 +23,21 @@ from karamelo_py.points.laws.strengths.hardening import (
     onto_yield_surface,
     plastic_increment,
     radial_return,
-    respond_at_pressure,
     surroundings,
 )
 from karamelo_py.points.laws.temperatures import temperature_or
 
+MELTED = 1e-6  # of the shear modulus
 LEAST = 1e-30  # plastic strain of a step that counts as a rate
 
 
 class SteinbergGuinan(NamedTuple):
-    """Flow stress of metals at high pressure, where the rate no longer matters.
+    """Flow stress and shear modulus of metals at high pressure, where the rate does not matter.
 
     Parameters
     ----------
     G
-        Shear modulus.
+        Shear modulus at 300 K without pressure.
     Y0
         Initial flow stress.
     beta, n
@@ -42,7 +49,7 @@ class SteinbergGuinan(NamedTuple):
     B
         Softening with temperature, per kelvin: 3.77e-4 for copper.
     Tm
-        Melting temperature; no strength above.
+        Melting temperature; no strength and no shear stiffness above.
     T
         Temperature, if neither the material nor its solid has one.
 
@@ -52,9 +59,10 @@ class SteinbergGuinan(NamedTuple):
 
     Notes
     -----
-    Y = min(Y0 (1 + beta ep)^n, Ymax) (1 + A p J^(1/3) - B (T - 300)), not below 0 (Steinberg,
-    Cochran & Guinan 1980, J. Appl. Phys. 51, 1498-1504). In their law, the shear modulus has the
-    same last factor; here it is constant.
+    Y = min(Y0 (1 + beta ep)^n, Ymax) g with g = 1 + A p J^(1/3) - B (T - 300), not below 0; the
+    shear modulus is G g (Steinberg, Cochran & Guinan 1980, J. Appl. Phys. 51, 1498-1504). Elastic
+    shear strains remain when g changes, and their change of energy counts as dissipated. Dump
+    columns: ep, stiffness (g).
 
     See Also
     --------
@@ -81,17 +89,37 @@ class SteinbergGuinan(NamedTuple):
         return cls(G, Y0, beta, n, Ymax, A, B, min(Tm, 1e30), T)
 
 
-remembers(SteinbergGuinan, ep=0.0)
-respond.on(SteinbergGuinan)(respond_at_pressure)
+remembers(SteinbergGuinan, ep=0.0, stiffness=1.0)
+
+
+@present.on(SteinbergGuinan)
+def _present_steinberg_guinan(strength, memory):
+    return strength._replace(G=strength.G * memory.stiffness)
+
+
+def stiffness_factor(strength, around):
+    factor = 1 + strength.A * around.p * power(around.J, 1 / 3) - strength.B * (around.T - 300)
+    return where(strength.Tm > around.T, max(factor, 0), 0)
+
+
+@respond.on(SteinbergGuinan)
+def _respond_steinberg_guinan(strength, law, kin, step, memories):
+    around = around_flow(strength, law, step, memories)
+    memory = memories.strength
+    stiffness = max(stiffness_factor(strength, around), MELTED)
+    ratio = stiffness / memory.stiffness
+    softer = (1 - ratio) * shear_energy(present(strength, memory), kin, step.s)
+    memory = memory._replace(stiffness=stiffness)
+    step = step._replace(s=ratio * step.s)
+    s, memory, work = radial_return(present(strength, memory), kin, step, memory, around)
+    return s, memory, work + softer
 
 
 @flow_stress.on(SteinbergGuinan)
 def _flow_stress_steinberg_guinan(strength, before, increment, dt):
-    T, p, J = surroundings(strength, before.heat)
+    factor = stiffness_factor(strength, surroundings(strength, before.heat))
     base = 1 + strength.beta * (before.memory.ep + increment)
     hard = strength.Y0 * power(base, strength.n)
-    factor = 1 + strength.A * p * power(J, 1 / 3) - strength.B * (T - 300)
-    factor = where(strength.Tm > T, max(factor, 0), 0)
     rises = hard < strength.Ymax
     slope = where(rises, hard * strength.n * strength.beta / base, 0)
     return min(hard, strength.Ymax) * factor, slope * factor
