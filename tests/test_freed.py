@@ -21,7 +21,7 @@ from karamelo_py import Simulation, SimulationError
 from karamelo_py.compiler import address_of_python, caller_of, kernel
 from karamelo_py.kernels import touching
 from karamelo_py.styles.fixes import grip
-from karamelo_py.styles.fixes.grip import Grip, grip_for
+from karamelo_py.styles.fixes.grip import Grip, memory_for
 
 pytestmark = pytest.mark.xdist_group("surface")
 INDENT = "fix(dent, indent/minimize_penetration, all, sphere, 0.1, 0.45, 0.55, 0, 0, 0, 0, 0.2)"
@@ -122,7 +122,10 @@ class Rough(Grip):
 
 @pytest.mark.parametrize(
     ("module", "ask"),
-    [(touching, lambda: touching.touch_kind(Rough)), (grip, lambda: grip_for(NO_FIXES, Rough))],
+    [
+        (touching, lambda: touching.touch_kind(Rough, None)),
+        (grip, lambda: memory_for(NO_FIXES, Rough)),
+    ],
     ids=["touch", "grip"],
 )
 def test_threads_find_one_class(monkeypatch, module, ask):

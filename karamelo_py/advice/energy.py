@@ -14,6 +14,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
 LOSS = 0.05  # of the largest energy, at the end of a run: more gives a warning; WITHIN before
+LEAST = 5e-4  # of the largest energy: smaller losses by contact are not shown
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
@@ -168,6 +169,15 @@ def collides(hub: Hub) -> tuple[str, str] | None:
         cause = "collisions: nodes of a surface lose their velocity of approach"
         return cause, "finer cells, which reduce the loss in a collision"
     return None
+
+
+def words_of_contact(simulation: Simulation) -> dict[str, str]:
+    largest = float(simulation.energy_watch.watch.largest_energy)
+    lost = simulation.points.total("contact loss")
+    if not lost > LEAST * largest:
+        return {}
+    much = f"{100 * lost / largest:.3g} % of the largest, by damping and friction of contact"
+    return {"lost by contact": f"{much} (in the work above)"}
 
 
 def words_of_change(hub: Hub, fraction: float) -> str:

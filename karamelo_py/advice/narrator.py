@@ -160,7 +160,10 @@ class Narrator(Listener):
         }
         self.hub.record.finish(facts)
         change, path = facts["energy_change_percent"], facts["path_cells"]
-        of_energy = {} if change is None else {"energy": energy.words_of_change(self.hub, change)}
+        of_energy = {}
+        if change is not None:
+            of_energy = {"energy": energy.words_of_change(self.hub, change)}
+            of_energy |= energy.words_of_contact(simulation)
         self.hub.console.summary(
             {
                 "wall time": f"{wall:.3g} s",

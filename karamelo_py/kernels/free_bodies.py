@@ -13,13 +13,15 @@ from karamelo_py.kernels.contact import Bodies, SeparateFields, list_pairs
 from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to
-from karamelo_py.kernels.touching import ASIDE, CALL, SOFT, direction_of
+from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.bodies import radius
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
+
+SOFT = 0.1  # fraction of the penetration removed in a step
 
 _call = caller_of(CALL)
 

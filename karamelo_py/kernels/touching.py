@@ -10,15 +10,17 @@ from typing import NamedTuple
 from numba import types
 
 from karamelo_py.compiler import caller_of, importable, noinline, point_function
-from karamelo_py.compiler.fields import field, load_vector, store
+from karamelo_py.compiler.fields import field, increase, load_vector, store
 from karamelo_py.kernels import hooks
-from karamelo_py.kernels.equations.internal_force import Force
+from karamelo_py.kernels.equations.internal_force import ContactLoss, Force
 from karamelo_py.kernels.surfaces import depth, slopes
 from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
-SOFT = 0.1  # fraction of the penetration removed in a step
+STIFF = 0.5  # contact stiffness, over m / dt^2
+DAMPED = 0.2  # contact damping, over m / dt
+STIFFENING = 0.02  # in a step, of a contact that is deep
 ASIDE = 0.05  # step of depth differences, over the reach
 LEVEL = 1e-3  # change of depth over that step, below which there is no direction
 CALL = types.int64(types.int64)
@@ -47,13 +49,18 @@ def direction_of(falls, step):
 
 
 @point_function()
-def grip_of(tag, members):
-    pass
+def memory_of(tag, members):
+    """Return the arrays of lever and grip (or None) of a fix."""
 
 
-@grip_of.on(Touch)
-def _grip_of_none(tag, members):
-    return None
+def spring_rate(before, now, within, reach):
+    """Return stiffness over mass: that of the first touch, which gives back what it takes.
+
+    A larger one would add energy, a much softer one let points through.
+    """
+    if before == 0:
+        return now
+    return min(now, (1 + STIFFENING) * before if within > 0.5 * reach else before)
 
 
 @noinline
@@ -63,12 +70,16 @@ def force_of(tag, members, volume, one):
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
     position = none._make([float(x) for x in load_vector(kin, members.x, p)])
-    ball = radius(kin, float(volume), position)
+    whole, (lever, grip) = radius(kin, float(volume), position), memory_of(tag, members)
+    ball = float(lever[d, p]) if lever[d, p] > 0 else whole
     x = position - way
-    grip = grip_of(tag, members)
     # most points are far, and a short reach is cheap
-    within = depth(tag.shape, kin, x, 1.001 * ball)
+    within = depth(tag.shape, kin, x, 1.001 * max(ball, whole))
     if within <= -ball:
+        if lever[d, p] != 0:
+            near = 1.0 if within > -whole else 0.0
+            depths = near * ball, near * lever[d + 1, p], within + ball, 0.0
+            store(lever, p, (*none, *depths))
         if grip is not None and grip[d, p] != 0:
             store(grip, p, (0.0,) * (2 * d + 2))
         return none
@@ -83,11 +94,18 @@ def force_of(tag, members, volume, one):
     velocity = (1 / dt) * (none._make(values[d : 2 * d]) - way)
     slip = velocity - none._make([float(v) for v in load_vector(kin, members.points.v, p)])
     contact_dt, contact_kick, kick = values[2 * d :]
-    stiffness = float(members.points.mass[p]) / (contact_dt * contact_kick)
-    # removing all penetration within a step would throw bodies back
-    push = SOFT * (within + ball) + contact_dt * dot(slip, normal)
-    load = stiffness * max(push, 0.0)
+    mass, closer, last_dt = float(members.points.mass[p]), dt * dot(slip, normal), dt
+    rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, tag.reach)
+    if lever[d + 1, p] > 0:  # from positions, because velocities are noisy
+        closer, last_dt = within + ball - float(lever[d + 2, p]), 2 * kick - dt
+    spring = mass * rate * (within + ball)
+    load = max(spring + mass * DAMPED / contact_kick * closer / last_dt, 0.0)
+    lost = 0.5 * (load - spring + lever[d + 3, p]) * closer
+    losses = field(members.points.fields, ContactLoss)
+    arm = sqrt(load * ball) * normal
+    store(lever, p, (*arm, ball, rate, within + ball, load - spring))
     if grip is None:
+        increase(losses, p, (lost,))
         return load * normal
     hold = none._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
@@ -95,24 +113,24 @@ def force_of(tag, members, volume, one):
     if mean > 0:  # from positions, because velocities are noisy
         slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
-    hold = along(hold + SOFT * stiffness * slid, normal)
-    stop = along(contact_dt * stiffness * slip, normal)
+    hold = along(hold + mass * rate * slid, normal)
+    stop = along(mass / contact_kick * slip, normal)
     rubbed, memory = rub(tag.mu, load, FrictionMemory(hold, mean, unused), stop)
     store(grip, p, (*memory.hold, memory.mean, memory.unused, *x))
+    increase(losses, p, (lost + kick * dot(rubbed, slip),))
     return load * normal + rubbed
 
 
-def touch_kind(grip: type | None) -> type[Touch]:
-    if grip is None:
-        return Touch
-    name = f"Touch{grip.__name__}"
+def touch_kind(lever: type, grip: type | None) -> type[Touch]:
+    name = f"Touch{lever.__name__}{grip.__name__ if grip else ''}"
 
     def made() -> type:
         kind = type(name, (Touch,), {"__module__": __name__})
 
-        @grip_of.on(kind)
-        def _grip_of(tag, members):
-            return field(members.points.fields, grip)
+        @memory_of.on(kind)
+        def _memory_of(tag, members):
+            fields = members.points.fields
+            return field(fields, lever), field(fields, grip) if grip else None
 
         return kind
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, matter_of, some_of
+from karamelo_py.kernels.equations.internal_force import ContactLoss
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
@@ -269,9 +270,12 @@ def _of_law(density: Any) -> Callable:
     return energies
 
 
-def _bounces(_: Setup, block: Block) -> np.ndarray | None:
-    counts = fields.field(block.points.fields, Bounces)
-    return None if counts is None else counts.astype(float).ravel()
+def _of_field(kind: type) -> Callable:
+    def numbers(_: Setup, block: Block) -> np.ndarray | None:
+        array = fields.field(block.points.fields, kind)
+        return None if array is None else array.astype(float).ravel()
+
+    return numbers
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
@@ -289,7 +293,8 @@ SUMMED = {
     "stored": _of_law(energy_density),
     "dissipated": _of_law(dissipated_energy),
     "born with": _born_with,
-    "bounces": _bounces,
+    "bounces": _of_field(Bounces),
+    "contact loss": _of_field(ContactLoss),
 }
 
 

@@ -3,21 +3,35 @@
 The total frame has reference volume and gradients, and the first Piola-Kirchhoff stress.
 """
 
-from karamelo_py.compiler import real
-from karamelo_py.compiler.fields import Field, StepField, vector
+from karamelo_py.compiler import real, where
+from karamelo_py.compiler.fields import Field, StepField, increase, load_vector, vector
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.fbar import FBar, NodalStress, mean_stress
 from karamelo_py.points import laws
 from karamelo_py.points.basis.product import inverse_spread
 from karamelo_py.points.frames import force_stress
-from karamelo_py.points.kinematics import zero_vector
+from karamelo_py.points.kinematics import dot, outer, sym, zero_vector
 from karamelo_py.points.transfers import forces_by_arms
 
 
 class Force(StepField):
     shape = vector
     columns = ("bx", "by", "bz")
+
+
+class Lever(Field):
+    """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
+
+    The force f n at x - r n acts like one at x and the stress f r n n / V. 0: no contact. Then
+    stiffness over mass, the depth, and the part of f that damps.
+    """
+
+    shape = staticmethod(lambda kin: kin.dimension + 4)
+
+
+class ContactLoss(Field):
+    """Energy that damping and friction of contact have taken from a point."""
 
 
 class WorkOfForces(Field):
@@ -29,7 +43,28 @@ def minus_V_stress(pt):
     """Return -V times the stress conjugate to the frame's gradients, a tensor."""
     law, state, f = pt.law_state_F
     volume = eq.mass(pt) * laws.specific_volume(law)
-    return -volume * force_stress(pt.w.frame, pt.kin, laws.kirchhoff_stress(law, pt.kin, state), f)
+    tau = laws.kirchhoff_stress(law, pt.kin, state)
+    if levers := _levers(pt):
+        V_tau = volume * tau
+        for lever in levers:
+            arm = load_vector(pt.kin, lever, pt.p)
+            V_tau = V_tau + sym(outer(arm, arm))
+        return -force_stress(pt.w.frame, pt.kin, V_tau, f)
+    return -volume * force_stress(pt.w.frame, pt.kin, tau, f)
+
+
+def _levers(pt):
+    return [one.array for one in pt.w.points.fields if isinstance(one, Lever)]
+
+
+def stretch_levers(pt, growth):
+    """Stretch the levers of contacts with a spatial increment dt grad v, and add their work."""
+    for lever in _levers(pt):
+        arm = load_vector(pt.kin, lever, pt.p)
+        d, strained, square = len(arm), dot(arm, growth.planar() @ arm), arm.squared()
+        increase(pt.of(WorkOfForces), pt.p, (-strained,))
+        rate = where(square > 0, strained, 0) / where(square > 0, square, 1)
+        lever[d, pt.p] = lever[d, pt.p] * (1 + rate)
 
 
 @eq.reads("force")

@@ -5,6 +5,7 @@ from math import inf, sqrt
 from karamelo_py.compiler import all_lanes, real, where
 from karamelo_py.compiler.fields import store, store_from
 from karamelo_py.kernels.equations import Report, Task, fbar
+from karamelo_py.kernels.equations.internal_force import stretch_levers
 from karamelo_py.kernels.views import location_at
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, deformed, extent
@@ -43,6 +44,7 @@ class Strain(Task):
         extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
         state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
         store(w.points.state, pt.p, state)
+        stretch_levers(pt, growth)
         now = frames.strained(w.frame, w.kin, f, dl)
         store(pt.of(frames.DeformationGradient), pt.p, now)
         j = laws.jacobian(law, w.kin, state)

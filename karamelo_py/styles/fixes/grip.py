@@ -19,8 +19,8 @@ class GripOfTool(Grip):
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
 
 
-def grip_for(hub: Hub, kind: type[Grip]) -> type[Grip]:
-    """Return a grip class that no other fix of the scene uses: a point may touch several."""
+def memory_for(hub: Hub, kind: type) -> type:
+    """Return a class of `kind` that no other fix of the scene uses: a point may touch several."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:
@@ -34,18 +34,23 @@ class Gripping(Fix):
     has_touched = False  # until then, grips in a restart file belong to an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
+    memories: tuple[type, ...] = ()  # fields of this fix alone
     mu = 0.0
 
     def rubs(self, hub: Hub, mu: float) -> None:
         judge_friction(hub, mu)
         self.mu = mu
         if mu > 0:
-            self.grip = grip_for(hub, self.kind_of_grip)
-            self.point_fields = (*self.point_fields, self.grip)
+            self.grip = memory_for(hub, self.kind_of_grip)
+            self.remember(self.grip)
+
+    def remember(self, kind: type) -> None:
+        self.memories = (*self.memories, kind)
+        self.point_fields = (*self.point_fields, kind)
 
     def begin_to_touch(self) -> None:
-        if self.grip is not None and not self.has_touched:
+        for kind in () if self.has_touched else self.memories:
             for block in self.hub.simulation.setup.blocks:
-                if (grip := field(block.points.fields, self.grip)) is not None:
-                    grip[:] = 0
+                if (memory := field(block.points.fields, kind)) is not None:
+                    memory[:] = 0
         self.has_touched = True

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.equations.internal_force import ContactLoss
 from karamelo_py.kernels.rubbing import Rubbing, rub_points
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.scene.views import PointsView
@@ -17,6 +18,7 @@ class StiffTool(Gripping, ToolFix):
     by_sizes = True
     impulsive = True
     kind_of_grip = GripOfTool
+    point_fields = (*ToolFix.point_fields, ContactLoss)
 
     def press(
         self,
@@ -55,6 +57,8 @@ class StiffTool(Gripping, ToolFix):
             hold, rubbed = before[:, : d + 2].copy(), force[near]
             rubbing = Rubbing(normal[near], load[near], pull, stop)
             rub_points(KINEMATICS[d](), self.mu, rubbing, hold, rubbed)
+            lost = ((rubbed - force[near]) * slip).sum(axis=1)
+            points[ContactLoss][near, 0] += points.kick * lost
             force[near] = rubbed
             grip[:] = 0
             grip[near, : d + 2], grip[near, d + 2 :] = hold, seen[near]
