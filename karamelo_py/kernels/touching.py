@@ -54,7 +54,7 @@ def memory_of(tag, members):
 
 
 def spring_rate(before, now, within, reach):
-    """Return stiffness over mass: that of the first touch, which gives back what it takes.
+    """Return stiffness over mass, as at the first touch, which gives back what it takes.
 
     A larger one would add energy, a much softer one let points through.
     """
