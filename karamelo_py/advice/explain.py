@@ -173,6 +173,8 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
             return Trouble(seen, smaller, "point-lost")
         loose = _loose(simulation, number, old, LOOSE * h)
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
+        for fix in hub.fixes.values():
+            keep += f"; if it went through fix '{fix.id}', a wall of two cells" * fix.presses
         return Trouble(
             f"{name} leaves the domain at {where(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",

@@ -68,14 +68,15 @@ class ContactSurface(StiffTool):
 
     The spring gives back what it takes. Damping and friction do not: the closing table has the line
     ``lost by contact``, energy that the balance counts as work of the fix. A disk that hits at 5 %
-    of its wave speed loses 2.6, 1.2 and 0.4 % with 4, 8 and 16 cells in the radius, and 4.7, 2.6
-    and 1.6 % at 25 %. A rod of 16 x 4 cells returns with 0.96 of its speed (exact 1).
+    of its wave speed loses 3.0, 1.4 and 0.4 % with 4, 8 and 16 cells in the radius, and 4.7, 2.6
+    and 1.5 % at 25 %. A rod of 16 x 4 cells returns with 0.96 of its speed (exact 1).
 
     Under its weight, a block has the right stress in its lowest row within 6 % with a linear
     basis, and 22 % too little (29 % too much in the next row) with quadratic-spline.
 
     The force acts in the direction of the steepest decrease of the depth. A point deeper than a
-    cell, or in the middle of a thin region, ends the run.
+    cell, or in the middle of a thin region, ends the run; past the middle it leaves on the other
+    side. A wall of one cell stops bodies up to a third of their wave speed.
 
     A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.54 in tlmpm and 1.55 in
     ulmpm (exact 1.541; points=cut), with an energy balance to 0.2 %. It sinks in by twice the force
