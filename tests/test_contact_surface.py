@@ -224,7 +224,9 @@ def test_a_rod_rebounds(run_interpreted):
 def test_a_wall_of_one_cell_stops_a_rod(run_interpreted):
     """Of APIC with splines at a fifth of its wave speed; points stopped one by one went through."""
     text = ROD.replace("ulmpm, FLIP, linear, 1", "ulmpm, APIC, quadratic-spline")
-    text = text.replace("-INF, 0", "-h, 0").replace("all, -0.1", "all, -2").replace(", v_x", ", a_x")
+    text = (
+        text.replace("-INF, 0", "-h, 0").replace("all, -0.1", "all, -2").replace(", v_x", ", a_x")
+    )
     text = text.replace("run_time(0.4)", "run_time(0.1)")
     done = run_interpreted(text.replace("compute(v, average_velocity", "compute(a, min_position"))
     assert min(done.log.a_x) > -0.5 * 0.125

@@ -39,6 +39,44 @@ def test_the_own_step_of_what_flows_bears_a_lone_point(run_interpreted, transfer
     assert "lone_points (points alone in cells); 0.9" in done.out
 
 
+AT_WALL = """
+scheme(SCHEME)
+method(ulmpm, APIC, BASIS)
+dimension(2, 0, 0.6, 0, 0.6, 0.1)
+region(b, block, 0, 0.1, 0.2, 0.3)
+eos(we, fluid, 1000, 1e5, 7)
+strength(ws, fluid, 0)
+material(water, eos-strength, we, ws)
+solid(s, region, b, 1, water, 0.1, 0)
+translate_particles(s, region, b, PLACE*0.1 - 0.05, 0.03)
+region(wall, block, -INF, 0, -INF, INF)
+group(wall, nodes, region, wall, all)
+fix(wall, velocity_nodes, wall, 0, NULL)
+fix(start, initial_stress, all, -10, -10, -10, 0, 0, 0)
+compute(Es, strain_energy, all)
+set_output(1)
+log_modify(custom, step, dt, Es)
+run(40)
+"""
+
+
+@pytest.mark.parametrize("basis", ["quadratic-spline", "cubic-spline"])
+@pytest.mark.parametrize(("scheme", "place"), [("musl", 0.06), ("musl", 0.12), ("usl", 0.12)])
+def test_a_lone_point_at_a_wall_is_as_stable(run_interpreted, basis, scheme, place):
+    """There D -> 0, and c sqrt(1 / D) without limit: the splash of a dam break gained energy."""
+    text = AT_WALL.replace("SCHEME", scheme).replace("BASIS", basis).replace("PLACE", str(place))
+    stored = run_interpreted(text).log["Es"]
+    assert stored[20:].max() < 1.5 * stored[:20].max()
+
+
+def test_usl_takes_a_smaller_step_for_a_lone_point(run_interpreted):
+    """The largest eigenvalue of a step over all places in a cell is 1 up to 0.544 h/c."""
+    text = SCRIPT.replace("TRANSFER", "APIC").replace("STEP", "scheme(usl)")
+    text = text.replace("region, b, 1,", "region, b, 2,")
+    dt = run_interpreted(text.replace("run(150)", "run(2)")).log["dt"][1:].max()
+    assert dt == pytest.approx(0.9 * 0.9 * 0.544 * 0.1 / C, rel=0.05)
+
+
 def test_above_the_limit_it_does_not(run_interpreted):
     """At 0.85 h/c, between the limits of one dimension and of two."""
     script = SCRIPT.replace("TRANSFER", "MLS").replace("STEP", f"set_dt({0.85 * 0.1 / C})")

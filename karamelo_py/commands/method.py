@@ -7,11 +7,13 @@ from typing import Annotated, Any, Literal
 
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
+from karamelo_py.language.rules import Feature, compare
 from karamelo_py.language.signature import Argument, Parameter, variants_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.styles.methods.base import CORRECTED
 
 
 def method(
@@ -40,7 +42,7 @@ def method(
         ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
     mass
         ``corrected``: remove most of the error of the lumped masses from the accelerations, with
-        APIC, AFLIP or MLS and splines.
+        APIC, AFLIP, MLS or TPIC and splines. Linear momentum is conserved.
 
     Example
     -------
@@ -84,6 +86,13 @@ def method(
     for family, item in parts.items():
         check_part(hub, f"{family} {call.names[family]}", item)
     chosen.basis_name = f"{basis} {call.variant}".strip()
+    if mass == "corrected":
+        names = ("method", kind), ("transfer", transfer), ("basis", chosen.basis_name)
+        words = f"method {kind}", f"transfer {transfer}", f"the basis {chosen.basis_name}"
+        compare(
+            {Feature(CORRECTED.option, "", CORRECTED.option): CORRECTED},
+            [Feature(*name, word) for name, word in zip(names, words, strict=True)],
+        )
     chosen.mark, chosen.corrected = hub.mark, mass == "corrected"
     hub.update.thermal = chosen.thermal
 

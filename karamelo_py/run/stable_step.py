@@ -104,8 +104,9 @@ def lone_point(hub: Hub) -> float:
     if not (keeps and stiff and flowing):
         return inf
     by_gradient = not update.transfer.traits.inverts_spread
+    usl = min(update.scheme.traits.courant) < 1 and not by_gradient
     share = CORRECTED_LONE if update.method.corrected else LONE
-    return share * 2 / sqrt(stiff[by_gradient] * hub.domain.dimension)
+    return share * 2 / sqrt(stiff[2 if usl else by_gradient] * hub.domain.dimension)
 
 
 def bears_drift(hub: Hub) -> bool:

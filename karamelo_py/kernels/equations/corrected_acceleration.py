@@ -2,7 +2,7 @@
 
 The lumped mass matrix m_I averages what the transfer maps to a node: a wave of wave number k loses
 the fraction kappa (k h)^2 of its acceleration, with kappa = D / h^2. Adjacent nodes along the axes
-return it in pairs, which conserves momentum to round-off::
+return it in pairs, which conserves linear momentum to round-off::
 
     a_I + kappa / m_I sum_J min(m_I, m_J) (a_I - a_J)
 """

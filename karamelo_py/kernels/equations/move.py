@@ -13,6 +13,7 @@ from karamelo_py.kernels.views import location_at
 from karamelo_py.points import kinematics, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry
 from karamelo_py.points.basis.cpdi import AtCorners
+from karamelo_py.points.basis.product import retained
 from karamelo_py.points.grid import Bounces, inside, reflected
 from karamelo_py.points.kinematics import dot
 
@@ -58,7 +59,7 @@ class Move(Task):
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
         warm(pt, v_pic - dv)
-        moment = in_company(pt, moment)
+        moment = towards_walls(pt, in_company(pt, moment))
         y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
         increase(pt.of(Bounces), pt.p, hits)
         store(pt.of(VelocityBefore), pt.p, old)
@@ -75,6 +76,14 @@ class Move(Task):
             store(w.locations.y, pt.p, new)
             moved += further_reach(w.basis, w.kin, w.grid, before, new)
         return Report(where(inside(w.grid, w.kin, y), moved, inf), fastest)
+
+
+def towards_walls(pt, moment):
+    kept = retained(pt.w.basis, pt.stencil) if len(moment) else ()
+    if not kept:
+        return moment
+    pairs = zip(moment, moment.places, strict=True)
+    return moment._make([kept[j] * a for a, (_, j) in pairs])
 
 
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:

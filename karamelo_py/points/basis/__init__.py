@@ -27,9 +27,9 @@ class BasisTraits(NamedTuple):
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # h^2 / D, and max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: the stiffness of
-    # a point alone at its nodes.
-    lone: tuple[float, float] | None = None
+    # h^2 / D, max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: the stiffness of a
+    # point alone at its nodes. Last, what the eigenvalues of a step of usl with D have.
+    lone: tuple[float, float, float] | None = None
     # D / h^2 where it is constant: mapping to the nodes and back damps waves by it.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations, in the updated frame.

@@ -59,6 +59,12 @@ def inverse_spread(basis, grid):
 
 
 @point_function(otherwise=True)
+def retained(basis, stencil):
+    """Return the retained fraction of a stored velocity gradient, per direction, or ()."""
+    return ()
+
+
+@point_function(otherwise=True)
 def evenly(basis, grid, stencil):
     """Return True if a point's D^-1 is `inverse_spread`."""
     return True

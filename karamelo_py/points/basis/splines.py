@@ -12,6 +12,7 @@ from karamelo_py.points.basis import BasisTraits, first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
 
+NARROW = 5 / 36  # D / h^2 of the first of three rows of points per cell at a wall
 BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls at faces of a cell
 
 
@@ -59,7 +60,7 @@ class QuadraticSpline(NamedTuple):
         least_nodes=3,
         steady_moment=True,
         steep_edge=False,
-        lone=(4.0, 6.0),
+        lone=(4.0, 6.0, 6.8),
         spread=1 / 4,
         courant_still=1.25,
     )
@@ -115,6 +116,21 @@ def _evenly_quadratic_spline(basis, grid, stencil):
     return first
 
 
+@product.retained.on(QuadraticSpline)
+def _retained_spline(basis, stencil):
+    """Drop velocity gradients towards a wall that is nearer than NARROW allows.
+
+    With the spread D -> 0 their node, of hardly any mass, is driven by the pressure of the point
+    with the frequency c / sqrt(D): a lone point at a wall would be unstable at any step.
+    """
+    kept = []
+    for line in stencil.lines:
+        spread = sum([w * (k - line.r) * (k - line.r) for k, w in enumerate(line.weights)])
+        ratio = where(spread < NARROW, spread / NARROW, 1)
+        kept.append(ratio * ratio * ratio)
+    return tuple(kept)
+
+
 @first_node.on(QuadraticSpline)
 def _first_node_quadratic_spline(basis, template):
     return 0.5
@@ -143,7 +159,14 @@ def of_splines(basis: type, of: type, functions: tuple) -> None:
 of_splines(
     QuadraticSpline,
     QuadraticSplineAtWalls,
-    (product.along, product.affine_along, product.inverse_spread, product.evenly, first_node),
+    (
+        product.along,
+        product.affine_along,
+        product.inverse_spread,
+        product.evenly,
+        product.retained,
+        first_node,
+    ),
 )
 
 
@@ -169,7 +192,7 @@ class CubicSpline(NamedTuple):
         least_nodes=4,
         steady_moment=True,
         steep_edge=False,
-        lone=(3.0, 3.14),
+        lone=(3.0, 3.14, 3.3),
         spread=1 / 3,
         corrected_share=0.95,
         courant_total=1.25,
@@ -254,6 +277,7 @@ def next_to_wall(grid, t):
     return weights, slopes, affine
 
 
+product.retained.on(CubicSpline)(_retained_spline)
 product.register(CubicSpline, 4)
 product.warn_of_many_nodes(CubicSpline)
 

@@ -27,7 +27,8 @@ class APIC(NamedTuple):
     al. 2015).
 
     In the updated frame, with bases whose D vanishes at nodes (linear, Bernstein-quadratic), the
-    velocity that deforms points omits the moments, which needs musl.
+    velocity that deforms points omits the moments, which needs musl. With splines, points nearer
+    than h/6 to a wall of the grid lose part of the velocity gradient across it.
 
     Example
     -------
