@@ -42,8 +42,3 @@ def law_on(law: Any, h: float, T0: float | None) -> Any:
         return value if values.get(name) is None else values[name]
 
     return type(law)(*map(on, law._fields, law))
-
-
-def elastic_law(law: Any) -> Any:
-    """Return the stress law of a law that adds a temperature or relaxation, else the law."""
-    return elastic_law(law.elastic) if hasattr(law, "elastic") else law

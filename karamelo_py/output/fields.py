@@ -11,7 +11,6 @@ from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, matter_of, some_of
 from karamelo_py.kernels.equations.internal_force import ContactLoss
 from karamelo_py.kernels.export import export
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
@@ -19,7 +18,7 @@ from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.node_columns import NodeTable
 from karamelo_py.output.point_table import Part, PointTable, Rows, absent, declared_columns
 from karamelo_py.points.grid import Bounces
-from karamelo_py.points.laws import can, dissipated_energy, energy_density
+from karamelo_py.points.laws import can, dissipated_energy, elastic_law, energy_density
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, one_of, table, unknown

@@ -23,7 +23,6 @@ from karamelo_py.kernels.export import (
     impose_temperature,
 )
 from karamelo_py.kernels.hook_loop import corners_that_move
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.kernels.ranks import Linked
 from karamelo_py.output.point_table import (
     AXES,
@@ -34,7 +33,7 @@ from karamelo_py.output.point_table import (
     declared_columns,
     places_before,
 )
-from karamelo_py.points.laws import can, with_stress, with_temperature
+from karamelo_py.points.laws import can, elastic_law, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import Mark, NoItem, ScriptError, nearest
 

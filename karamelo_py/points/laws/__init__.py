@@ -64,6 +64,12 @@ def can(law: NamedTuple, function: Callable) -> bool:
 _handing_on: set[Callable] = set()
 
 
+@point_function(otherwise=True)
+def elastic_law(law):
+    """Return the stress law of a law that adds a temperature or relaxation, else the law."""
+    return law
+
+
 def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
     """Decorate the implementation for a law that wraps another, which must have the function."""
 
@@ -93,6 +99,8 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
 
     for function in functions:
         register(function, function in (advance, with_temperature, with_stress, warmed, lit))
+    if component == "elastic":
+        elastic_law.on(outer)(lambda law: elastic_law(law.elastic))
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:

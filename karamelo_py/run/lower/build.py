@@ -18,7 +18,7 @@ from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.laws import elastic_law, law_in, law_on, law_table
+from karamelo_py.kernels.laws import law_in, law_on, law_table
 from karamelo_py.kernels.table import Dry, Insulated
 from karamelo_py.language import registry
 from karamelo_py.language.rules import Feature, Restrictions, compare
@@ -385,7 +385,7 @@ def lower_points(
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
-    elastic = elastic_law(used)
+    elastic = laws.elastic_law(used)
     stored = [kind for kind in kinds if kind.needed(elastic)]
     points = arrays.Points(
         x=x, home=None if method.frame.moves else places,

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
-from karamelo_py.kernels.laws import elastic_law, law_on
+from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
 from karamelo_py.output.units import FORCE, Powers
@@ -15,6 +15,7 @@ from karamelo_py.points.laws import (
     advance,
     can,
     cauchy_stress,
+    elastic_law,
     initial_state,
     specific_volume,
     with_stress,
@@ -287,8 +288,9 @@ class InitialStress(Fix):
 
     Notes
     -----
-    The stress of a hyperelastic material (neo-hookean) follows from its deformation and cannot be
-    set. Tension that a material cannot sustain, as in soil without cohesion, gives a warning.
+    The stress of a hyperelastic material (neo-hookean, orthotropic) follows from its deformation
+    and cannot be set. Tension that a material cannot sustain, as in soil without cohesion, gives a
+    warning.
     """
 
     published = ()
@@ -319,7 +321,7 @@ def refuse_following(hub: Hub, group: ParticleGroup) -> None:
             raise ScriptError(
                 f"the stress of solid '{solid.id}' follows from its deformation and cannot be set",
                 argument="group",
-                expected="a material in rate form, such as linear, or eos-strength but for jwl",
+                expected="linear, hill, jointed, viscoelastic, cam-clay or eos-strength (not jwl)",
             )
 
 

@@ -10,11 +10,10 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import pairs
 from karamelo_py.kernels.arrays import Block, Matter
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.rules import FLAT, Restrictions, gain
 from karamelo_py.language.signature import NonNegative
 from karamelo_py.points.bodies import Hertz, MinimizePenetration
-from karamelo_py.points.laws import parameter
+from karamelo_py.points.laws import elastic_law, parameter
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from karamelo_py.kernels.laws import elastic_law
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import PointTable
-from karamelo_py.points.laws import parameter
+from karamelo_py.points.laws import elastic_law, parameter
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import per_direction
