@@ -70,6 +70,10 @@ def elastic_law(law):
     return law
 
 
+def _elastic_law_within(law):
+    return elastic_law(law.elastic)
+
+
 def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
     """Decorate the implementation for a law that wraps another, which must have the function."""
 
@@ -100,7 +104,7 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
     for function in functions:
         register(function, function in (advance, with_temperature, with_stress, warmed, lit))
     if component == "elastic":
-        elastic_law.on(outer)(lambda law: elastic_law(law.elastic))
+        elastic_law.on(outer)(_elastic_law_within)
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
