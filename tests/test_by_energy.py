@@ -498,6 +498,20 @@ def test_energies_that_make_no_law(run_interpreted, words, says, instead):
     assert says in error and instead in error and ":2:" in error
 
 
+@pytest.mark.parametrize(
+    ("law", "marked"),
+    [
+        ("mooney-rivlin, 1000, -1e5, 0.5e5, 2e7", "-1e5"),
+        ("yeoh, 1000, 2e7, -3", "-3"),
+        ("ogden, 1000, 2e7, -3, 1", "-3"),
+    ],
+)
+def test_negative_moduli_are_marked(run_interpreted, law, marked):
+    err = run_interpreted(f"material(m, {law})\n", status=1).err
+    line, marks = next(pair for pair in pairwise(err.splitlines()) if {*pair[1]} == {*" |^"})
+    assert line[marks.index("^") :].startswith(marked) and "shear modulus at rest" in err
+
+
 def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
     line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
     said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err

@@ -138,9 +138,18 @@ def of_energy(
 
 
 def ready(
-    rho: float, formula: str, fibres: Sequence[Vector | Direction] = (), **numbers: float
+    rho: float,
+    formula: str,
+    fibres: Sequence[Vector | Direction] = (),
+    argument: str | None = None,
+    **numbers: float,
 ) -> Any:
-    return of_energy(rho, with_numbers(formula, **numbers), fibres)
+    """Return the law of a ready formula; `argument` is the one to blame for unstable constants."""
+    try:
+        return of_energy(rho, with_numbers(formula, **numbers), fibres)
+    except ScriptError as error:
+        error.argument = argument
+        raise
 
 
 VOLUME = "K/2*(J - 1)^2"
@@ -178,7 +187,7 @@ class MooneyRivlin(OfInvariants, Fields):
     @classmethod
     def given(cls, rho: AboveZero, C10: float, C01: float, K: AboveZero) -> Any:
         formula = f"C10*(I1*J^(-2/3) - 3) + C01*(I2*J^(-4/3) - 3) + {VOLUME}"
-        return ready(rho, formula, C10=C10, C01=C01, K=K)
+        return ready(rho, formula, argument="C10", C10=C10, C01=C01, K=K)
 
 
 class Yeoh(OfInvariants, Fields):
@@ -217,7 +226,7 @@ class Yeoh(OfInvariants, Fields):
             )
         numbers = {f"C{k}0": C for k, C in enumerate(constants, 1)}
         parts = [f"C{k}0*(I1*J^(-2/3) - 3)^{k}" for k in range(1, len(constants) + 1)]
-        return ready(rho, " + ".join([*parts, VOLUME]), K=K, **numbers)
+        return ready(rho, " + ".join([*parts, VOLUME]), argument="constants", K=K, **numbers)
 
 
 class Gent(OfInvariants, Fields):
@@ -332,7 +341,7 @@ class SaintVenantKirchhoff(OfInvariants, Fields):
     @classmethod
     def given(cls, rho: AboveZero, lam: float, G: AboveZero) -> Any:
         formula = "lam/8*(I1 - 3)^2 + G/4*(I1^2 - 2*I2 - 2*I1 + 3)"
-        return ready(rho, formula, lam=lam, G=G)
+        return ready(rho, formula, argument="G", lam=lam, G=G)
 
 
 class Ogden(OfInvariants, Fields):
@@ -377,7 +386,7 @@ class Ogden(OfInvariants, Fields):
             powers = f"l1^a{k} + l2^a{k} + l3^a{k}"
             parts.append(f"m{k}/a{k}*(({powers})*J^(-a{k}/3) - 3)")
             numbers |= {f"m{k}": mu, f"a{k}": alpha}
-        return ready(rho, " + ".join(parts), **numbers)
+        return ready(rho, " + ".join(parts), argument="pairs", **numbers)
 
 
 class Holzapfel(OfFibres, Fields):

@@ -1,6 +1,7 @@
 """Damages by stress: tuler-butcher, cochran-banner, formula."""
 
 from collections import namedtuple
+from math import isnan, nan
 from typing import Any, ClassVar, NamedTuple
 
 from karamelo_py.compiler import real, where
@@ -19,6 +20,7 @@ from karamelo_py.points.laws.formulas import (
 )
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.temperatures import temperature_or
+from karamelo_py.script.errors import ScriptError
 
 
 class TulerButcher(NamedTuple):
@@ -228,7 +230,19 @@ class DamageFormula(ByRate, DamageFields):
         codes["style"] = "formula"
         codes["in_lanes"] = in_lanes(codes["rate"])
         fields = {"brittleness": brittleness, "initial_temperature": T}
-        return writer.law(ByRate, fields, codes)
+        law = writer.law(ByRate, fields, codes)
+        pulled = 1.0, -1 / 3, 1.0, 1 / 3, 1.0, T, 0.5
+        try:
+            growth = evaluated(law.rate, law, pulled)
+        except ArithmeticError:
+            growth = nan
+        if isnan(growth):
+            raise ScriptError(
+                "the growth is no number in uniaxial tension",
+                argument="rate",
+                expected="a number for every tension, such as max(s1, 0)",
+            )
+        return law
 
 
 column(ByRate, "damage", damage)
