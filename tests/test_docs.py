@@ -394,6 +394,13 @@ def _tried(lines, dimension, folder):
     interpreter = _scene(dimension, folder)
     for line in lines:
         words = re.findall(r"\w+", line)
+        if words[2] == "joint" or words[2:4] == ["contact", "bodies"]:
+            interpreter.run_text("material(lead, rigid, 1)")
+            h = STAGES[dimension][0].split()[-1]
+            for solid in {"floor", "box", "ball", "arm", "forearm"} & {*words[3:]}:
+                interpreter.run_text(f"solid({solid}, region, disk, 2, lead, {h}, 0)")
+            interpreter.run_text(line)
+            continue
         if words[2] == "contact" and words[4] != "plane":
             interpreter = _scene(dimension, folder, "ulmpm/contacts")
             h = STAGES[dimension][0].split()[-1]

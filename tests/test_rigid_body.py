@@ -317,7 +317,7 @@ def test_rigid_bodies_that_pass_through_each_other_are_reported(run_interpreted)
     second += "fix(c, rigid_body, two, spin=1)\n"
     text = alone("force=(-12*(b_x - 4), 0)", "b_x").replace("scheme(", second + "scheme(")
     result = run_interpreted(text)
-    assert "'body' passes through other rigid solids: two" in result.err
+    assert "it passes through other rigid solids: two" in result.err
     # Leapfrog of period 2 pi: 2 arcsin(dt / 2) / dt.
     rate = 2 * np.arcsin(0.05) / 0.1
     assert result.log.b_x == pytest.approx(4 - np.cos(rate * result.log.Time), rel=1e-3)

@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.compiler import caller_of, kernel, noinline, point_function
 from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels import arrays
+from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, list_pairs
 from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
@@ -211,6 +211,18 @@ def _reaction(body, s):
 
 
 @noinline
+def _add_links(body, s):
+    """Add the forces of other bodies to the forces that the method publishes."""
+    given, centre, values = body.solution.given, body.state[0].x, s.control.values
+    kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        about = centre[i] * given[j] - centre[j] * given[i]
+        values[force[body.field] + k] += given[k] / kick
+        values[torque[body.field] + k] += (given[3 + k] + about) / kick
+
+
+@noinline
 def _follow(s, n, again):
     """Let a node of a body follow the surface that it touches, for the velocity that deforms this.
 
@@ -231,28 +243,51 @@ def _follow(s, n, again):
 # --- rows -------------------------------------------------------------------------------------
 
 
+@noinline
+def _list_contacts(body, s):
+    """List the contacts of a body with what deforms."""
+    body.count[0] = 0
+    for surface in body.surfaces:
+        for c in range(s.kin.dimension):
+            s.control.values[surface.slot + c] = 0.0
+        for c in range(3 if surface.torque else 0):
+            s.control.values[surface.torque + c] = 0.0
+        for number, block in enumerate(s.blocks):
+            _list_points(body, surface, s, block, number)
+    if isinstance(s.contact, SeparateFields):
+        _lead_nodes(body, s)
+        _list_nodes(body, s)
+
+
+@noinline
+def _push(body, s):
+    """Give the impulses of a body to what deforms; its nodes take its velocity."""
+    if isinstance(s.contact, SeparateFields):
+        _lead_nodes(body, s)
+    else:
+        for number, block in enumerate(s.blocks):
+            _give_to_points(body, s, block, number, False)
+
+
 @kernel
 def _meet(s):
     """Find the velocities of all bodies at the end of the step."""
-    for body in s.bodies.bodies:
+    bodies, links = s.bodies.bodies, s.bodies.links
+    if isinstance(links, rigid_links.Links):
+        for body in bodies:
+            motion.start_step(body, s.control)
+        if rigid_links.find(links, bodies, s.control, s.kin):
+            for body in bodies:
+                _list_contacts(body, s)
+            rigid_links.solve(links, bodies, s.control)
+            for body in bodies:
+                _push(body, s)
+            return
+    for body in bodies:
         motion.start_step(body, s.control)
-        body.count[0] = 0
-        for surface in body.surfaces:
-            for c in range(s.kin.dimension):
-                s.control.values[surface.slot + c] = 0.0
-            for c in range(3 if surface.torque else 0):
-                s.control.values[surface.torque + c] = 0.0
-            for number, block in enumerate(s.blocks):
-                _list_points(body, surface, s, block, number)
-        if isinstance(s.contact, SeparateFields):
-            _lead_nodes(body, s)
-            _list_nodes(body, s)
+        _list_contacts(body, s)
         motion.solve(body, s.control.values[arrays.DT])
-        if isinstance(s.contact, SeparateFields):
-            _lead_nodes(body, s)
-        else:
-            for number, block in enumerate(s.blocks):
-                _give_to_points(body, s, block, number, False)
+        _push(body, s)
 
 
 @kernel
@@ -261,6 +296,7 @@ def _part(s):
     for body in s.bodies.bodies:
         if isinstance(s.contact, SeparateFields):
             _reaction(body, s)
+            _add_links(body, s)
         else:
             for number, block in enumerate(s.blocks):
                 _give_to_points(body, s, block, number, True)
@@ -293,6 +329,7 @@ class FreeBodies(NamedTuple):
 
     bodies: tuple[motion.FreeBody, ...]
     held: np.ndarray  # (N, d) bool: nodes whose velocity is prescribed
+    links: rigid_links.NoLinks | rigid_links.Links
     rows_first = (Once(_meet),)
     rows_last = Once(_part), each_point(_lead_point, Rigid)
     rows_before = (each_node(lambda s, n: _follow(s, n, False)),)

@@ -86,6 +86,7 @@ class Solution(NamedTuple):
     residual: np.ndarray
     trial_residual: np.ndarray
     total: np.ndarray  # of impulses
+    given: np.ndarray  # impulses of other bodies
     after: np.ndarray  # momentum, with contact
     before: np.ndarray  # centre before the step, (3,)
     mass: np.ndarray  # (6, 6)
@@ -115,7 +116,7 @@ def index_of(field: str) -> int:
 
 
 def new_solution() -> Solution:
-    arrays = [np.zeros(6) for _ in range(7)]
+    arrays = [np.zeros(6) for _ in range(8)]
     return Solution(*arrays, np.zeros(3), np.zeros((6, 6)), np.zeros((6, 7)), np.eye(3, 6))
 
 
@@ -223,6 +224,14 @@ def from_start(state, a):
 
 
 @noinline
+def place_of(state, constants, x):
+    """Return where the position `x` (3,) of a body at the start is now."""
+    begin = constants.start
+    way = from_start(state, (x[0] - begin[0], x[1] - begin[1], x[2] - begin[2]))
+    return way[0] + state.x[0], way[1] + state.x[1], way[2] + state.x[2]
+
+
+@noinline
 def set_mass(body):
     """Put the mass and the inertia about the present axes into the mass matrix."""
     M, state, constants = body.solution.mass, body.state[0], body.constants[0]
@@ -282,7 +291,7 @@ def _set_impulse(body, u, i, dt, bounded):
 
 
 @noinline
-def _residual(body, dt, u, rest, bounded):
+def residual(body, dt, u, rest, bounded):
     """Put M U - P + sum A^T p into `rest`; return its square, in units of energy."""
     work = body.solution
     M, total, square = work.mass, work.total, 0.0
@@ -302,7 +311,7 @@ def _residual(body, dt, u, rest, bounded):
 
 
 @noinline
-def _add_slope(body, i, bounded):
+def add_slope(body, i, bounded):
     """Add A^T (dp/dr) A of contact `i`, whose impulse is known, to the slope."""
     c, A, J = body.contacts[i], body.solution.lever, body.solution.slope
     if not c.push > 0:
@@ -323,7 +332,7 @@ def _add_slope(body, i, bounded):
 
 
 @noinline
-def _solve_system(J):
+def solve_system(J):
     """Solve J (6, 7) by elimination with pivots; the result replaces the last column."""
     for k in range(6):
         best = k
@@ -348,7 +357,7 @@ def _iterate(body, dt, bounded):
     """Newton's method with halved steps; return whether it has converged."""
     work = body.solution
     M, J, energy = work.mass, work.slope, 0.0
-    size = _residual(body, dt, work.u, work.residual, bounded)
+    size = residual(body, dt, work.u, work.residual, bounded)
     for a in range(6):
         energy += work.momentum[a] ** 2 / M[a, a]
     scale = max(size, GOOD_ENOUGH * energy)
@@ -358,24 +367,24 @@ def _iterate(body, dt, bounded):
         body.state[0].passes += 1
         J[:, :6], J[:, 6] = M, work.residual
         for i in range(body.count[0]):
-            _add_slope(body, i, bounded)
+            add_slope(body, i, bounded)
         for a in range(6):
             if not body.dofs[a]:
                 for b in range(6):
                     J[a, b] = J[b, a] = 0.0
                 J[a, a], J[a, 6] = 1.0, 0.0
-        _solve_system(J)
+        solve_system(J)
         part, better, now = 1.0, False, size
         for _ in range(HALVINGS):
             for a in range(6):
                 work.trial[a] = work.u[a] - part * J[a, 6]
-            now = _residual(body, dt, work.trial, work.trial_residual, bounded)
+            now = residual(body, dt, work.trial, work.trial_residual, bounded)
             if now < size:
                 better = True
                 break
             part *= 0.5
         if not better:
-            _residual(body, dt, work.u, work.residual, bounded)
+            residual(body, dt, work.u, work.residual, bounded)
             return size <= GOOD_ENOUGH * scale
         work.u[:], work.residual[:] = work.trial, work.trial_residual
         size = now
@@ -455,7 +464,7 @@ def _velocities_of(body, momentum):
         for b in range(6):
             J[a, b] = M[a, b] if body.dofs[a] else (1.0 if a == b else 0.0)
         J[a, 6] = momentum[a] if body.dofs[a] else work.u[a]
-    _solve_system(J)
+    solve_system(J)
     work.u[:] = J[:, 6]
 
 
@@ -469,9 +478,10 @@ def finish_step(body, control, dimension):
     state, work, values = body.state[0], body.solution, control.values
     kick, dt, total = control.step[0].kick, values[DT], work.total
     for k in range(3):
-        state.force[k], state.torque[k] = -total[k] / kick, -total[3 + k] / kick
+        state.force[k] = (work.given[k] - total[k]) / kick
+        state.torque[k] = (work.given[3 + k] - total[3 + k]) / kick
     for a in range(6):
-        work.after[a] = work.momentum[a] - total[a]
+        work.after[a], work.given[a] = work.momentum[a] - total[a], 0.0
     _velocities_of(body, work.after)
     u, M, old, partly, change = work.u, work.mass, work.slope, False, 0.0
     for k in range(3):

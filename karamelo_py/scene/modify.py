@@ -121,6 +121,7 @@ class Fix(Publisher):
     reads_itself = False  # its formulas may contain its own values
     moves: Any = None  # rigid solid, by the forces on it
     touches: Any = None  # rigid solid that its points push, and that pushes them
+    links = False  # contact or joint between rigid bodies
     ignites = False
     follows_points = False  # force depends on positions of points (tools)
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
@@ -152,6 +153,11 @@ class Fix(Publisher):
     def of_rigid_points(self) -> bool:
         soft = (solid for solid in self.hub.solids.values() if not solid.rigid)
         return isinstance(self.group, ParticleGroup) and not any(map(self.group.touches, soft))
+
+    @property
+    def of_bodies(self) -> bool:
+        """True if it moves, touches or links rigid bodies."""
+        return self.moves is not None or self.touches is not None or self.links
 
     @property
     def nodes(self) -> np.ndarray:

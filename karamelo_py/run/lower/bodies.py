@@ -13,6 +13,7 @@ from karamelo_py.kernels.contact import ListedPairs
 from karamelo_py.kernels.touching import CALL
 from karamelo_py.points.laws import can, constrained_velocity, is_rigid
 from karamelo_py.run.lower.hooks import NO_PROGRAM
+from karamelo_py.run.lower.links import lower_links
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix, moved
@@ -40,7 +41,8 @@ def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
             if formula is not None:
                 fixed[slice(None) if fix.group.all else fix.nodes, k] = True
     kind = kernel.FreeBodies if hub.update.method.fields_per_solid else kernel.BodiesAtPoints
-    return kind(tuple(_body(hub, fix, len(fixed)) for fix in moving), fixed)
+    bodies = tuple(_body(hub, fix, len(fixed)) for fix in moving)
+    return kind(bodies, fixed, lower_links(hub, moving))
 
 
 def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
@@ -154,6 +156,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
             raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
         acts = fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix)
+        acts = acts or any(other.links for other in hub.fixes.values())
         if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
             raise _error(fix, f"nothing acts on the body '{body.id}': it stays at rest", hint)

@@ -263,8 +263,8 @@ def lower(
 
 
 def fixes_of_bodies(hub: Hub) -> tuple:
-    fixes = [f for f in hub.fixes.values() if f.moves or f.touches or f.prescribes_velocity]
-    return tuple(fixes) if any(fix.moves or fix.touches for fix in fixes) else ()
+    fixes = [f for f in hub.fixes.values() if f.of_bodies or f.prescribes_velocity]
+    return tuple(fixes) if any(fix.of_bodies for fix in fixes) else ()
 
 
 def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]:

@@ -99,12 +99,12 @@ class RigidBody(Fix):
 
     Formulas may contain its published values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the
     same ID replaces this one, and the body retains its velocity: to release it, repeat the line
-    without fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through each
-    other, rigid solids and held nodes.
+    without fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through held
+    nodes, and without fix contact/bodies through each other.
 
     See Also
     --------
-    contact/rigid_body, velocity_particles, material rigid, method ulmpm/contacts
+    contact/rigid_body, contact/bodies, joint, velocity_particles, method ulmpm/contacts
     """
 
     syntax = (
@@ -250,12 +250,6 @@ class RigidBody(Fix):
                 kept.x = self.state.x
             self.state[:] = kept
             self._spin_up()
-        others = [s.id for s in self.hub.solids.values() if s.rigid and s is not self.body]
-        if others and before is None:
-            self.hub.warn(
-                f"'{self.body.id}' passes through other rigid solids: {', '.join(others)}",
-                hint="one of two that may meet deforms: neo-hookean, stiffer than the rest",
-            )
         for slot, column in self.slots():
             self.hub.values.array[slot] = self.numbers[column]
 
