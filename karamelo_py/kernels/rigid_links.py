@@ -41,7 +41,7 @@ from karamelo_py.kernels.surfaces import (
 
 SOFT = 1e-5
 GIVEN_BACK = 0.1  # fraction of a penetration removed in a step
-SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # square of the residual, over that of the momentum
+SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # square of the residual over the squared momentum
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # along a step; slope there over the slope at its start
 SLOW = 1e-9  # approach that is no collision, over the fastest one
 COLLISIONS = 50  # at most, for each contact
