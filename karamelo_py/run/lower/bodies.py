@@ -155,8 +155,8 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
             raise _error(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
         if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
             raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
-        acts = fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix)
-        acts = acts or any(other.links for other in hub.fixes.values())
+        moves = fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin)
+        acts = moves or surfaces_of(fix) or any(other.links for other in hub.fixes.values())
         if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
             raise _error(fix, f"nothing acts on the body '{body.id}': it stays at rest", hint)

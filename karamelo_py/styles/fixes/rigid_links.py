@@ -123,8 +123,8 @@ class ContactBodies(Fix):
             raise ScriptError(message, argument="first", expected="a solid with a fix rigid_body")
 
     def defined(self) -> None:
-        pairs = {pair: other for other in contacts(self.hub) if other is not self
-                 for pair in other.pairs()}  # fmt: skip
+        others = [fix for fix in contacts(self.hub) if fix is not self]
+        pairs: dict[frozenset[str], Any] = {pair: fix for fix in others for pair in fix.pairs()}
         for pair in self.pairs():
             if pair in pairs:
                 a, b = sorted(pair)
