@@ -22,7 +22,6 @@ STYLES = {
 # Lines that must be refused, after a domain in 2D.
 LINES = {
     "sheared periodic": "boundary(sheared, x)",
-    "torsion": "axisymmetric(true, twist=true)",
     "grids refined": "refine_grid(0.05)",
 }
 

@@ -65,10 +65,12 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
     if not built_in or update.thermal or any(can(law, constrained_velocity) for law in laws):
         return False
 
-    def stress(points: PointTable) -> np.ndarray:
-        return np.max([np.abs(points.particle("s" + c)) for c in COMPONENTS], axis=0)
+    columns = ("vtheta", *["s" + c for c in COMPONENTS])
 
-    return simulation.fastest() == 0 and simulation.points.largest(stress)[0] == 0
+    def largest(points: PointTable) -> np.ndarray:
+        return np.max([np.abs(points.particle(name)) for name in columns], axis=0)
+
+    return simulation.fastest() == 0 and simulation.points.largest(largest)[0] == 0
 
 
 def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.advice.basics import is_zero
 from karamelo_py.points.kinematics import free_from
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.laws import law_parts, law_traits
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
@@ -65,7 +66,7 @@ def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
 def _flat(hub: Hub) -> Words:
     domain = hub.domain
     d = domain.dimension
-    if d == 1 or len(hub.lattices) > 1:
+    if d == 1 or len(hub.lattices) > 1 or isinstance(domain.kin, Twisted):
         return
     round_ = domain.kin.hoops > 0
     whole = "thickness" if d == 3 else "length" if round_ else "cross-section"

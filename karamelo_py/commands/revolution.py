@@ -2,28 +2,49 @@
 
 from karamelo_py.commands.thin import refuse_uneven
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 
-def axisymmetric(hub: Hub, active: bool) -> None:
+def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     """Make x the radius and y the axis of symmetry.
+
+    Parameters
+    ----------
+    active
+        ``true``, or ``false`` for plane strain (the default).
+    twist
+        Bodies also rotate around the axis, each point with a different angle: torsion, spinning
+        bodies, swirling fluids.
 
     Example
     -------
     dimension(2, 0, 10, 0, 30, 0.5)
     axisymmetric(true)
+    axisymmetric(true, twist=true)
 
     Notes
     -----
     Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
     radian: multiply forces and energies by 2 pi for the whole body.
 
+    With twist, z is the direction around the axis: shears 13 and 23 are those of r-theta and
+    z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
+    and fix angular_velocity_nodes holds and rotates nodes. Columns of points: ``vtheta``, this
+    velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the
+    one about the axis, which steps conserve to round-off, as ID_y. Needs ulmpm or tlmpm on one
+    process and no GPU, an explicit scheme, no rigid solids, and neither contact between solids nor
+    fixes velocity_nodes with bounds or friction.
+
     See Also
     --------
-    dimension, cylindrical, spherical
+    dimension, cylindrical, spherical, fix angular_velocity_nodes
     """
-    _set(hub, active, Axisymmetric())
+    if twist and not active:
+        message = "only a body of revolution can twist around its axis"
+        raise ScriptError(message, argument="twist", expected="axisymmetric(true, twist=true)")
+    _set(hub, active, Twisted() if twist else Axisymmetric())
 
 
 def cylindrical(hub: Hub, active: bool) -> None:
@@ -77,7 +98,7 @@ INSTEAD = {1: "cylindrical(true) or spherical(true)", 2: "axisymmetric(true)"}
 
 def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) -> None:
     domain, d, name = hub.require_domain(), kin.dimension, kin.word
-    same = isinstance(domain.kin, type(kin))
+    same = type(domain.kin) is type(kin) if active else isinstance(domain.kin, type(kin))
     if active and domain.dimension != d:
         message = f"{name} scenes have {SPACES[d]}, not {domain.dimension}"
         expected = f"dimension({d}, ...) before {name}(true)"

@@ -259,6 +259,8 @@ SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
 POST_CONTACT = 10  # damping, also of contact forces
 POST_WATER_TO_GRID = 11  # accelerations of nodes, for the water in their pores
+POST_UPDATE_GRID_ROTATION = 12
+POST_ROTATION_TO_GRID = 13
 
 # node array on which a hook acts
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
@@ -399,7 +401,7 @@ class Setup(NamedTuple):
     contact: Tag
     bodies: Tag  # freely moving rigid bodies, or none
     heat: Tag
-    water: Tag  # in the pores, or none
+    company: Tag  # of tasks and quantities: water in the pores, rotation around an axis, none
     grids: Grid  # an array (g,) for each number
     nodes: Nodes
     buffers: Buffers

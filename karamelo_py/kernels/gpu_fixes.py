@@ -19,6 +19,7 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
+from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
@@ -252,7 +253,16 @@ def _add_all(copy, first_row, solid, total):
             totals.add_to(copy, first_row + solid * len(total) + k, number)
 
 
+ADDED = WorkOfForces, VelocityAround
+
+
 def add_work(i, fate, s, block, copies):
+    """Add a point's work of forces, and its energy of rotation."""
+    around = field(block.points.fields, VelocityAround)
+    if around is not None:
+        v = float(around[0, i])
+        energy = 0.5 * float(block.points.mass[i]) * v * v
+        totals.add_to(copies[index((i // 32) % len(copies))], totals.KINETIC, energy)
     work = field(block.points.fields, WorkOfForces)
     if work is not None:
         totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))

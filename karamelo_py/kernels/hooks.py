@@ -64,7 +64,11 @@ HEAT_STAGES = {
     "supply_heat": arrays.SUPPLY_HEAT,
     "post_update_grid_heat": arrays.POST_UPDATE_GRID_HEAT,
 }
-STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES
+ROTATION_STAGES = {
+    "post_update_grid_rotation": arrays.POST_UPDATE_GRID_ROTATION,
+    "post_rotation_to_grid": arrays.POST_ROTATION_TO_GRID,
+}
+STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES | ROTATION_STAGES
 
 
 class CompiledHook(NamedTuple):
@@ -94,6 +98,7 @@ WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
 # Hooks on whole points may act wherever points are.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
+    **dict.fromkeys(ROTATION_STAGES, "nodes"),
     **dict.fromkeys(POINT_STAGES, "points"),
     "supply_heat": "heated points",
 }

@@ -1,6 +1,5 @@
 """Rows of pore water, and how its quantities join the soil's."""
 
-from types import MappingProxyType
 from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
@@ -14,7 +13,7 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import Company, NodeTask, Processor, take
+from karamelo_py.kernels.table import Company, NodeTask, Processor, companies, take
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -60,14 +59,15 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s))
 
 
-COMPANY = {
-    MassMomentum: Company(then=(pores.WaterMomentum(),)),
-    InternalForce: Company(then=(pores.WaterForce(),)),
-    MomentumAgain: Company(then=(pores.WaterMomentumAgain(),)),
-    NodalUpdate: Company(before=(AtWater(), NodeTask(pores.ShareForces, make=share_forces))),
-    Move: Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),)),
-    Strain: Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),)),
-}
+COMPANIES = (
+    (MassMomentum, Company(then=(pores.WaterMomentum(),))),
+    (InternalForce, Company(then=(pores.WaterForce(),))),
+    (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
+    (NodalUpdate, Company(before=(AtWater(), NodeTask(pores.ShareForces, make=share_forces)))),
+    (Move, Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))),
+    (Strain, Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
+)
+SLOW_COMPANIES = COMPANIES[:1]
 
 
 class Water(NamedTuple):
@@ -75,13 +75,20 @@ class Water(NamedTuple):
 
     point_fields = pores.POINT_FIELDS
     node_fields = pores.NODE_FIELDS
-    company = MappingProxyType(COMPANY)
+
+
+@companies.on(Water)
+def _companies_water(tag):
+    return COMPANIES
 
 
 class SlowWater(NamedTuple):
     """Water in load steps, whose equations are in `run.implicit.pore_water`."""
 
-    company = MappingProxyType({MassMomentum: COMPANY[MassMomentum]})
+
+@companies.on(SlowWater)
+def _companies_slow_water(tag):
+    return SLOW_COMPANIES
 
 
 impose_pore_pressure = imposing(with_pore_pressure)

@@ -7,7 +7,6 @@ memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and
 """
 
 from collections.abc import Iterable, Iterator
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import kernel, point_function, real
@@ -276,21 +275,28 @@ COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
 class Company(NamedTuple):
-    """Company of a task or quantity in a scene (`Setup.water`)."""
+    """Company of a task or quantity in a scene (`Setup.company`)."""
 
     before: tuple = ()  # rows before it
     first: tuple = ()  # tasks or quantities in the same visit, before it
     then: tuple = ()  # and after it
 
 
-class Dry(NamedTuple):
-    company = MappingProxyType({})
+class NoCompany(NamedTuple):
+    pass
+
+
+@point_function(otherwise=True)
+def companies(tag: Any) -> tuple:
+    """Return pairs of a class of tasks or quantities, and its `Company`."""
+    return ()
 
 
 def company_of(tag: Any, s: Setup) -> Company:
-    for kind in type(tag).__mro__:
-        if kind in s.water.company:
-            return s.water.company[kind]
+    kinds = tag.__mro__ if isinstance(tag, type) else type(tag).__mro__
+    for kind, company in companies.find((type(s.company),))(s.company):
+        if kind in kinds:
+            return company
     return Company()
 
 
@@ -315,7 +321,7 @@ def _rows_of_scene(row, s):
 
 @in_scene.on(NodeTask)
 def _after_others(row, s):
-    return (row,) if row.at or row.make else (*company_of(row.task, s).before, row)
+    return (row,) if row.at else (*company_of(row.task, s).before, row)
 
 
 @in_scene.on(Sweep)

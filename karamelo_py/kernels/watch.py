@@ -16,6 +16,7 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws, matter_of
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
+from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import state_at
@@ -94,6 +95,13 @@ def _sum_energies(mode, matter, tiling, control):
 
 
 @kernel
+def _add_rotation(mass, around, control):
+    for p in range(mass.size):
+        v = float(around[0, p])
+        totals.add_to(control.totals, totals.KINETIC, 0.5 * float(mass[p]) * v * v)
+
+
+@kernel
 def _take_work(work, control):
     for p in range(work.size):
         totals.add_to(control.totals, totals.WORK, float(work[0, p]))
@@ -107,6 +115,9 @@ def sum_energies(s, mode):
     for block in s.blocks:
         if not is_rigid(block.laws):
             _sum_energies(mode, matter_of(s.kin, block), block.tiling, s.control)
+        around = field(block.points.fields, VelocityAround)
+        if around is not None:
+            _add_rotation(block.points.mass, around, s.control)
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)

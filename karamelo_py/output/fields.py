@@ -10,6 +10,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, matter_of, some_of
 from karamelo_py.kernels.equations.internal_force import ContactLoss
+from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, rounded
 from karamelo_py.language.arguments import Argument
@@ -254,7 +255,10 @@ def ranges(count: int) -> Iterator[tuple[int, int]]:
 def _kinetic(s: Setup, block: Block) -> np.ndarray:
     points = block.points
     v = point_table.shown_velocity(s, points).astype(float)
-    return 0.5 * points.mass.astype(float) * (v**2).sum(axis=0)
+    squared = (v**2).sum(axis=0)
+    if (around := fields.field(points.fields, VelocityAround)) is not None:
+        squared += around[0].astype(float) ** 2
+    return 0.5 * points.mass.astype(float) * squared
 
 
 def _of_law(density: Any) -> Callable:

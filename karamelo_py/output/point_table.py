@@ -20,6 +20,7 @@ from karamelo_py.kernels.arrays import (
 )
 from karamelo_py.kernels.equations.move import VelocityBefore
 from karamelo_py.kernels.heat import Conducting
+from karamelo_py.kernels.twist import rotating
 from karamelo_py.language.scene import Scene
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.laws import columns_of
@@ -226,6 +227,8 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
     frame, averaging, *others = of_method
     owners = [frame, update.transfer, averaging, contact, heat, grids]
     materials = [solid.material for solid in hub.solids.values()]
+    if hub.domain is not None:
+        owners += rotating(hub.domain.kin, update.transfer)
     owners += [hub.domain, *hub.fixes.values(), update, update.scheme, *others]
     return [*owners, *(part for one in materials for part in (one.law, one.fluid))]
 

@@ -13,10 +13,9 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
 from karamelo_py.compiler.programs import EVALUATE
-from karamelo_py.kernels import arrays, gpu, heat, table
+from karamelo_py.kernels import arrays, gpu, heat, table, twist
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
-from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
@@ -237,9 +236,9 @@ class StepsOnCard:
         return [int(slot) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL]
 
     def hooks_on_nodes(
-        self, stage: int, target: int, of_heat: bool = False
+        self, stage: int, target: int, at: Callable | None = None
     ) -> Iterator[KernelLaunch]:
-        s = heat.at_its_nodes(self.s) if of_heat else self.s
+        s, of_heat = at(self.s) if at else self.s, at is heat.at_its_nodes
         own = [h for h, row in enumerate(self.table) if row.stage == stage]
         yield from self._clear_again(stage, own)
         if own and target == arrays.ON_UPDATE and self.hooks.holders.size:
@@ -350,7 +349,7 @@ class StepsOnCard:
             if not is_rigid(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
                 found.append(self.launch(fixes.add_energies, threads, s, block, copies))
-            if field(block.points.fields, WorkOfForces) is not None:
+            if any(field(block.points.fields, kind) is not None for kind in fixes.ADDED):
                 found.append(self.of_points(fixes.add_work, block, copies))
         found += [*self.collect(0, WORK + 1), *self.collect(*solids)]
         before, behind = (
@@ -496,7 +495,12 @@ def _at_nodes(row, steps):
 
 @take.on(heat.AtHeatNodes, Card)
 def _at_heat_nodes(row, steps):
-    return steps.hooks_on_nodes(row.stage, row.target, of_heat=True)
+    return steps.hooks_on_nodes(row.stage, row.target, heat.at_its_nodes)
+
+
+@take.on(twist.AtRotation, Card)
+def _at_rotation(row, steps):
+    return steps.hooks_on_nodes(row.stage, row.target, twist.at_its_nodes)
 
 
 @take.on(table.AtPoints, Card)

@@ -3,7 +3,7 @@
 The total frame has reference volume and gradients, and the first Piola-Kirchhoff stress.
 """
 
-from karamelo_py.compiler import real, where
+from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, StepField, increase, load_vector, vector
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
@@ -67,14 +67,21 @@ def stretch_levers(pt, growth):
         lever[d, pt.p] = lever[d, pt.p] * (1 + rate)
 
 
+@point_function(otherwise=True)
+def force_around(kin, pt):
+    """Return the force (d,) of a rotation around the axis, or ()."""
+    return ()
+
+
 @eq.reads("force")
-def force_of_fixes(pt):
-    """Return the force (d,) of fixes, or ()."""
-    force = pt.load(Force, pt.v)
+def force_on_point(pt):
+    """Return the force (d,) of fixes and rotation, or ()."""
+    force, around = pt.load(Force, pt.v), force_around(pt.kin, pt)
     if not len(force):
-        return ()
+        return around
     # A force on rigid points would act on other points at their nodes.
-    return of_present(pt.p, real(0 if laws.is_rigid(pt.w.laws) else 1, force[0])) * force
+    force = of_present(pt.p, real(0 if laws.is_rigid(pt.w.laws) else 1, force[0])) * force
+    return force + around if len(around) else force
 
 
 @eq.reads()
@@ -100,7 +107,7 @@ def affine_force(pt, w):
 class InternalForce(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "internal force"
-    takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_of_fixes, mean=V_mean_stress)
+    takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_on_point, mean=V_mean_stress)
     gives = (
         eq.Sum(eq.FORCE, force_at, affine_force),
         eq.Sum(eq.whole(NodalStress), lambda pt, node: tuple([node.N * a for a in pt.mean])),

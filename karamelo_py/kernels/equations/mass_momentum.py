@@ -66,12 +66,15 @@ class MassMomentum(eq.NodalQuantity):
     )
 
 
-@eq.reads("moment")
-def moment_again(pt):
-    moment = eq.moment(pt)
+def mapped_moment(pt, moment):
     return (
         mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment
     )
+
+
+@eq.reads("moment")
+def moment_again(pt):
+    return mapped_moment(pt, eq.moment(pt))
 
 
 class MomentumAgain(eq.NodalQuantity):

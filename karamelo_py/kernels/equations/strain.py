@@ -2,7 +2,7 @@
 
 from math import inf, sqrt
 
-from karamelo_py.compiler import all_lanes, real, where
+from karamelo_py.compiler import all_lanes, point_function, real, where
 from karamelo_py.compiler.fields import store, store_from
 from karamelo_py.kernels.equations import Report, Task, fbar
 from karamelo_py.kernels.equations.internal_force import stretch_levers
@@ -33,7 +33,7 @@ class Strain(Task):
         w, (gradient, ratio) = pt.w, total
         if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
-        dl = increment(pt.dt, gradient)
+        dl = increment_at(w.kin, pt, gradient)
         if isinstance(task, StrainOfLastStep):
             dl = frames.of_places_before(w.frame, w.kin, dl)
         dl = fbar.averaged(pt, dl, ratio)
@@ -91,7 +91,7 @@ class TrialStrain(Strain):
         return add_gradient(node, total)
 
     def updated(task, pt, total, totals, fastest):
-        dl = increment(pt.dt, total)
+        dl = increment_at(pt.kin, pt, total)
         if isinstance(task, TrialStrainOfLastStep):
             dl = frames.of_places_before(pt.w.frame, pt.kin, dl)
         _, _, f = pt.law_state_F
@@ -108,13 +108,25 @@ def _is_known(task, w):
     return isinstance(task, StrainInMove) and not isinstance(w.averaging, fbar.FBar)
 
 
+@point_function(otherwise=True)
+def velocity_gradient(kin, node):
+    """Return the part of a node in the gradient."""
+    return outer(node.v, node.strain_N)
+
+
 def add_gradient(node, grad_v):
-    return grad_v + outer(node.v, node.strain_N) if len(grad_v) else grad_v
+    return grad_v + velocity_gradient(node.kin, node) if len(grad_v) else grad_v
 
 
 def increment(dt, grad_v):
     """Return dl = dt grad v, rounded first: F + dl sums two numbers."""
     return grad_v._make(dt * grad_v)
+
+
+@point_function(otherwise=True)
+def increment_at(kin, pt, grad_v):
+    """Return the increment of a point from the sum of `velocity_gradient`."""
+    return increment(pt.dt, grad_v)
 
 
 def _deform_domain(task, pt, growth):

@@ -6,6 +6,7 @@ tag               vector          velocity gradient, F           symmetric tenso
 ``Line``          x               xx                             xx yy zz
 ``PlaneStrain``   x y             xx xy yx yy                    xx yy zz xy
 ``Axisymmetric``  r z             rr rz zr zz tt                 rr zz tt rz
+``Twisted``       r z             rr rz zr zz tt tr tz rt zt     rr zz tt rz rt zt
 ``Cylindrical``   r               rr tt                          rr tt zz
 ``Spherical``     r               rr tt pp                       rr tt pp
 ``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
@@ -479,7 +480,7 @@ for _kind in (Elements, Vector, Matrix, Tensor, SymmetricTensor):
     algebra(_kind)
 
 
-def _class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
+def tensor_class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
     words = [name.translate(_WORDS) for name in names] + [f"around_{k + 1}" for k in around]
     name = f"{tag.__name__}{kind.__name__}" + ("Gradient" if around else "")
     one = type(name, (kind, namedtuple(name, words)), {"__module__": __name__})
@@ -492,7 +493,7 @@ def _class(kind: type, tag: type, names: tuple, around: tuple = ()) -> type:
     return one
 
 
-def _rows(one: type, whole: type) -> None:
+def set_rows(one: type, whole: type) -> None:
     d = one.kin.dimension
     one.acting = tuple((i if i < d else 0, j) for i, j in one.places)
     number = {(j, i): k for k, (i, j) in enumerate(one.places)}
@@ -504,18 +505,18 @@ def _rows(one: type, whole: type) -> None:
 _WORDS = str.maketrans("123", "xyz")
 for _tag in TAGS:
     _tag.plane = KINEMATICS[_tag.dimension]()
-    _tag.Symmetric = _class(SymmetricTensor, _tag, _tag.symmetric_names)
-    _tag.Tensor = _class(Tensor, _tag, _tag.tensor_names)
+    _tag.Symmetric = tensor_class(SymmetricTensor, _tag, _tag.symmetric_names)
+    _tag.Tensor = tensor_class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric
     _names = "123"[: _tag.dimension]
     if _tag.hoops:
         _tag.Vector = KINEMATICS[_tag.dimension].Vector
-        _tag.Gradient = _class(Vector, _tag, _names, _tag.Tensor.axes[_tag.dimension :])
+        _tag.Gradient = tensor_class(Vector, _tag, _names, _tag.Tensor.axes[_tag.dimension :])
     else:
-        _tag.Vector = _tag.Gradient = _class(Vector, _tag, _names)
+        _tag.Vector = _tag.Gradient = tensor_class(Vector, _tag, _names)
     _tag.Gradient.tensor = _tag.Tensor
     for _one in (_tag.Tensor, _tag.Symmetric):
-        _rows(_one, _tag.Tensor)
+        set_rows(_one, _tag.Tensor)
     for _one in (_tag.Vector, _tag.Gradient, _tag.Tensor, _tag.Symmetric):
         _one.vector = _tag.Vector
 

@@ -18,6 +18,7 @@ from karamelo_py import __version__
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.output.files import whole
 from karamelo_py.output.rhythm import ByTime, Rhythmic
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.run.checkpoint.arrays import (
     Stored,
     reading,
@@ -291,7 +292,7 @@ def described(hub: Hub) -> dict[str, str]:
     words = {
         "method": update.words_of_state + " thermo-mechanical" * update.thermal,
         "domain": f"{domain.dimension}, {', '.join(f'{a!r}, {b!r}' for a, b in box)}, {domain.h!r}",
-        "axisymmetric": str(domain.kin.hoops > 0),
+        "axisymmetric": str(domain.kin.hoops > 0) + " with twist" * isinstance(domain.kin, Twisted),
         "thickness": str(domain.thickness),
         "precision": hub.settings.precision,
         "anti_volumetric_locking": str(update.anti_locking),

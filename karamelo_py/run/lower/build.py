@@ -19,7 +19,8 @@ from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import law_in, law_on, law_table
-from karamelo_py.kernels.table import Dry, Insulated
+from karamelo_py.kernels.table import Insulated, NoCompany
+from karamelo_py.kernels.twist import rotating
 from karamelo_py.language import registry
 from karamelo_py.language.rules import Feature, Restrictions, compare
 from karamelo_py.language.scene import Scene
@@ -28,6 +29,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.basis import carried, deformed, walled
 from karamelo_py.points.grid import ReflectingGrid
 from karamelo_py.points.kinematics import Line
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.placed import with_directions
@@ -44,7 +46,7 @@ from karamelo_py.run.step_size import Carried, set_up
 from karamelo_py.run.tiles import Tiles
 from karamelo_py.scene import boundary
 from karamelo_py.scene.comm import SerialComm
-from karamelo_py.scene.domain import THIN
+from karamelo_py.scene.domain import THIN, TWIST
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import table
 from karamelo_py.scene.modify import Fix
@@ -131,6 +133,8 @@ def _features(hub: Hub) -> Iterator[Feature]:
         yield Feature("series", "", f"transfer {transfer}", "APIC or FLIP", mark)
     if update.thermal:
         yield Feature("heat", "", "heat conduction", "a mechanical method", mark)
+    if any(solid.rigid for solid in hub.solids.values()):
+        yield Feature("rigid", "", "a rigid solid", "a stiff solid")
     if update.anti_locking:
         yield Feature("F-bar", "", "anti_volumetric_locking", "anti_volumetric_locking(false)")
     if settings.precision != "double":
@@ -158,6 +162,8 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
     if update.boundary != "error":
         words = f"boundary({update.boundary})"
         yield boundary.RESTRICTIONS[update.boundary], words, update.boundary_mark
+    if isinstance(box.kin, Twisted):
+        yield TWIST, "twist=true", None
     if box.thin:
         yield THIN, "plane_stress" if box.dimension == 2 else "uniaxial_stress", None
     for solid in hub.solids.values():
@@ -247,11 +253,12 @@ def lower(
     bodies = lower_bodies(hub, lattices) if fixes_of_bodies(hub) else NoBodies()
     fluids = (solid.material.fluid for solid in hub.solids.values())
     tag = "tag_in_load_steps" if hub.update.scheme.traits.implicit else "tag"
-    water = next((getattr(fluid, tag) for fluid in fluids if fluid is not None), Dry())
+    company = [getattr(fluid, tag) for fluid in fluids if fluid is not None]
+    company += [*rotating(kin, transfer), NoCompany()]
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
         averaging=method.averaging(hub), contact=contact, bodies=bodies,
-        heat=heat, water=water, grids=grids, nodes=nodes,
+        heat=heat, company=company[0], grids=grids, nodes=nodes,
         buffers=tiles.empty_buffers(nodes, len(hub.solids)),
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,

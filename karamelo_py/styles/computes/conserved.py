@@ -5,6 +5,7 @@ import numpy as np
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.units import ENERGY, Powers
 from karamelo_py.points.kinematics import total
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix
@@ -242,9 +243,14 @@ class AngularMomentum(Momentum):
         arm, v = np.zeros((2, points.count, 3))
         arm[:, :d], v[:, :d] = points.position, points.velocity
         arm -= self.centre
+        twists = isinstance(self.hub.domain.kin, Twisted)
+        if twists:
+            v[:, 2] = points.particle("vtheta")
         angular = np.cross(arm, v)
+        if twists:  # the rest has no sum over a revolution
+            angular *= (0, 1, 0)
         moment = points.velocity_moment
-        if moment is not None and d > 1:
+        if moment is not None and d > 1 and not twists:
             # B_ij = sum N v_i (X - x)_j: angular momentum within a point's surroundings.
             b = np.zeros((points.count, 3, 3))
             b[:, :d, :d] = moment.reshape(-1, d, d)

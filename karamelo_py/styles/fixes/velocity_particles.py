@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.language.rules import known_failure
 from karamelo_py.output.point_table import places_before
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView, per_direction, point_hook
@@ -31,8 +33,12 @@ def carry(mass, v, x_old, x, value, before, dt, kick):
 class VelocityOfPoints(Fix):
     syntax = "group, vx[, vy[, vz]]"
 
+    around: Expression | None = None  # velocity around the axis
+
     def __init__(self, hub: Hub, group: ParticleGroup, *velocity: Expression | None):
         super().__init__(hub, group)
+        if self.first_step_only and isinstance(hub.require_domain().kin, Twisted):
+            velocity, self.around = velocity[:2], next(iter(velocity[2:]), None)
         self.formulas = per_direction(hub, "v", velocity)
 
 
@@ -78,7 +84,8 @@ class InitialVelocityParticles(VelocityOfPoints):
     ----------
     velocity
         vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component unchanged;
-        in 1D and 2D, omit the last ones or set them to NULL or 0.
+        in 1D and 2D, omit the last ones or set them to NULL or 0. With axisymmetric(true,
+        twist=true), vz is the velocity around the axis.
 
     Example
     -------
@@ -110,6 +117,9 @@ class InitialVelocityParticles(VelocityOfPoints):
                 v[:, k] = evaluate(x, x0)
                 points.set_velocity_gradient(k, partial(gradient, evaluate, x, x0))
         points.velocity = v
+        if self.around is not None:
+            x0 = points.reference_position
+            points[VelocityAround][:, 0] = self.around.evaluate_points(self.hub.values, x, x0)
 
 
 def gradient(

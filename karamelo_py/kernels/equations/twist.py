@@ -1,0 +1,220 @@
+"""Rotation of axisymmetric bodies around their axis.
+
+Points store the velocity around the axis, nodes have an angular velocity w: its mass is the inertia
+sum N m r^2, its momentum the angular momentum sum N m r v, its force the torque -sum V r (s_31
+dN/dr + s_32 dN/dz). Mapping r^2 w from the nodes conserves angular momentum with any transfer, the
+torques have no sum, and a point that moves retains r v, which is Coriolis' force. A rigid rotation
+is exact, and w is regular at the axis. Points push outwards with m v^2 / r.
+"""
+
+from typing import NamedTuple
+
+from karamelo_py.compiler import real
+from karamelo_py.compiler.fields import (
+    Field,
+    StepField,
+    SummedField,
+    field,
+    pair,
+    store,
+    triple,
+)
+from karamelo_py.compiler.lanes import of_present
+from karamelo_py.kernels import arrays
+from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.internal_force import force_around, minus_V_stress
+from karamelo_py.kernels.equations.loss import OnePoint
+from karamelo_py.kernels.equations.mass_momentum import mapped_moment
+from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.equations.strain import increment, increment_at, velocity_gradient
+from karamelo_py.kernels.records import row
+from karamelo_py.points import transfers
+from karamelo_py.points.kinematics import Line, tensor, vector
+from karamelo_py.points.kinematics.twist import Twisted, gradient_around, times_radius
+
+
+class VelocityAround(Field):
+    """Velocity around the axis, from x to z."""
+
+    columns = ("vtheta",)
+
+
+class AngleAround(Field):
+    """Angle by which a point has rotated, in radians."""
+
+    columns = ("twist",)
+
+
+class MomentAround(Field):
+    """Moment or gradient of the angular velocity, as in `transfers.Moment`."""
+
+    shape = pair
+
+
+class Radius(StepField):
+    """Radius of a point after its last move."""
+
+
+class SumsAround(SummedField):
+    """Inertia, angular momentum and torque of a node, as `Nodes.sums` of a line."""
+
+    shape = triple
+
+
+class MomentumAround(SummedField):
+    """Sum of N m v around the axis at a node."""
+
+
+class UpdateAround(StepField):
+    """Angular velocity w* of a node after the update, and its change."""
+
+    shape = pair
+
+
+class AngularVelocity(SummedField):
+    """Angular velocity of a node that strains the points."""
+
+
+LINE = Line()
+INERTIA = eq.MASS._replace(array=SumsAround)
+MOMENT = eq.NodeColumns(SumsAround, lambda kin: 1, lambda kin: 1, lambda kin: 2)
+TORQUE = eq.NodeColumns(SumsAround, lambda kin: 2, lambda kin: 1, lambda kin: 3)
+
+
+def rotation(pt, r):
+    """Return inertia, angular velocity and its moment (or ()) of a point at radius r.
+
+    Velocity and moment are in both components of a plane, as transfers map vectors.
+    """
+    omega = pt.of(VelocityAround)[0, pt.p] / r
+    moment = pt.load(MomentAround, (r, r))
+    if len(moment):
+        moment = tensor(pt.kin.plane, (*moment, *moment))
+    return OnePoint(eq.mass(pt) * r * r, vector(pt.kin, (omega, omega)), moment)
+
+
+@eq.reads("mass", "x moved", "velocity around", "moment around")
+def rotation_after(pt):
+    r = pt.y[0]
+    store(pt.of(Radius), pt.p, (r,))
+    return rotation(pt, r)
+
+
+@eq.reads()
+def radius_after(pt):
+    return pt.y[0]
+
+
+@eq.reads("mass", "radius", "velocity around", "moment around")
+def rotation_again(pt):
+    made = rotation(pt, pt.of(Radius)[0, pt.p])
+    return made._replace(moment=mapped_moment(pt, made.moment))
+
+
+def angular_momentum(pt, node):
+    return (transfers.nodal_momentum(node.transfer, pt.around, node)[0],)
+
+
+def momentum_around(pt, node):
+    mass, omega, _ = pt.around
+    return (node.N * (mass / pt.radius * omega[0]),)
+
+
+class Around(eq.NodalQuantity):
+    not_at_corners = ("moments",)
+    says = "angular momentum to grid"
+    takes = eq.of_point(around=rotation_after, radius=radius_after)
+    gives = (
+        eq.Sum(INERTIA, lambda pt, node: (node.N * pt.around.mass,)),
+        eq.Sum(MOMENT, angular_momentum),
+        eq.Sum(eq.whole(MomentumAround), momentum_around),
+    )
+
+
+class AroundAgain(eq.NodalQuantity):
+    not_at_corners = ("moments",)
+    says = "angular momentum to grid"
+    takes = eq.of_point(around=rotation_again)
+    gives = (eq.Sum(eq.whole(AngularVelocity), angular_momentum),)
+
+
+@eq.reads("mass", "state", "material", "deformation gradient", "radius")
+def torque(pt):
+    """Return minus V r times the components 31 and 32 of the frame's stress."""
+    stress, r = minus_V_stress(pt), pt.of(Radius)[0, pt.p]
+    return r * stress.at()[2, 0], r * stress.at()[2, 1]
+
+
+class Torque(eq.NodalQuantity):
+    not_at_corners = ("moments",)
+    says = "torque"
+    takes = eq.of_point(torque=torque)
+    gives = (
+        eq.Sum(
+            TORQUE,
+            lambda pt, node: (pt.torque[0] * node.strain_N[0] + pt.torque[1] * node.strain_N[1],),
+        ),
+    )
+
+
+@force_around.on(Twisted)
+def _force_around_twisted(kin, pt):
+    v, r = pt.of(VelocityAround)[0, pt.p], pt.of(Radius)[0, pt.p]
+    force = of_present(pt.p, pt.w.points.mass[pt.p] * v * v / r)
+    return vector(kin, (force, force - force))
+
+
+@node_task
+class PushOutwards(NamedTuple):
+    """Adds the change of the centrifugal force by the new w*, so that it does not lag a step."""
+
+    says = "centrifugal force"
+    goes_through = ("sums", "sums", "momentum around", "update around")
+
+    def at_node(task, kin, nodes, n, dt):
+        momentum = field(nodes.fields, MomentumAround)[n, 0]
+        change = field(nodes.fields, UpdateAround)[n, 1]
+        nodes.sums[n, arrays.of_force(kin)] += momentum * (change + change)
+
+
+@velocity_gradient.on(Twisted)
+def _velocity_gradient_twisted(kin, node):
+    (omega,) = row(node.of(AngularVelocity), node.i, 0, (node.N,))
+    return gradient_around(node.v, omega, node.strain_N)
+
+
+@increment_at.on(Twisted)
+def _increment_at_twisted(kin, pt, gradient):
+    _, _, f = pt.law_state_F
+    return times_radius(increment(pt.dt, gradient), pt.of(Radius)[0, pt.p], f)
+
+
+class Rotate(eq.Task):
+    """Gathers w* and its change; updates the velocity around the axis and the angle."""
+
+    not_at_corners = ("moments",)
+    says = "rotation"
+    reads = ("x moved", "radius", "velocity around", "angle around", "moment around")
+    writes = ("velocity around", "angle around", "moment around")
+
+    def empty(task, w, x):
+        zero = x[0] - x[0]
+        return zero, zero, transfers.zero_moment(w.transfer, w.kin, zero)
+
+    def gathered(task, node, total):
+        at_nodes, change, moment = total
+        omega, more = row(node.of(UpdateAround), node.i, 0, (at_nodes, change))
+        both = vector(node.kin, (omega, omega))
+        moment = transfers.add_moment(node.transfer, node, both, moment)
+        return at_nodes + node.N * omega, change + node.N * more, moment
+
+    def updated(task, pt, total, totals, fastest):
+        (at_nodes, change, moment), r = total, pt.of(Radius)[0, pt.p]
+        old = pt.of(VelocityAround)[0, pt.p] / r
+        new = transfers.updated_velocity(pt.w.transfer, old, at_nodes, change)
+        store(pt.of(VelocityAround), pt.p, (r * r * new / pt.y[0],))
+        store(pt.of(Radius), pt.p, (pt.y[0],))
+        store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
+        if len(moment):
+            store(pt.of(MomentAround), pt.p, moment[:2])
+        return eq.Report(real(0, pt.dt), fastest)

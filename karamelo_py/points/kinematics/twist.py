@@ -1,0 +1,75 @@
+"""Axisymmetric bodies that twist: a velocity around the axis, and its shears.
+
+Axes 1 and 2 are radius and axis, 3 is around it. They rotate with each point by its angle around
+the axis, so that a rigid rotation of any size strains nothing. Tensors have the components of 3D in
+another order; 13 and 23 of velocity gradient and F are 0. With the angular velocity w and the
+rotation phi of a point, the gradient has r dw/dr in 31 and r dw/dz in 32, F has r dphi/dR and
+r dphi/dZ.
+"""
+
+from karamelo_py.compiler import algebra, real
+from karamelo_py.points.kinematics import (
+    Axisymmetric,
+    Space,
+    SymmetricTensor,
+    Tensor,
+    outer,
+    set_rows,
+    tensor_class,
+)
+
+
+class Twisted(Axisymmetric):
+    """A body of revolution with torsion."""
+
+    __slots__ = ()
+    word = "axisymmetric with twist"
+    tensor_size = 9
+    tensor_names = ("11", "12", "21", "22", "33", "31", "32", "13", "23")
+    symmetric_names = Space.symmetric_names
+
+
+@algebra
+class TwistedStress(SymmetricTensor):
+    __slots__ = ()
+
+    def nominal(self, F):
+        """Return P = s F^-T, but s_33 / F_33 in 33: what acts on the radius.
+
+        The radial displacement also stretches 31 and 32 of F, in proportion to r.
+        """
+        made = SymmetricTensor.nominal(self, F)
+        hoop = self[2] / F[4]
+        return made._make([*made[:4], hoop, *made[5:]])
+
+
+Twisted.Tensor = tensor_class(Tensor, Twisted, Twisted.tensor_names)
+Twisted.Symmetric = tensor_class(TwistedStress, Twisted, Twisted.symmetric_names)
+Twisted.Tensor.symmetric = Twisted.Symmetric
+for _one in (Twisted.Tensor, Twisted.Symmetric):
+    set_rows(_one, Axisymmetric.Tensor)
+    _one.vector = Twisted.Vector
+    _one.kin = Space()
+
+
+def twisted(in_plane, around):
+    """Return the tensor of the components in the half plane, and 31 and 32."""
+    zero = real(0, around[0])
+    return Twisted.Tensor._make((*in_plane, *around, zero, zero))
+
+
+def gradient_around(v, omega, slopes):
+    """Return the gradient of a node's weight times its velocity, but dw/dr and dw/dz in 31, 32."""
+    return twisted(outer(v, slopes), (omega * slopes[0], omega * slopes[1]))
+
+
+def times_radius(gradient, r, F):
+    """Make an increment of a `gradient_around`; F is () in the updated frame.
+
+    With the radius r at the end of the step, F follows from the positions.
+    """
+    around = tuple([r * slope for slope in gradient[5:7]])
+    if len(F):
+        growth = gradient[4] / F[4]
+        around = tuple([a + growth * f for a, f in zip(around, F[5:7], strict=True)])
+    return twisted(gradient[:5], around)
