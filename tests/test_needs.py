@@ -23,7 +23,7 @@ from karamelo_py.compiler.trace.functions import PointFunction, forget, outdate_
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
-from karamelo_py.kernels.table import in_scene, take
+from karamelo_py.kernels.table import companies, in_scene, take
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps
@@ -132,8 +132,8 @@ def test_only_what_averages_has_a_nodal_mean(lowered):
 
 
 IN_KERNEL = {
-    # what the scene has: grid, basis, transfer, threads
-    "Grid", "Linear", "FLIP", "Serial",
+    # what the scene has: components, grid, basis, transfer, threads
+    "PlaneStrain", "Grid", "Linear", "FLIP", "Serial",
     # that it has no more: heat, contact, fixes at every step, other processes
     "NoHooks", "FixedFrame", "Alone",
     # what is done at points and nodes in the two visits of musl
@@ -156,7 +156,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     words, find = set(), PointFunction.find
 
     def noted(self, classes):
-        if self not in (take, in_scene):
+        if self not in (take, in_scene, companies):
             words.update(one.__name__ for one in classes if one)
         return find(self, classes)
 

@@ -29,7 +29,7 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
     radian: multiply forces and energies by 2 pi for the whole body.
 
-    With twist, z is the direction around the axis: shears 13 and 23 are those of r-theta and
+    With twist, z is the direction around the axis: components 13 and 23 are the shears r-theta and
     z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
     and fix angular_velocity_nodes holds and rotates nodes. Columns of points: ``vtheta``, this
     velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the

@@ -292,10 +292,9 @@ def companies(tag: Any) -> tuple:
     return ()
 
 
-def company_of(tag: Any, s: Setup) -> Company:
-    kinds = tag.__mro__ if isinstance(tag, type) else type(tag).__mro__
+def company_of(tag: type, s: Setup) -> Company:
     for kind, company in companies.find((type(s.company),))(s.company):
-        if kind in kinds:
+        if kind in tag.__mro__:
             return company
     return Company()
 
@@ -303,7 +302,7 @@ def company_of(tag: Any, s: Setup) -> Company:
 def _joined(tags: tuple, s: Setup) -> tuple:
     joined: tuple = ()
     for tag in tags:
-        company = company_of(tag, s)
+        company = company_of(type(tag), s)
         joined = (*joined, *company.first, tag, *company.then)
     return joined
 
@@ -321,7 +320,8 @@ def _rows_of_scene(row, s):
 
 @in_scene.on(NodeTask)
 def _after_others(row, s):
-    return (row,) if row.at else (*company_of(row.task, s).before, row)
+    kind = row.task if row.make else type(row.task)
+    return (row,) if row.at else (*company_of(kind, s).before, row)
 
 
 @in_scene.on(Sweep)
@@ -332,7 +332,7 @@ def _in_company(row, s):
         return (*averages, row)
     before: tuple = ()
     for task in row.visit.tasks if row.gathers else ():
-        before = (*before, *company_of(task, s).before)
+        before = (*before, *company_of(type(task), s).before)
     tasks, quantities, weights = row.visit
     visit = Visit(_joined(tasks, s), _joined(quantities, s), weights)
     return (*averages, *before, row._replace(visit=visit))

@@ -1,4 +1,4 @@
-"""Rows of the rotation around an axis: its nodes are those of a line, as in heat flow."""
+"""Rows of the rotation around an axis, on nodes of a line, as in heat flow."""
 
 from typing import Any, NamedTuple
 
@@ -67,9 +67,9 @@ def _task(task: Any) -> NodeTask:
 HELD = AtRotation(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE)
 LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=update_to_velocity)
 COMPANIES = (
-    (MassMomentum, Company(then=(twist.Around(),))),
+    (MassMomentum, Company(then=(twist.RotationToNodes(),))),
     (InternalForce, Company(then=(twist.Torque(),))),
-    (MomentumAgain, Company(then=(twist.AroundAgain(),))),
+    (MomentumAgain, Company(then=(twist.RotationAgain(),))),
     (
         nodes.NodalUpdate,
         Company(before=(_task(nodes.NodalUpdate()), HELD, NodeTask(twist.PushOutwards()))),
@@ -84,7 +84,7 @@ COMPANIES = (
 class Rotating(NamedTuple):
     """Rotation around the axis: its fields, and what joins tasks and quantities."""
 
-    point_fields = (twist.VelocityAround, twist.AngleAround, twist.Radius)
+    point_fields = (twist.VelocityAround, twist.AngleAround, twist.RadiusAfterMove)
     node_fields = (
         twist.SumsAround, twist.MomentumAround, twist.UpdateAround, twist.AngularVelocity,
     )  # fmt: skip

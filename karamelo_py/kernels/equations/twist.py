@@ -51,7 +51,7 @@ class MomentAround(Field):
     shape = pair
 
 
-class Radius(StepField):
+class RadiusAfterMove(StepField):
     """Radius of a point after its last move."""
 
 
@@ -96,7 +96,7 @@ def rotation(pt, r):
 @eq.reads("mass", "x moved", "velocity around", "moment around")
 def rotation_after(pt):
     r = pt.y[0]
-    store(pt.of(Radius), pt.p, (r,))
+    store(pt.of(RadiusAfterMove), pt.p, (r,))
     return rotation(pt, r)
 
 
@@ -105,9 +105,9 @@ def radius_after(pt):
     return pt.y[0]
 
 
-@eq.reads("mass", "radius", "velocity around", "moment around")
+@eq.reads("mass", "radius after move", "velocity around", "moment around")
 def rotation_again(pt):
-    made = rotation(pt, pt.of(Radius)[0, pt.p])
+    made = rotation(pt, pt.of(RadiusAfterMove)[0, pt.p])
     return made._replace(moment=mapped_moment(pt, made.moment))
 
 
@@ -120,7 +120,7 @@ def momentum_around(pt, node):
     return (node.N * (mass / pt.radius * omega[0]),)
 
 
-class Around(eq.NodalQuantity):
+class RotationToNodes(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "angular momentum to grid"
     takes = eq.of_point(around=rotation_after, radius=radius_after)
@@ -131,17 +131,17 @@ class Around(eq.NodalQuantity):
     )
 
 
-class AroundAgain(eq.NodalQuantity):
+class RotationAgain(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "angular momentum to grid"
     takes = eq.of_point(around=rotation_again)
     gives = (eq.Sum(eq.whole(AngularVelocity), angular_momentum),)
 
 
-@eq.reads("mass", "state", "material", "deformation gradient", "radius")
+@eq.reads("mass", "state", "material", "deformation gradient", "radius after move")
 def torque(pt):
     """Return minus V r times the components 31 and 32 of the frame's stress."""
-    stress, r = minus_V_stress(pt), pt.of(Radius)[0, pt.p]
+    stress, r = minus_V_stress(pt), pt.of(RadiusAfterMove)[0, pt.p]
     return r * stress.at()[2, 0], r * stress.at()[2, 1]
 
 
@@ -159,7 +159,7 @@ class Torque(eq.NodalQuantity):
 
 @force_around.on(Twisted)
 def _force_around_twisted(kin, pt):
-    v, r = pt.of(VelocityAround)[0, pt.p], pt.of(Radius)[0, pt.p]
+    v, r = pt.of(VelocityAround)[0, pt.p], pt.of(RadiusAfterMove)[0, pt.p]
     force = of_present(pt.p, pt.w.points.mass[pt.p] * v * v / r)
     return vector(kin, (force, force - force))
 
@@ -186,7 +186,7 @@ def _velocity_gradient_twisted(kin, node):
 @increment_at.on(Twisted)
 def _increment_at_twisted(kin, pt, gradient):
     _, _, f = pt.law_state_F
-    return times_radius(increment(pt.dt, gradient), pt.of(Radius)[0, pt.p], f)
+    return times_radius(increment(pt.dt, gradient), pt.of(RadiusAfterMove)[0, pt.p], f)
 
 
 class Rotate(eq.Task):
@@ -194,7 +194,7 @@ class Rotate(eq.Task):
 
     not_at_corners = ("moments",)
     says = "rotation"
-    reads = ("x moved", "radius", "velocity around", "angle around", "moment around")
+    reads = ("x moved", "radius after move", "velocity around", "angle around", "moment around")
     writes = ("velocity around", "angle around", "moment around")
 
     def empty(task, w, x):
@@ -209,11 +209,11 @@ class Rotate(eq.Task):
         return at_nodes + node.N * omega, change + node.N * more, moment
 
     def updated(task, pt, total, totals, fastest):
-        (at_nodes, change, moment), r = total, pt.of(Radius)[0, pt.p]
+        (at_nodes, change, moment), r = total, pt.of(RadiusAfterMove)[0, pt.p]
         old = pt.of(VelocityAround)[0, pt.p] / r
         new = transfers.updated_velocity(pt.w.transfer, old, at_nodes, change)
         store(pt.of(VelocityAround), pt.p, (r * r * new / pt.y[0],))
-        store(pt.of(Radius), pt.p, (pt.y[0],))
+        store(pt.of(RadiusAfterMove), pt.p, (pt.y[0],))
         store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
         if len(moment):
             store(pt.of(MomentAround), pt.p, moment[:2])
