@@ -21,6 +21,7 @@ import pytest
 from karamelo_py.app import catalogue, cli
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_fix
 from karamelo_py.script.errors import ScriptError
@@ -412,6 +413,8 @@ def _tried(lines, dimension, folder):
             h = STAGES[dimension][0].split()[-1]
             interpreter.run_text("material(lead, rigid, 1)")
             interpreter.run_text(f"solid({words[3]}, region, disk, 2, lead, {h}, 0)")
+        if words[2] == "angular_velocity_nodes":
+            interpreter.hub.domain.kin = Twisted()
         if "pore_pressure" in words[2]:
             wet = "pore_water(wet, n=0.4, permeability=1)\nsolid(wet, region, disk, 2, wet, h, 0)"
             wet = wet.replace("h,", f"{STAGES[dimension][0].split()[-1]},")

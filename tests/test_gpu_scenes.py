@@ -74,8 +74,11 @@ SCENES = {
     .replace("2*x, -4*y", "2*x"),
     "twist": bar("method(ulmpm, AFLIP, quadratic-spline, 0.99)")
     .replace("axisymmetric(true", "axisymmetric(true, twist=true")
-    .replace("-4*y)", "-4*y, x*sin(9*y))\ngroup(some, nodes, region, bar, all)\n"
-             "fix(turn, angular_velocity_nodes, some, time*y0)"),
+    .replace(
+        "-4*y)",
+        "-4*y, x*sin(9*y))\ngroup(some, nodes, region, bar, all)\n"
+        "fix(turn, angular_velocity_nodes, some, time*y0)",
+    ),
     "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
     "averaged pressure of soil": bar(
         "method(ulmpm, FLIP, linear, 0.99)\nscheme(usavg)\nanti_volumetric_locking(true)"
