@@ -83,6 +83,23 @@ def test_storage_and_loss_moduli(kind):
     assert lost[-1] - lost[-1 - n] == pytest.approx(pi * size**2 * loss, rel=1e-3)
 
 
+def test_a_cycle_of_stiffening_rubber_dissipates_its_work(run_interpreted):
+    """After a stretch to three times the length and full relaxation nothing is stored."""
+    script = """
+    material(y, yeoh, 1100, 2e7, 5e5, -1e4, 2e3)
+    material(v, viscoelastic, y, 0.3, 0.5)
+    load_path(pull, 50, exx=1.1, syy=0, szz=0)
+    load_path(back, 50, exx=0, syy=0, szz=0)
+    load_path(rest, 50, sxx=0, syy=0, szz=0, duration=10)
+    element(e, v, pull, back, rest)"""
+    folder = run_interpreted(script).folder
+    d = np.genfromtxt(folder / "element_e.txt", names=True)
+    assert d["dissipated"][-1] == pytest.approx(d["work"][-1], rel=0.08)
+    assert abs(d["stored"][-1]) < 0.03 * d["stored"].max()
+    # Constants of the spring at rest would count 1.9 times the work.
+    assert (np.diff(d["dissipated"]) >= 0).all()
+
+
 def test_shear_creeps_under_constant_stress(run_interpreted):
     """gamma = s/G (1/(1-g) - g/(1-g) exp(-(1-g) t/tau))."""
     script = """

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import where
+from karamelo_py.compiler import round_off, where
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure
@@ -29,6 +29,8 @@ from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import ScriptError
 
+ENOUGH = 1e3  # strain increment over the round-off whose stiffness is known
+LEAST = 0.01  # stiffness over that at rest of a strain that counts
 SMALL = 0.01  # step over relaxation time, below which a series is exact
 
 
@@ -137,9 +139,11 @@ class Viscoelastic(NamedTuple):
     Steps are exact for a constant rate of s. The relaxation modulus is G(t) = G (1 - sum g (1 -
     exp(-t/tau))); the volume response is elastic.
 
-    With the shear modulus G at rest, each branch adds |h|^2/(4 g G) to the strain energy and
-    dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``), which heats a material with a
-    temperature. Fix initial_stress starts from a relaxed body, with 1 - sum g of the stiffness.
+    Each branch dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``), with the tangent
+    shear modulus G of the elastic law along the last strain increment; this heats a material with a
+    temperature. Small strains store |h|^2/(4 g G) in a branch. A cycle to three times the length
+    dissipates its work within 8 %. Fix initial_stress starts from a relaxed body, with 1 - sum g of
+    the stiffness.
 
     See Also
     --------
@@ -185,6 +189,7 @@ class State(NamedTuple):
     branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
     gone: Any  # energy of the elastic law that is not stored, per reference volume
+    stiffness: Any  # of the last strain in shear, over that at rest
 
 
 def at_rest(branches, kin):
@@ -232,6 +237,15 @@ def decayed(branches, memory, dl, added, dt):
     return (h, rest), loss + more
 
 
+def stiffness_along(branches, added, strain, last):
+    """Return the shear stiffness along a strain increment over that at rest; else the `last`."""
+    square = inner(strain, strain)
+    known = square > (ENOUGH * round_off(square)) ** 2
+    # 1/(2 G) at rest is 2 g softness
+    rise = inner(added, strain) / where(known, square, 1) * (2 * branches.g * branches.softness)
+    return where(known & (rise > LEAST), rise, last)
+
+
 def strain_of(dl):
     """Return Almansi's strain of I + dl, conjugate to the Kirchhoff stress after the step."""
     back = dl @ inv(I + dl)
@@ -241,7 +255,7 @@ def strain_of(dl):
 @laws.initial_state.on(Viscoelastic)
 def _initial_state_viscoelastic(law, kin, template):
     return State(
-        laws.initial_state(law.elastic, kin, template), at_rest(law.branches, kin), 0.0, 0.0
+        laws.initial_state(law.elastic, kin, template), at_rest(law.branches, kin), 0.0, 0.0, 1.0
     )
 
 
@@ -252,13 +266,16 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     before = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
     after = dev(laws.kirchhoff_stress(law.elastic, kin, elastic))
     dt = shifted(law.shift, dt, laws.temperature(law.elastic, kin, elastic))
-    branches, loss = decayed(law.branches, state.branches, plain, after - before.carried(plain), dt)
+    strain, added = strain_of(plain), after - before.carried(plain)
+    stiffness = stiffness_along(law.branches, added, dev(strain), state.stiffness)
+    branches, loss = decayed(law.branches, state.branches, plain, added, dt)
+    loss /= stiffness
     # work that the relaxed stress does not do
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
-    gone = state.gone + loss + 0.5 * inner(lost, strain_of(plain))
+    gone = state.gone + loss + 0.5 * inner(lost, strain)
     elastic = heated_by(law.elastic, kin, elastic, loss)
-    return State(elastic, branches, state.loss + loss, gone)
+    return State(elastic, branches, state.loss + loss, gone, stiffness)
 
 
 @laws.kirchhoff_stress.on(Viscoelastic)
@@ -319,4 +336,5 @@ def _with_stress_viscoelastic(law, kin, state, stress):
     left = 1 - relaxed_part(law.branches)
     relaxed = laws.with_stress(law.elastic, kin, state.elastic, dev(s) / left + 1 / 3 * tr(s) * I)
     stored = 0.5 * inner(dev(s), laws.elastic_strain(law.elastic, kin, relaxed))
-    return State(relaxed, at_rest(law.branches, kin), state.loss, stored * (1 - left) / left)
+    gone = stored * (1 - left) / left
+    return State(relaxed, at_rest(law.branches, kin), state.loss, gone, state.stiffness)
