@@ -38,6 +38,7 @@ TOOLS = (
     "defaults",
     "exact",
     "faces",
+    "lesser",
     "lines",
     "peers",
     "pictures",

@@ -3,6 +3,8 @@
 import pytest
 from conftest import INPUTS
 
+from comparisons.lesser import ROWS
+
 MODELS = INPUTS / "models"
 
 
@@ -57,3 +59,32 @@ def test_the_taylor_bar_by_three_models(run_script):
     ring, quarter, full = found["diameter"]
     assert quarter == pytest.approx(full, rel=1e-8)
     assert full == pytest.approx(ring, rel=0.01)
+
+
+QUICK = "bar", "along", "across", "plate", "lamina 30"
+
+
+def found(run, name, twins, variables):
+    words = [part for key, value in variables.items() for part in ("-var", key, str(value))]
+    folder = name.replace(" ", "_")
+    return twins.measure(run(MODELS / f"in.{twins.script}", *words, folder=folder))
+
+
+def agrees(value, twins):
+    if not twins.exact:
+        return abs(value) < twins.within
+    return value == pytest.approx(twins.exact, rel=twins.within)
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_lesser_model_has_the_exact_answer(run_interpreted, name):
+    """The sources are in comparisons/lesser.py and the scenes."""
+    twins = ROWS[name]
+    assert agrees(found(run_interpreted, name, twins, twins.lesser), twins)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", sorted(set(ROWS) - set(QUICK)))
+def test_every_lesser_model_has_the_exact_answer(run_script, name):
+    twins = ROWS[name]
+    assert agrees(found(run_script, name, twins, twins.lesser), twins)

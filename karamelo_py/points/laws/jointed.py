@@ -28,6 +28,7 @@ from karamelo_py.points.laws.parameters import (
 )
 from karamelo_py.points.laws.strengths import FrictionTrial, pressure_response
 from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
+from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import ScriptError
 
 ALIGNED = 1e-9  # component of the normal that counts as none
@@ -195,6 +196,11 @@ warn_of_leaning(
 @laws.is_round.on(Jointed)
 def _is_round_jointed(law):
     return max(abs(law.ny), abs(law.nz)) <= ALIGNED
+
+
+@has_short_trials.on(Jointed)
+def _has_short_trials_jointed(law):
+    return True
 
 
 @laws.initial_state.on(Jointed)

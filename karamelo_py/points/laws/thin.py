@@ -7,13 +7,13 @@ across; the rest enters the next step (de Borst 1991; Klinkel & Govindjee 2002).
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import real, where
+from karamelo_py.compiler import point_function, real, where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
 
 WHOLE = Axisymmetric()
 ENOUGH = 10  # trials of q for increments of any size
-UNROLLED = 9  # laws of F have short trials, which are code without a loop
+UNROLLED = 9  # short trials are code without a loop
 FURTHEST = 0.3  # change of the stretch across in a trial
 FLATTEST, STEEPEST = 0.02, 4.0  # accepted slopes of the stress across, over rho c^2
 
@@ -47,6 +47,11 @@ def with_strain_across(law, kin, dl, q):
     return WHOLE.Tensor._make(numbers)
 
 
+@point_function(otherwise=True)
+def has_short_trials(law):
+    return not laws.by_rates(law)
+
+
 @laws.initial_state.on(Thin)
 def _initial_state_thin(law, kin, template):
     return State(laws.initial_state(law.law, WHOLE, template), 1)
@@ -66,7 +71,7 @@ def _advance_thin(law, kin, state, dl, dt):
         new = laws.advance(inner, WHOLE, old, with_strain_across(inner, kin, dl, q), dt)
         return new, laws.cauchy_stress(inner, WHOLE, new)[2]
 
-    large_trials = ENOUGH if laws.by_rates(inner) else UNROLLED
+    large_trials = UNROLLED if has_short_trials(inner) else ENOUGH
     q, slope = modulus - modulus, first
     new, stress = tried(q)
     for _ in range((large_trials if isinstance(dl, LargeIncrement) else law.trials) - 1):
