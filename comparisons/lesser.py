@@ -110,7 +110,7 @@ def specimen(law: str, angle: float, exact: float, unit: float) -> Twins:
     answer = "modulus (GPa)" if law != "rock" else "strength (MPa)"
     of = {"plate": "a plate", "lamina": f"a lamina at {angle}°", "rock": f"joints at {angle}°"}[law]
     size = {"law": law, "angle": angle}
-    thin = {**FULL, **size, "t": 0.04}
+    thin = {**FULL, **size, "t": 0.1 if law == "rock" else 0.04}
     measure = in_units("found", unit)
     return Twins("specimen", f"{answer} of {of}", {**PLANE, **size}, thin, measure, exact, 0.02)
 
@@ -136,7 +136,7 @@ ROWS = {
     "disk": Twins("disk", "stress at the centre of a spinning disk (Pa)", PLANE,
                   {**FULL, "t": 0.02}, in_units("s_11", 1), 412.5, 0.002),
     "limit": Twins("disk", "limit of its speed, rho w^2 R^2/Y", {**PLANE, "law": "plastic"},
-                   {**FULL, "law": "plastic", "t": 0.0625}, logged("Time"), 3.2582, 0.005),
+                   {**FULL, "law": "plastic", "t": 0.08}, logged("Time"), 3.2582, 0.005),
     "strip": Twins("strip", "angle of the neck of a strip (°, Hill 1952)", PLANE, FULL,
                    angle_of_neck, 54.74, 0.015),
     "impact": Twins("impact", "stress of a strip on a wall (MPa)", PLANE,
