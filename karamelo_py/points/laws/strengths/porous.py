@@ -51,7 +51,8 @@ class CrushableFoam(NamedTuple):
     sqrt((q^2 + alpha^2 p^2)/(1 + alpha^2/9)) is at most Y + H ep + a ln(1/(1 - (ep/e)^beta)), with
     alpha^2 = 9/2 (1 - 2 nu)/(1 + nu); flow is associated, and dep is the axial strain in uniaxial
     compression (Deshpande & Fleck 2000, J. Mech. Phys. Solids 48, 1253-1283). The plastic volume
-    ratio is the dump column Jp.
+    ratio is the dump column Jp. With eos p-alpha, steps must be below the elastic strain at yield:
+    in larger ones pores take pressure that flow would.
 
     See Also
     --------
@@ -106,9 +107,10 @@ class Gurson(NamedTuple):
     (q/Ym)^2 + 2 q1 f cosh(3 q2 p/(2 Ym)) is at most 1 + (q1 f)^2; flow is associated and (1 - f) Ym
     dem the plastic work (Gurson 1977; Tvergaard & Needleman 1984, Acta Metall. 32, 157-169). Voids:
     df = (1 - f) dev + fn/(sn sqrt(2 pi)) exp(-((em - en)/sn)^2/2) dem. From fc on, f in the surface
-    grows by (1/q1 - fc)/(ff - fc) of df. Each step uses the matrix and f at its beginning.
-    Compression closes voids, even of failed metal, which then is sound again; without voids, metal
-    yields by q = Ym. Dump columns: ep (em), f, Jp (plastic volume ratio).
+    grows by (1/q1 - fc)/(ff - fc) of df. Each step uses the matrix and f at its beginning: a pull
+    to a strain of 0.4 errs by 6 % in steps of 0.04, by 1 % in steps of 0.008. Compression closes
+    voids, even of failed metal, which then is sound again; without voids, metal yields by q = Ym.
+    Dump columns: ep (em), f, Jp (plastic volume ratio).
 
     See Also
     --------
