@@ -1,6 +1,9 @@
 """One point of a law, driven through strains; numbers of the tests of laws."""
 
+import re
+
 import numpy as np
+import pytest
 from tensors import flat, symmetric_matrix
 
 from karamelo_py.points.laws import (
@@ -80,3 +83,17 @@ def integrated(rate, y, end, steps=20_000):
         d = rate(t + h, y + h * c)
         y = y + h / 6 * (a + 2 * b + 2 * c + d)
     return y
+
+
+def lanes_are_the_point_function(run_script, run_interpreted, script):
+    """Compiled, in lanes, a scene with logged energies Es and Ed dissipates as interpreted."""
+    slow, fast = run_interpreted(script).log, run_script(script, folder="compiled").log
+    assert slow["Ed"][-1] > 0
+    for name in ("Es", "Ed"):
+        assert fast[name] == pytest.approx(slow[name], rel=1e-8)
+
+
+def leaning_is_reported(run_interpreted, script, straight, leaning):
+    script = script.replace(straight, leaning)
+    script = re.sub(r"run\(\d+\)", "run(1)", script)
+    assert "shear out of its plane" in run_interpreted(script, status=None).err

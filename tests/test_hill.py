@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from laws import lanes_are_the_point_function, leaning_is_reported
 from tensors import every_kinematics, flat, rotation, symmetric_matrix
 
 from comparisons.results import read_log
@@ -226,15 +227,11 @@ DISK = f"""
 
 
 def test_compiled_lanes_are_the_point_function(run_script, run_interpreted):
-    slow, fast = run_interpreted(DISK).log, run_script(DISK, folder="compiled").log
-    assert slow["Ed"][-1] > 0
-    for name in ("Es", "Ed"):
-        assert fast[name] == pytest.approx(slow[name], rel=1e-8)
+    lanes_are_the_point_function(run_script, run_interpreted, DISK)
 
 
 def test_axes_that_lean_out_of_the_plane_are_reported(run_interpreted):
-    script = DISK.replace("hard, 30, R", "hard, 30, 40, R").replace("run(10)", "run(1)")
-    assert "shear out of its plane" in run_interpreted(script, status=None).err
+    leaning_is_reported(run_interpreted, DISK, "hard, 30, R", "hard, 30, 40, R")
 
 
 @pytest.mark.parametrize(

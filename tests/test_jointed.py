@@ -4,6 +4,7 @@ from math import cos, inf, radians, sin, tan
 
 import numpy as np
 import pytest
+from laws import lanes_are_the_point_function, leaning_is_reported
 from tensors import every_kinematics, flat, matrix, rotation, symmetric_flat, symmetric_matrix
 
 from comparisons.results import read_log
@@ -179,15 +180,11 @@ SLIDE = """
 
 
 def test_compiled_lanes_are_the_point_function(run_script, run_interpreted):
-    slow, fast = run_interpreted(SLIDE).log, run_script(SLIDE, folder="compiled").log
-    assert slow["Ed"][-1] > 0
-    for name in ("Es", "Ed"):
-        assert fast[name] == pytest.approx(slow[name], rel=1e-8)
+    lanes_are_the_point_function(run_script, run_interpreted, SLIDE)
 
 
 def test_joints_that_lean_out_of_the_plane_are_reported(run_interpreted):
-    script = SLIDE.replace("60, 90, psi", "60, 45, psi").replace("run(10)", "run(1)")
-    assert "shear out of its plane" in run_interpreted(script, status=None).err
+    leaning_is_reported(run_interpreted, SLIDE, "60, 90, psi", "60, 45, psi")
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ STYLES = {
     "pores that are partly": [("command", "unsaturated"), ("fix", "suction")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "terrain": [("region", "heights"), ("region", "raster")],
-    "failure of fibres": [("damage", "hashin"), ("material", "hashin")],
+    "cracks in laminae": [("damage", "cohesive"), ("fix", "cohesive")],
     "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],
     "cracks": [("method", "dfg"), ("fix", "crack")],

@@ -66,7 +66,7 @@ class Orthotropic(NamedTuple):
 
     See Also
     --------
-    transverse, hill, tsai-hill, saint-venant-kirchhoff, plane_stress
+    transverse, hill, tsai-hill, hashin, saint-venant-kirchhoff, plane_stress
     """
 
     rho: AboveZero
@@ -99,8 +99,13 @@ class Orthotropic(NamedTuple):
                 hint="nu12 = nu21 E1/E2: the ratio belongs to a pull along the first axis",
             )
         C = rotated(np.linalg.inv(compliance), axes(self.angle, self.tilt, self.spin))
-        numbers = [C[VOIGT[a] + VOIGT[b]] for a, b in PAIRS]
-        return Directional(1 / self.rho, fastest(C), *map(float, numbers))
+        return of_stiffness(1 / self.rho, C)
+
+
+def of_stiffness(specific_volume: float, C: np.ndarray) -> Directional:
+    """Return the law with the stiffness C (3, 3, 3, 3)."""
+    numbers = [C[VOIGT[a] + VOIGT[b]] for a, b in PAIRS]
+    return Directional(specific_volume, fastest(C), *map(float, numbers))
 
 
 class Transverse(NamedTuple):

@@ -70,7 +70,7 @@ class TsaiHill(NamedTuple):
 
     See Also
     --------
-    orthotropic, transverse, hill, fix erosion
+    hashin, orthotropic, transverse, hill, fix erosion
     """
 
     elastic: Any
@@ -95,14 +95,18 @@ class TsaiHill(NamedTuple):
                     argument="Y",
                     expected="a strength across below twice the strength along axis 1",
                 )
-        if not residual < 1:
-            raise ScriptError(
-                f"a residual fraction of {residual:g} is no failure",
-                argument="residual",
-                expected="a number above 0 and below 1",
-            )
+        refuse_whole(residual)
         turn = map(float, axes(angle, tilt, spin).ravel())
         return Failing(elastic.whole, X, Xc or X, Y, Yc or Y, S, residual, Turn(*turn))
+
+
+def refuse_whole(residual: float) -> None:
+    if not residual < 1:
+        raise ScriptError(
+            f"a residual fraction of {residual:g} is no failure",
+            argument="residual",
+            expected="a number above 0 and below 1",
+        )
 
 
 class Turn(NamedTuple):
@@ -130,12 +134,18 @@ class _Fields(NamedTuple):
     turn: Turn  # columns: the axes of strength
 
 
-class Failing(OfDeformation, _Fields):
-    """An elastic solid with a criterion of Tsai and Hill."""
+class Ply(OfDeformation):
+    """An elastic solid with directions, in the field `elastic`, that breaks."""
 
     __slots__ = ()
     in_lanes = True
     traits = laws.LawTraits()
+
+
+class Failing(Ply, _Fields):
+    """A ply with the criterion of Tsai and Hill."""
+
+    __slots__ = ()
 
 
 class State(NamedTuple):
@@ -153,15 +163,19 @@ def piola_stress(law, kin, F):
     return stress_of(law.elastic, laws.elastic_strain(law.elastic, kin, Deformed(F)))
 
 
-def criterion(law, T):
+def in_axes(turn, T):
+    """Return T11, T22, T33, T12, T13, T23 in the axes of strength."""
     a = T.at()
 
     def component(p, q):
         pairs = [(i, j) for i in range(3) for j in range(3) if (i, j) in a]
-        return total([law.turn[3 * i + p] * law.turn[3 * j + q] * a[i, j] for i, j in pairs])
+        return total([turn[3 * i + p] * turn[3 * j + q] * a[i, j] for i, j in pairs])
 
-    t11, t22, t33 = [component(k, k) for k in range(3)]
-    t12, t13, t23 = component(0, 1), component(0, 2), component(1, 2)
+    return [component(p, q) for p, q in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+
+
+def criterion(law, T):
+    t11, t22, t33, t12, t13, t23 = in_axes(law.turn, T)
     x = 1 / where(t11 < 0, law.Xc, law.X)
     y = 1 / where(t22 + t33 < 0, law.Yc, law.Y)
     xx, yy = x * x, y * y
@@ -197,36 +211,40 @@ def _energy_density_failing(law, kin, state):
     return fraction_left(law, state.index) * whole
 
 
-@laws.dissipated_energy.on(Failing)
-def _dissipated_energy_failing(law, kin, state):
-    return state.loss
-
-
-@laws.damage.on(Failing)
-def _damage_failing(law, kin, state):
-    return where(state.index < 1, 0, 1)
-
-
 @laws.damage_initiation.on(Failing)
 def _damage_initiation_failing(law, kin, state):
     return state.index
 
 
-@laws.wave_speed_squared.on(Failing)
-def _wave_speed_squared_failing(law, kin, state):
+@laws.dissipated_energy.on(Ply)
+def _dissipated_energy_ply(law, kin, state):
+    return state.loss
+
+
+@laws.damage.on(Ply)
+def _damage_ply(law, kin, state):
+    return where(laws.damage_initiation(law, kin, state) < 1, 0, 1)
+
+
+@laws.wave_speed_squared.on(Ply)
+def _wave_speed_squared_ply(law, kin, state):
     return laws.wave_speed_squared(law.elastic, kin, Deformed(state.F))
 
 
-@laws.specific_volume.on(Failing)
-def _specific_volume_failing(law):
+@laws.specific_volume.on(Ply)
+def _specific_volume_ply(law):
     return law.elastic.specific_volume
 
 
-@laws.is_round.on(Failing)
-def _is_round_failing(law):
+@laws.is_round.on(Ply)
+def _is_round_ply(law):
     return laws.is_round(law.elastic)
 
 
-laws.column(Failing, "damage", laws.damage)
-laws.column(Failing, "damage_init", laws.damage_initiation)
-laws.column(Failing, "dissipated", laws.dissipated_energy)
+COLUMNS = {
+    "damage": laws.damage,
+    "damage_init": laws.damage_initiation,
+    "dissipated": laws.dissipated_energy,
+}
+for _name, _source in COLUMNS.items():
+    laws.column(Ply, _name, _source)
