@@ -139,9 +139,9 @@ def boundary(
     In a periodic direction the domain repeats endlessly: points that leave at one end enter at the
     other, and bodies at both ends touch. Its length is a multiple of the cell size. Formulas of
     nodes should be equal a period apart. Points return to the domain every 10 steps; until then,
-    dumps may show them outside. Supported are method ulmpm with linear or splines, scheme musl and
-    any transfer but XPIC, on one process without a GPU; not the other styles of boundary,
-    axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, or pore_water.
+    dumps may show them outside. It needs method ulmpm with linear or splines, scheme musl, any
+    transfer but XPIC, and one process without a GPU. It refuses the other styles of boundary,
+    axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
 
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 
@@ -348,8 +348,9 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    By reference positions of points when the command is read, or positions of nodes. Separate nodes
-    of later solids also belong, unless solids are named. The group ``all`` always exists.
+    The command selects points by their reference positions, nodes by their positions. A group of
+    nodes also gets nodes of the separate grids of later solids, unless `solids` are named. The group
+    ``all`` always exists.
 
     A set of faces, edges or nodes of a mesh selects what is nearer to it than half a cell.
 
@@ -367,7 +368,7 @@ def group(
         ``all``, or ``solid`` followed by IDs of solids. For a mesh: name or number of its set, as
         in region mesh.
     solids
-        Only their points may belong. For nodes, solids on the same grid give the same group.
+        Select only points of these solids, or nodes of their grids.
 
     Example
     -------

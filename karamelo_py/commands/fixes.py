@@ -208,9 +208,9 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Nodes: the sum of the forces from the points: the divergence of stress, and fixes on points
-    (contact, tools, tractions); at held nodes with little acceleration minus the reaction. Points:
-    the rate of change of their momentum in the last step, sum m a. 0 before the first step.
+    Of nodes: the sum of the forces from the points, by stress and by fixes on points (contact,
+    tools, tractions). At held nodes with little acceleration it is minus the reaction. Of points:
+    the rate of change of their momentum in the last step, sum m a. It is 0 before the first step.
 
     See Also
     --------
@@ -241,9 +241,9 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Nodes: fixes on nodes, such as body_force and force_nodes. Points: fixes on points (contact,
-    tools, tractions). Not included: prescribed velocities, whose fixes publish reactions. 0 before
-    the first step. Karamelo gives the internal force here.
+    Of nodes: by fixes on nodes, such as body_force and force_nodes. Of points: by fixes on points
+    (contact, tools, tractions). Forces that prescribe a velocity are omitted; their fixes publish
+    reactions. It is 0 before the first step. Karamelo returns the internal force instead.
 
     See Also
     --------

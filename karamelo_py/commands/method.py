@@ -59,8 +59,8 @@ def method(
 
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
-    a temperature), also between bodies with common nodes. Else it leaves a body only by a fix.
-    Points take temperature increments (FLIP, for any velocity transfer): only conduction smears
+    a temperature), also between bodies with common nodes. Only a fix adds or
+    removes other heat. Points take temperature increments (FLIP, for any velocity transfer): only conduction smears
     temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
     dimensions. If ``mechanical``, points are heated only by their own work.
 
@@ -197,12 +197,12 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Costs one extra pass over the points per stress update and one per force evaluation.
+    It costs one more pass over the points per stress update and one per force evaluation.
 
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
     fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
     sin(psi))). With the point's pressure alone, non-dilatant sand would lose half of its strength.
-    Load steps use it: do not average there for such sand.
+    Load steps do use it alone: do not average such sand there.
 
     See Also
     --------

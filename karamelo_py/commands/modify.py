@@ -37,11 +37,11 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     -----
     The next run uses them, without compilation. A stress outside the new yield surface returns to
     it in the first step. If an elastic modulus changes, an incremental law retains its stress; with
-    a law of the total deformation it changes at once. Not changeable: the density (points have
-    masses), and constants of the initial state, such as pc of cam-clay.
+    a law of the total deformation it changes at once. The density (points have masses) and
+    constants of the initial state, such as pc of cam-clay, cannot be changed.
 
-    ``kind`` material also finds constants of the parts of eos-strength, if only one part has the
-    name.
+    With ``material``, it also changes constants of the parts of eos-strength, if only one part has
+    that name.
 
     See Also
     --------

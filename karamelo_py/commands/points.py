@@ -53,9 +53,9 @@ def delete_particles(
 
     Notes
     -----
-    ``where`` is for between runs. The mass and energy of the deleted points are printed. Before the
-    first run, the rest is renumbered: the command must precede particle groups and contact fixes of
-    these solids, and a solid cannot lose all points. Between runs numbers do not change.
+    Use ``where`` between runs. The mass and energy of the deleted points are printed. Before the
+    first run, the other points are renumbered: the command must precede particle groups and contact
+    fixes of these solids, and a solid cannot lose all its points. Between runs ids do not change.
 
     See Also
     --------
@@ -207,8 +207,8 @@ def populate_cylindrical_coordinates(
     Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, and points at the
     angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx`` with
     ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``, in
-    total ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``); not so in Karamelo, with rings at ``j dr``, a
-    point in the centre, and slices at ``lo + i dx``.
+    total ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo differs: its rings lie at ``j dr``, with
+    a point in the centre, and its slices at ``lo + i dx``.
 
     Before the first run, and before groups of these points. T0 replaces the solid's.
 

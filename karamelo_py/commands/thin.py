@@ -28,10 +28,10 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
     -----
     Before the first material. Each law finds the strain across the plate for which szz vanishes.
     The column ``thickness`` is the present thickness over the initial one. Masses, forces and
-    energies refer to the whole thickness. Refused are liquids, gases and loose grains, which have
-    no strength without stress across, and anti_volumetric_locking: plane stress does not lock. With
-    a thickness other than 1, fixes that use sizes of points are refused: contact between points and
-    with surfaces, and fluxes through faces of points.
+    energies refer to the whole thickness. Liquids, gases and loose grains are refused, because
+    they have no strength without stress across; so is anti_volumetric_locking, because plane stress
+    does not lock. With a thickness other than 1, fixes that use sizes of points are refused:
+    contact between points and with surfaces, and fluxes through faces of points.
 
     See Also
     --------
@@ -59,7 +59,7 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
     -----
     Before the first material. Each law finds the strain across the bar, equal in y and z, for which
     the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces and
-    energies refer to the whole cross-section. Refused are the materials and fixes that plane_stress
+    energies refer to the whole cross-section. It refuses the materials and fixes that plane_stress
     refuses, and orthotropic materials that differ in y and z.
 
     See Also

@@ -170,7 +170,7 @@ class StepSize:
 
     def _choose(self) -> None:
         if not self.measured:
-            # Else the last step has measured: runs in pieces take the steps of a whole run.
+            # A run in pieces takes the steps of a whole run: the last step has measured.
             simulation, motion = self.simulation, self.motion
             self._measure(float(motion.weight))
             motion.wave = motion.speed = 0.0
