@@ -349,8 +349,8 @@ def group(
     """Name a set of points or of nodes.
 
     The command selects points by their reference positions, nodes by their positions. A group of
-    nodes also gets nodes of the separate grids of later solids, unless `solids` are named. The group
-    ``all`` always exists.
+    nodes also gets nodes of the separate grids of later solids, unless `solids` are named. The
+    group ``all`` always exists.
 
     A set of faces, edges or nodes of a mesh selects what is nearer to it than half a cell.
 

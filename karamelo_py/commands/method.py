@@ -59,10 +59,10 @@ def method(
 
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
-    a temperature), also between bodies with common nodes. Only a fix adds or
-    removes other heat. Points take temperature increments (FLIP, for any velocity transfer): only conduction smears
-    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
-    dimensions. If ``mechanical``, points are heated only by their own work.
+    a temperature), also between bodies with common nodes. Only fixes add or remove
+    other heat. Points take temperature increments (FLIP, for any velocity transfer), so only
+    conduction smears temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho
+    cp/kappa in d dimensions. If ``mechanical``, points are heated only by their own work.
 
     See Also
     --------
