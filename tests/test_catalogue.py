@@ -181,7 +181,7 @@ def test_a_broken_plug_in_is_listed_as_such(capsys, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("asked", "said"),
-    [("terrain", "region stl"), ("umat", "class in Python")],
+    [("umat", "class in Python")],
 )
 def test_help_says_what_is_missing(capsys, asked, said):
     assert main(["help", asked]) == 0

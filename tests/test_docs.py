@@ -375,6 +375,8 @@ def _write_meshes(folder):
     rows = "0.1, 0.1, 0.1, 1e-3\n0.2, 0.2, 0.2, 1e-3\n"
     (folder / "grains.csv").write_text("x, y, z, volume\n" + rows, encoding="utf-8")
     (folder / "packing.xyz").write_text("1\n\nX 0.5 0.5 0.5\n", encoding="utf-8")
+    head = "ncols 2\nnrows 1\nxllcorner -99\nyllcorner -99\ncellsize 200\n0.2 0.3\n"
+    (folder / "dem.asc").write_text(head, encoding="utf-8")
     (folder / "exact.csv").write_text("x, s11\n0, 0\n1, 2\n", encoding="utf-8")
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) / 2
     part = meshio.Mesh(

@@ -13,7 +13,6 @@ ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 STYLES = {
     "pores that are partly": [("command", "unsaturated"), ("fix", "suction")],
     "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
-    "terrain": [("region", "heights"), ("region", "raster")],
     "cracks in laminae": [("damage", "cohesive"), ("fix", "cohesive")],
     "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],

@@ -1,0 +1,130 @@
+"""Rasters of heights: ESRI ASCII grids and GeoTIFF, profiles, and their skins."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from karamelo_py.language.kinds import InputFile
+from karamelo_py.scene.tables import read_table
+from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.reading import read_text
+from karamelo_py.script.terms import number_of
+
+GEOTIFF = (".tif", ".tiff")
+NO_DATA = -9999.0
+FORM = "ncols, nrows, xllcorner, yllcorner, cellsize (and NODATA_value), then rows from the north"
+
+
+class HeightsFile(InputFile):
+    endings = (".asc", ".txt", ".csv", ".grd", *GEOTIFF)
+
+
+class Raster(NamedTuple):
+    """Heights (ny, nx) at the centres of square cells, rows from the south; NaN where unknown."""
+
+    corner: np.ndarray  # (2,) lower corner
+    cell: float
+    heights: np.ndarray
+
+    @property
+    def centres(self) -> tuple[np.ndarray, np.ndarray]:
+        ny, nx = self.heights.shape
+        x, y = (self.corner[k] + (np.arange(n) + 0.5) * self.cell for k, n in enumerate((nx, ny)))
+        return x, y
+
+
+def read_raster(path: Path) -> Raster:
+    """Read a raster; ScriptError for a wrong header, size or number."""
+    if path.suffix.lower() in GEOTIFF:
+        return _of_geotiff(path)
+    words, head = read_text(path).split(), {}
+    while len(words) > 1 and number_of(words[0]) is None:
+        number = number_of(words[1])
+        if number is None:
+            raise _wrong(path, f"'{words[0]} {words[1]}' in its header")
+        head[words[0].lower()], words = number, words[2:]
+    corners = [{f"{c}llcorner", f"{c}llcenter"} & head.keys() for c in "xy"]
+    if not ({"ncols", "nrows", "cellsize"} <= head.keys() and all(corners)):
+        raise _wrong(path, "its header lacks " + ", ".join(
+            sorted({"ncols", "nrows", "cellsize", "xllcorner", "yllcorner"} - head.keys())
+        ))  # fmt: skip
+    nx, ny, cell = int(head["ncols"]), int(head["nrows"]), float(head["cellsize"])
+    numbers = [number_of(word) for word in words]
+    if None in numbers:
+        raise _wrong(path, f"'{words[numbers.index(None)]}' is no height")
+    if len(numbers) != nx * ny or cell <= 0 or not numbers:
+        raise _wrong(path, f"{len(numbers)} heights in {nx} columns and {ny} rows")
+    heights = np.array(numbers, float).reshape(ny, nx)[::-1].copy()
+    heights[heights == head.get("nodata_value", NO_DATA)] = np.nan
+    corner = [head.get(f"{c}llcorner", head.get(f"{c}llcenter", 0) - cell / 2) for c in "xy"]
+    return Raster(np.array(corner, float), cell, heights)
+
+
+def _wrong(path: Path, what: str) -> ScriptError:
+    return ScriptError(f"{path} is no ESRI ASCII grid: {what}", argument="file", expected=FORM)
+
+
+def _of_geotiff(path: Path) -> Raster:
+    try:
+        import rasterio
+    except ImportError:
+        raise ScriptError(
+            f"{path}: GeoTIFF needs the package rasterio",
+            argument="file",
+            hint="pip install rasterio, or gdal_translate -of AAIGrid, which writes an ESRI grid",
+        ) from None
+    try:
+        with rasterio.open(path) as file:
+            heights, place = file.read(1, masked=True).astype(float).filled(np.nan), file.transform
+    except rasterio.errors.RasterioError as error:
+        raise ScriptError(f"{path} cannot be read: {error}", argument="file") from None
+    if place.b or place.d or not np.isclose(place.a, -place.e):
+        message = f"{path} has cells of {place.a:g} by {-place.e:g}, or is turned"
+        raise ScriptError(message, argument="file", expected="square cells along the axes")
+    corner = np.array([place.c, place.f + heights.shape[0] * place.e])
+    return Raster(corner, place.a, heights[::-1])
+
+
+def read_profile(path: Path) -> np.ndarray:
+    """Read positions and heights (n, 2), along increasing positions."""
+    profile = np.column_stack([*read_table(path).values()][:2])
+    if profile.shape[1] < 2 or len(profile) < 2 or (np.diff(profile[:, 0]) <= 0).any():
+        raise ScriptError(
+            f"{path} is no profile",
+            argument="file",
+            expected="rows of position and height, of which the positions increase",
+        )
+    return profile
+
+
+def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.ndarray:
+    """Return segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
+    x, z = np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([z[:1], z, z[-1:]])
+    corners = np.column_stack([np.append(x, ends)[::-1], np.append(z, [bottom] * 2)[::-1]])
+    corners[:2] = corners[1::-1]  # the bottom from left to right
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+
+
+def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.ndarray:
+    """Return triangles (m, 3, 3) around the ground below heights (ny, nx), seen from outside
+    counter-clockwise."""
+    ny, nx = z.shape
+    top = np.stack([*np.meshgrid(x, y), z], axis=2)
+    low = top.copy()
+    low[:, :, 2] = bottom
+    faces = [*_halves(top[:-1, :-1], top[:-1, 1:], top[1:, 1:], top[1:, :-1])]
+    rim = [(0, k) for k in range(nx)] + [(k, nx - 1) for k in range(1, ny)]
+    rim += [(ny - 1, k) for k in range(nx - 2, -1, -1)] + [(k, 0) for k in range(ny - 2, 0, -1)]
+    i, j = np.array(rim).T
+    a, b = low[i, j], top[i, j]
+    faces += [*_halves(a, np.roll(a, -1, 0), np.roll(b, -1, 0), b)]
+    ring, middle = a[::-1], np.broadcast_to(a[:1] * 0 + low.mean(axis=(0, 1)), a.shape)
+    faces.append(np.stack([ring, np.roll(ring, -1, 0), middle], axis=1))
+    return np.concatenate(faces)
+
+
+def _halves(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
+    """Divide quadrilaterals (..., 3) along a-c."""
+    flat = [corner.reshape(-1, 3) for corner in (a, b, c, d)]
+    return [np.stack([flat[k] for k in of], axis=1) for of in ((0, 1, 2), (0, 2, 3))]
