@@ -64,6 +64,7 @@ class Study:
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
     claim: Claim | None = None  # of the folder
     ran: int = 0
+    next_write: float = 0.0  # when the table is due
     begun: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:
@@ -95,7 +96,10 @@ class Study:
 
     def write(self) -> None:
         if self.writes and self.rows:
+            begun = time.perf_counter()
             write(self.out, list(self.rows.values()))
+            # Writing ten thousand rows takes as long as a short run.
+            self.next_write = time.perf_counter() + 20 * (time.perf_counter() - begun)
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
         """Run cases; an interrupt ends runs in progress, and finished ones are stored."""
@@ -151,6 +155,7 @@ class Study:
                     compiled.add(kind_of(case.values()))
                     self._put(case, future.result())
                     display.finish(case, self.rows[tuple(case.values())])
+                if done and time.perf_counter() > self.next_write:
                     self.write()
                 display.tick([case for case, _ in queue], list(running.values()))
                 if self.page:
@@ -159,6 +164,7 @@ class Study:
             self.launch.stop.set()
             raise
         finally:
+            self.write()
             if self.elsewhere is None:
                 pool.close()
 
