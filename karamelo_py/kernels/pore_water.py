@@ -61,7 +61,7 @@ def make_flux(s):
 
 COMPANIES = (
     (MassMomentum, Company(then=(pores.WaterMomentum(),))),
-    (InternalForce, Company(then=(pores.WaterForce(),))),
+    (InternalForce, Company(then=(pores.PoreVolumes(), pores.WaterForce()))),
     (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
     (NodalUpdate, Company(before=(AtWater(), NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))),

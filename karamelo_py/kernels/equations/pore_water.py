@@ -79,11 +79,9 @@ class PoreSums(SummedField):
 
 
 class PoreForce(SummedField):
-    shape = vector
+    """Force of the pressure (d,), and area (d,)."""
 
-
-class PoreArea(SummedField):
-    shape = vector
+    shape = numbers(0, 2)
 
 
 class WaterAgain(SummedField):
@@ -116,7 +114,7 @@ class GivenPressure(StepField):
 
 POINT_FIELDS = RelativeVelocity, UnseenPressure
 NODE_FIELDS = (
-    WaterSums, PoreSums, PoreForce, PoreArea, WaterAgain, WaterUpdate, Flux, GivenPressure,
+    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure,
 )  # fmt: skip
 
 
@@ -159,35 +157,48 @@ def water_v(pt):
     return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
 
 
-@eq.reads("mass", "state", "material", "deformation gradient", "unseen pressure")
+@eq.reads("mass", "state", "material", "unseen pressure")
+def volumes(pt):
+    """Return volume, pores, volume times pressure and times unseen pressure, drag; or ()."""
+    if not _is_wet(pt):
+        return ()
+    law, state = pt.law_and_state
+    volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
+    p, drag = pore_pressure(law, pt.kin, state), drag_per_volume(law, pt.kin, state)
+    unseen = pt.of(UnseenPressure)[0, pt.p]
+    return volume, volume * porosity(law, pt.kin, state), volume * p, volume * unseen, volume * drag
+
+
+@eq.reads("mass", "state", "material", "deformation gradient")
 def pores(pt):
-    """Return volume, pores, volume times pressure, drag, pressure, volume as a stress; or ()."""
+    """Return pressure, and volume as a stress; or ()."""
     if not _is_wet(pt):
         return ()
     law, state, f = pt.law_state_F
-    reference = eq.mass(pt) * laws.specific_volume(law)
-    volume, p = reference * laws.jacobian(law, pt.kin, state), pore_pressure(law, pt.kin, state)
-    drag = volume * drag_per_volume(law, pt.kin, state)
     one = nothing(pt.kin) + laws.jacobian(law, pt.kin, state) * I
-    area = reference * force_stress(pt.w.frame, pt.kin, one, f)
-    unseen = volume * pt.of(UnseenPressure)[0, pt.p]
-    sums = volume, volume * porosity(law, pt.kin, state), volume * p, unseen, drag
-    return sums, p, area
+    area = eq.mass(pt) * laws.specific_volume(law) * force_stress(pt.w.frame, pt.kin, one, f)
+    return pore_pressure(law, pt.kin, state), area
 
 
 def _sums_at(pt, node):
+    if not len(pt.volumes):
+        return ()
+    *some, drag = pt.volumes
+    return (*[pore_N(node) * one for one in some], node.N * drag)
+
+
+def _affine_sums(pt, w):
+    if not len(pt.volumes) or isinstance(w.basis, Linear):
+        return ()
+    return pt.volumes, ()
+
+
+def _force_and_area_at(pt, node):
     if not len(pt.pores):
         return ()
-    *volumes, drag = pt.pores[0]
-    return (*[pore_N(node) * one for one in volumes], node.N * drag)
-
-
-def _area_at(pt, node):
-    return pt.pores[2].dot(pore_grad(node)) if len(pt.pores) else ()
-
-
-def _force_at(pt, node):
-    return pt.pores[1] * _area_at(pt, node) if len(pt.pores) else ()
+    p, V = pt.pores
+    area = V.dot(pore_grad(node))
+    return (*(p * area), *area)
 
 
 class OfWater(NamedTuple):
@@ -202,6 +213,14 @@ def _momentum_at(pt, node):
     return nodal_momentum(node.transfer, OfWater(pt.water[0], pt.water_v, ()), node)
 
 
+def _affine_mass(pt, w):
+    return (pt.water[0], ()) if len(pt.water) else ()
+
+
+def _affine_momentum(pt, w):
+    return (pt.water[0] * pt.water_v, ()) if len(pt.water) else ()
+
+
 class WaterMomentum(eq.NodalQuantity):
     says = "water to grid"
     takes = eq.of_point(water=water, water_v=water_v)
@@ -209,25 +228,28 @@ class WaterMomentum(eq.NodalQuantity):
         eq.Sum(
             eq.MASS._replace(array=WaterSums),
             lambda pt, node: tuple([node.N * m for m in pt.water]),
+            _affine_mass,
         ),
-        eq.Sum(eq.MOMENTUM._replace(array=WaterSums), _momentum_at),
+        eq.Sum(eq.MOMENTUM._replace(array=WaterSums), _momentum_at, _affine_momentum),
     )
+
+
+class PoreVolumes(eq.NodalQuantity):
+    says = "volumes of pores to grid"
+    takes = eq.of_point(volumes=volumes)
+    gives = (eq.Sum(eq.whole(PoreSums), _sums_at, _affine_sums),)
 
 
 class WaterForce(eq.NodalQuantity):
     says = "pore pressure to grid"
     takes = eq.of_point(pores=pores)
-    gives = (
-        eq.Sum(eq.whole(PoreSums), _sums_at),
-        eq.Sum(eq.whole(PoreForce), _force_at),
-        eq.Sum(eq.whole(PoreArea), _area_at),
-    )
+    gives = (eq.Sum(eq.whole(PoreForce), _force_and_area_at),)
 
 
 class WaterMomentumAgain(eq.NodalQuantity):
     says = "momentum of the water to grid"
     takes = eq.of_point(water=water, water_v=water_v)
-    gives = (eq.Sum(eq.whole(WaterAgain), _momentum_at),)
+    gives = (eq.Sum(eq.whole(WaterAgain), _momentum_at, _affine_momentum),)
 
 
 # --- at the nodes ---------------------------------------------------------------------------------
@@ -240,10 +262,10 @@ def _taken_up(b):
 
 
 def _is_rim(nodes, kin, n, rim):
-    area, V = field(nodes.fields, PoreArea), field(nodes.fields, PoreSums)[n, 0]
-    squared = real(0, V)
-    for k in range(kin.dimension):
-        squared += area[n, k] * area[n, k]
+    force, V = field(nodes.fields, PoreForce), field(nodes.fields, PoreSums)[n, 0]
+    squared, d = real(0, V), kin.dimension
+    for k in range(d):
+        squared += force[n, d + k] * force[n, d + k]
     return squared >= rim * rim * V * V
 
 
@@ -265,13 +287,13 @@ class ShareForces(NamedTuple):
     surface: float  # |B| / V of nodes at the surface
 
     says = "forces on soil and water"
-    goes_through = ("sums", "water sums", "pore sums", "pore force", "pore area", "water update")
+    goes_through = ("sums", "water sums", "pore sums", "pore force", "water update")
 
     def at_node(task, kin, nodes, n, dt):
         if not _is_wet_node(nodes, n):
             return
         water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
-        force, area = field(nodes.fields, PoreForce), field(nodes.fields, PoreArea)
+        force, d = field(nodes.fields, PoreForce), kin.dimension
         prescribed = field(nodes.fields, GivenPressure)[n, 0]
         m, m_s = water[n, arrays.MASS], nodes.sums[n, arrays.MASS]
         V, D = sums[n, 0], sums[n, 4]
@@ -283,17 +305,17 @@ class ShareForces(NamedTuple):
         if _is_closed(nodes, kin, n, task.surface):
             # A wall carries the weight of its water, which is not in the mean pressure.
             squared = real(0, m)
-            for k in range(kin.dimension):
-                along += water[n, arrays.of_force(kin) + k] * area[n, k]
-                squared += area[n, k] * area[n, k]
+            for k in range(d):
+                along += water[n, arrays.of_force(kin) + k] * force[n, d + k]
+                squared += force[n, d + k] * force[n, d + k]
             along /= squared
         share = sums[n, 1] / V
         _, taken = _taken_up(dt * D / m)
         whole = m_s + m * (1 - taken)
-        for k in range(kin.dimension):
+        for k in range(d):
             of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
-            by_pressure = share * (force[n, k] - area[n, k] * p)
-            carried = along * area[n, k]
+            by_pressure = share * (force[n, k] - force[n, d + k] * p)
+            carried = along * force[n, d + k]
             on_water = water[n, of_force] - carried + by_pressure
             v = nodes.sums[n, of_momentum] / m_s
             w = water[n, of_momentum] / m - v
@@ -348,11 +370,11 @@ class MakeFlux(NamedTuple):
                 flux[n, k] = 0
             return
         m, V = field(nodes.fields, WaterSums)[n, arrays.MASS], field(nodes.fields, PoreSums)[n, 0]
-        again, area = field(nodes.fields, WaterAgain), field(nodes.fields, PoreArea)
+        again, force = field(nodes.fields, WaterAgain), field(nodes.fields, PoreForce)
         for k in range(d):
             j = (again[n, k] - m * nodes.velocity[n, k]) / V
             flux[n, k] = j
-            across += j * area[n, k]
+            across += j * force[n, d + k]
         closed = _is_closed(nodes, kin, n, task.rim)
         for k in range(2):
             flux[n, d + 2 + k] = field(nodes.fields, PoreSums)[n, 2 + k] / V

@@ -5,7 +5,6 @@ deformation: p = K ln(content / pores). `advance` alone is undrained; in a run t
 nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler.powers import exponential, logarithm
@@ -69,9 +68,9 @@ def _terms(law, kin, state, of_skeleton):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # The larger eigenvalue of the two phases; without drag it is fastest.
+    # Just above the larger eigenvalue of the two phases, without a root; it is fastest without drag.
     trace, product = _terms(law, kin, state, laws.wave_speed_squared)
-    return 0.5 * (trace + sqrt(max(trace * trace - 4 * product, 0)))
+    return trace - product / trace
 
 
 @laws.wave_speed_bound.on(Saturated)
