@@ -68,7 +68,7 @@ def _terms(law, kin, state, of_skeleton):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # Just above the larger eigenvalue of the two phases, without a root; it is fastest without drag.
+    # Just above the larger eigenvalue of the two phases, without a root; fastest without drag.
     trace, product = _terms(law, kin, state, laws.wave_speed_squared)
     return trace - product / trace
 
