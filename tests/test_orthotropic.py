@@ -130,6 +130,48 @@ def test_a_bar_along_its_fibres(run_interpreted):
     assert log["Ek"][-1] < 0.01 * log["Ek"].max()
 
 
+RING = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, 1, 0, 1, 0.25)
+    plane_stress(true)
+    region(box, block, 0.25, 0.75, 0.25, 0.75)
+    material(log, orthotropic, 1000, 1e6, 1e5, 1e5, 0.3, 0.3, 0.3, 4e4, 4e4, 4e4, axes=({axes}))
+    solid(log, region, box, 2, log, 0.25, 0)
+    fix(v, initial_velocity_particles, all, x0, y0)
+    fix(n, velocity_nodes, all, x0, y0)
+    set_dt(1e-5)
+    run(1)
+"""
+
+
+@pytest.mark.parametrize("axes", ["-y0, x0, 0, -x0, -y0, 0", "90 + 180/PI*atan2(y0, x0)"])
+def test_axes_by_formulas_of_place(state_interpreted, axes):
+    """A log that is stretched evenly: E1 (1 + nu21)/(1 - nu12 nu21) along its rings, E2 (1 + nu12)/
+    (1 - nu12 nu21) along the radius (Jones 1999, section 2.4)."""
+    state = state_interpreted(RING.format(axes=axes), "x", "y", "s11", "s22", "s12", "axis_x")
+    nu21 = 0.3 * 0.1
+    rings, radial = (1e-5 * x / (1 - 0.3 * nu21) for x in (1e6 * (1 + nu21), 1e5 * 1.3))
+    c, s = (state[name] / np.hypot(state["x"], state["y"]) for name in ("x", "y"))
+    assert state["s11"] == pytest.approx(rings * s * s + radial * c * c, rel=1e-4)
+    assert state["s22"] == pytest.approx(rings * c * c + radial * s * s, rel=1e-4)
+    assert state["s12"] == pytest.approx((radial - rings) * s * c, rel=1e-4)
+    assert state["axis_x"] == pytest.approx(-s, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("axes", "says"),
+    [
+        ("x0, y0, 0, 2*x0, 2*y0, 0", "parallel or zero"),
+        ("1, 0, 0, 2, 0, 0", "parallel or zero"),
+        ("1, 0, 0, 0, 0, 1", "lean out of the plane"),
+        ("1, 0", "gives no axes"),
+        ("30*time", "cannot depend on time"),
+    ],
+)
+def test_axes_that_are_none(run_interpreted, axes, says):
+    assert says in run_interpreted(RING.format(axes=axes), status=1).err
+
+
 def test_a_bar_that_would_flatten_is_refused(run_interpreted):
     """Across the fibres y and z differ; at an angle it would also shear."""
     for angle in (45, 90):

@@ -8,6 +8,7 @@ from karamelo_py.compiler import where
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I
 from karamelo_py.points.laws.elastic import State as Deformed
+from karamelo_py.points.laws.oriented import with_axes_of, without_axes
 from karamelo_py.points.laws.orthotropic import (
     STIFFNESS,
     VOIGT,
@@ -46,7 +47,8 @@ class Hashin(NamedTuple):
         Shear strength across the fibres, above Y/2.
     angle, tilt, spin
         Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own.
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own;
+        its `axes` hold for both.
     residual
         Remaining fraction of the stiffness, above 0 and below 1.
 
@@ -94,8 +96,9 @@ class Hashin(NamedTuple):
         refuse_whole(residual)
         R = axes(angle, tilt, spin)
         strengths = X, Xc, Y, Yc, S, St, residual
-        cracked = with_cracks(elastic.whole, R, residual)
-        return BreakingApart(elastic.whole, cracked, *strengths, Turn(*map(float, R.ravel())))
+        law = without_axes(elastic.whole)
+        cracked, turn = with_cracks(law, R, residual), Turn(*map(float, R.ravel()))
+        return with_axes_of(elastic.whole, BreakingApart(law, cracked, *strengths, turn))
 
 
 def with_cracks(law: Directional, R: np.ndarray, residual: float) -> Directional:

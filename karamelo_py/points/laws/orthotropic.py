@@ -12,6 +12,7 @@ from karamelo_py.points.kinematics import I, inner, total
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.leaning import warn_of_leaning
+from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
@@ -51,10 +52,15 @@ class Orthotropic(NamedTuple):
     angle, tilt, spin
         Rotation of the axes from x, y, z in degrees: by `angle` about z, by `tilt` about the new
         axis 1, by `spin` about the new axis 3.
+    axes
+        Axes that differ from point to point: an angle about z in degrees, or two vectors, along
+        axis 1 and towards axis 2; numbers, or formulas of x0, y0, z0. `angle`, `tilt`
+        and `spin` rotate the law within them.
 
     Example
     -------
     material(spruce, orthotropic, 450, 11e9, 0.6e9, 0.9e9, 0.4, 0.4, 0.3, 0.7e9, 0.6e9, 0.07e9)
+    material(log, orthotropic, 450, 9e9, 6e8, 9e8, 0.4, 0.4, 0.3, 7e8, 6e8, 7e7, axes=(90*x0))
     material(ply, orthotropic, 1600, 140e9, 9e9, 9e9, 0.3, 0.3, 0.4, 5e9, 5e9, 3e9, 30)
 
     Notes
@@ -82,6 +88,17 @@ class Orthotropic(NamedTuple):
     angle: float = 0.0
     tilt: float = 0.0
     spin: float = 0.0
+
+    @classmethod
+    def given(
+        cls, rho: AboveZero, E1: AboveZero, E2: AboveZero, E3: AboveZero,
+        nu12: float, nu13: float, nu23: float,
+        G12: AboveZero, G13: AboveZero, G23: AboveZero,
+        angle: float = 0.0, tilt: float = 0.0, spin: float = 0.0, *, axes: Axes | None = None,
+    ):  # fmt: skip
+        moduli, shear = (E1, E2, E3), (G12, G13, G23)
+        made = cls(rho, *moduli, nu12, nu13, nu23, *shear, angle, tilt, spin)
+        return oriented(made.checked(), axes)
 
     def checked(self):
         """Refuse constants with which some strain would release energy."""
@@ -124,6 +141,8 @@ class Transverse(NamedTuple):
     angle, tilt
         Rotation of the direction from z, in degrees: by `tilt` about x, then by `angle` about z.
         The normal of bedding that dips by 30 degrees about z has angle 30 and tilt 90.
+    axes
+        As for orthotropic, which rotate the direction from axis 3.
 
     Example
     -------
@@ -146,6 +165,13 @@ class Transverse(NamedTuple):
     G3: AboveZero
     angle: float = 0.0
     tilt: float = 0.0
+
+    @classmethod
+    def given(
+        cls, rho: AboveZero, E: AboveZero, nu: float, E3: AboveZero, nu3: float, G3: AboveZero,
+        angle: float = 0.0, tilt: float = 0.0, *, axes: Axes | None = None,
+    ):  # fmt: skip
+        return oriented(cls(rho, E, nu, E3, nu3, G3, angle, tilt).checked(), axes)
 
     def checked(self):
         if not -1 < self.nu < 1 or not self.nu3**2 < self.E3 / self.E * (1 - self.nu) / 2:

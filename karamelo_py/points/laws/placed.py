@@ -39,21 +39,13 @@ class Direction:
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> "Vector | Direction":
-        values = [one.value(hub) for one in argument.listed()]
-        formulas = tuple(Expression(one) for one in values if not isinstance(one, str))
-        if len(values) != 3 or len(formulas) != 3:
+        formulas = formulas_of_place(hub, argument)
+        if len(formulas) != 3:
             raise ScriptError(
                 f"'{argument.text}' is no direction",
                 mark=argument.mark,
                 expected="(x, y, z), not (0, 0, 0)",
             )
-        for part, one in zip(argument.listed(), formulas, strict=True):
-            if others := one.names - FIRST:
-                raise ScriptError(
-                    f"a direction at rest cannot depend on {min(others)}",
-                    mark=part.mark,
-                    expected="a number, or a formula of x0, y0, z0",
-                )
         if any(one.names for one in formulas):
             return cls(formulas, argument.mark)
         return unit_vector([one.constant for one in formulas], argument)
@@ -71,6 +63,20 @@ class Direction:
             mark=self.mark,
             expected="three numbers at every point, not all 0",
         )
+
+
+def formulas_of_place(hub: Scene, argument: Argument) -> tuple[Expression, ...]:
+    """Return the numbers or formulas of x0, y0, z0 in parentheses, or none if one is a text."""
+    values = [one.value(hub) for one in argument.listed()]
+    formulas = tuple(Expression(one) for one in values if not isinstance(one, str))
+    for part, one in zip(argument.listed(), formulas, strict=False):
+        if others := one.names - FIRST:
+            raise ScriptError(
+                f"a direction at rest cannot depend on {min(others)}",
+                mark=part.mark,
+                expected="a number, or a formula of x0, y0, z0",
+            )
+    return formulas if len(formulas) == len(values) else ()
 
 
 def unit_vector(components: Sequence[float], argument: Argument) -> Vector:
@@ -93,7 +99,7 @@ class Place:
     def __float__(self) -> float:
         return 0.0
 
-    def rows(self, values: Values, x0: np.ndarray) -> np.ndarray:
+    def rows(self, values: Values, x0: np.ndarray, _: Any = None) -> np.ndarray:
         """Return the numbers (n, k) of the law's field ``directions`` at `x0` (n, d)."""
         return np.hstack(
             [
@@ -133,7 +139,9 @@ def directions_in(law: "Placed", scene: Any) -> np.ndarray:
 
 def place_of(law: Any) -> Place | None:
     """Return the formulas of a law or of one that it wraps."""
-    return next((one.place for one in laws.law_parts(law) if isinstance(one, Placed)), None)
+    return next(
+        (one.place for one in laws.law_parts(law) if isinstance(one, Placed | Oriented)), None
+    )
 
 
 def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any) -> np.ndarray:
@@ -141,19 +149,28 @@ def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any
     place = place_of(solid.material.law)
     if place is None:
         return column
-    rows = place.rows(values, solid.x0).T
-    first, columns = index_of_directions(state), np.repeat(column, solid.count, axis=1)
+    at_rest = directions_at_rest(state)
+    rows = place.rows(values, solid.x0, at_rest).T
+    first, columns = index_in(state, at_rest), np.repeat(column, solid.count, axis=1)
     columns[first : first + len(rows)] = rows
     return columns
 
 
-def index_of_directions(state: tuple) -> int:
-    """Return the place of a point's first direction in its flat state, or -1."""
+def directions_at_rest(state: tuple) -> Any:
+    """Return the numbers of a state that depend on the place: directions, or F of `Oriented`."""
+    if isinstance(state, State):
+        return state.here or state.elastic.F
+    inside = (directions_at_rest(item) for item in state if isinstance(item, tuple))
+    return next((one for one in inside if one is not None), None)
+
+
+def index_in(state: tuple, numbers: Any) -> int:
+    """Return the place of the first of `numbers` in a flat state, or -1."""
     before = 0
     for item in state:
-        if isinstance(state, State) and item is state.here:
+        if item is numbers:
             return before
-        inside = index_of_directions(item) if isinstance(item, tuple) else -1
+        inside = index_in(item, numbers) if isinstance(item, tuple) else -1
         if inside >= 0:
             return before + inside
         before += count_in(item) if isinstance(item, tuple) else 1
@@ -168,6 +185,15 @@ class Placed(NamedTuple):
 
     elastic: Any
     place: Place
+
+
+class Oriented(NamedTuple):
+    """A law of F alone whose F starts as the rotation to the point's axes."""
+
+    in_lanes = True
+
+    elastic: Any
+    place: Any
 
 
 class State(NamedTuple):

@@ -9,6 +9,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, total
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.elastic import State as Deformed
+from karamelo_py.points.laws.oriented import with_axes_of, without_axes
 from karamelo_py.points.laws.orthotropic import Directional, axes, stress_of
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
@@ -22,7 +23,7 @@ class DirectionalBase:
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         material = look_up(hub.materials, argument)
-        if not isinstance(material.whole, Directional):
+        if not isinstance(without_axes(material.whole), Directional):
             raise ScriptError(
                 f"material '{material.id}' has no directions",
                 mark=argument.mark,
@@ -46,7 +47,8 @@ class TsaiHill(NamedTuple):
         Shear strength of planes with axis 1.
     angle, tilt, spin
         Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own.
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own;
+        its `axes` hold for both.
     Xc, Yc
         Strengths in compression; default: as in tension.
     residual
@@ -97,7 +99,9 @@ class TsaiHill(NamedTuple):
                 )
         refuse_whole(residual)
         turn = map(float, axes(angle, tilt, spin).ravel())
-        return Failing(elastic.whole, X, Xc or X, Y, Yc or Y, S, residual, Turn(*turn))
+        law = without_axes(elastic.whole)
+        made = Failing(law, X, Xc or X, Y, Yc or Y, S, residual, Turn(*turn))
+        return with_axes_of(elastic.whole, made)
 
 
 def refuse_whole(residual: float) -> None:

@@ -1,0 +1,151 @@
+"""Axes of a law by formulas of place: the deformation gradient of a point starts as a rotation.
+
+A law with directions that knows the deformation by F alone has other axes if F starts from the
+rotation R to them: then F R takes the place of F, and the axes turn with the body.
+"""
+
+from math import sqrt
+from typing import Any, ClassVar
+
+import numpy as np
+
+from karamelo_py.language.arguments import Argument
+from karamelo_py.language.scene import Scene
+from karamelo_py.points import laws
+from karamelo_py.points.kinematics import total
+from karamelo_py.points.laws.placed import Oriented, State, formulas_of_place
+from karamelo_py.points.laws.thin import has_short_trials
+from karamelo_py.script.errors import Mark, ScriptError
+from karamelo_py.script.expressions import Expression
+from karamelo_py.script.values import Values
+
+LEANS = 1e-9
+LEAST = 1e-6  # sine of the angle between two vectors that are not parallel
+
+
+class Axes:
+    """Script argument: an angle about z in degrees, or two vectors, numbers or formulas."""
+
+    script_kind: ClassVar[str] = "(angle), or two vectors (x1, y1, z1, x2, y2, z2)"
+
+    def __init__(self, formulas: tuple[Expression, ...], mark: Mark | None):
+        self.formulas = formulas
+        self.mark = mark
+
+    def __float__(self) -> float:
+        return 0.0
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> "Axes":
+        formulas = formulas_of_place(hub, argument)
+        if len(formulas) not in (1, 6):
+            raise ScriptError(
+                f"'{argument.text}' gives no axes", mark=argument.mark, expected=cls.script_kind
+            )
+        made = cls(formulas, argument.mark)
+        if not any(one.names for one in formulas):
+            made.rotations(hub.values, np.zeros((1, 3)))
+        return made
+
+    def rotations(self, values: Values, x0: np.ndarray) -> np.ndarray:
+        """Return rotations (n, 3, 3) with the axes as columns at positions `x0` (n, d)."""
+        numbers = [one.evaluate_points(values, x0) for one in self.formulas]
+        if len(numbers) == 1:
+            (angle,) = np.radians(numbers)
+            c, s, zero = np.cos(angle), np.sin(angle), np.zeros(len(x0))
+            rows = (c, -s, zero), (s, c, zero), (zero, zero, zero + 1)
+            return np.stack([np.stack(row, axis=1) for row in rows], axis=1)
+        a, b = np.stack(numbers[:3], axis=1), np.stack(numbers[3:], axis=1)
+        with np.errstate(all="ignore"):
+            first = a / np.linalg.norm(a, axis=1, keepdims=True)
+            size = np.linalg.norm(b, axis=1, keepdims=True)
+            rest = b / size - np.sum(first * b / size, axis=1, keepdims=True) * first
+            sine = np.linalg.norm(rest, axis=1, keepdims=True)
+            second = rest / sine
+        if (wrong := ~(np.isfinite(second).all(axis=1) & (sine[:, 0] > LEAST))).any():
+            k = int(np.flatnonzero(wrong)[0])
+            raise self.fault("two vectors that are parallel or zero", x0[k])
+        return np.stack([first, second, np.cross(first, second)], axis=2)
+
+    def rows(self, values: Values, x0: np.ndarray, F: Any) -> np.ndarray:
+        """Return the components (n, k) of the first deformation gradient, a tensor such as F."""
+        R = self.rotations(values, x0)
+        outside = [
+            R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places
+        ]
+        if np.abs(outside).max(initial=0) > LEANS:
+            raise self.fault("axes that lean out of the plane or line of the scene", x0[0])
+        return np.stack([R[:, i, j] for i, j in F.places], axis=1)
+
+    def fault(self, what: str, x0: np.ndarray) -> ScriptError:
+        place = ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0, strict=False))
+        return ScriptError(
+            f"the axes are {what}, at the point {place}",
+            mark=self.mark,
+            expected=f"{self.script_kind}; in 2D without z",
+        )
+
+
+def oriented(law: Any, axes: Axes | None) -> Any:
+    return law if axes is None else Oriented(law, axes)
+
+
+def without_axes(law: Any) -> Any:
+    return law.elastic if isinstance(law, Oriented) else law
+
+
+def with_axes_of(other: Any, law: Any) -> Any:
+    return Oriented(law, other.place) if isinstance(other, Oriented) else law
+
+
+@laws.initial_state.on(Oriented)
+def _initial_state_oriented(law, kin, template):
+    return State(laws.initial_state(law.elastic, kin, template), ())
+
+
+# Without laws.deformation: F of the law within is another one.
+laws.wraps(
+    Oriented, "elastic", "elastic", (
+        laws.advance, laws.jacobian, laws.by_rates, laws.specific_volume, laws.kirchhoff_stress,
+        laws.cauchy_stress, laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part,
+        laws.energy_density, laws.elastic_strain, laws.dissipated_energy, laws.damage,
+        laws.damage_initiation, laws.plastic_strain, laws.with_stress,
+    ),
+)  # fmt: skip
+
+
+@has_short_trials.on(Oriented)
+def _has_short_trials_oriented(law):
+    return True
+
+
+@laws.is_round.on(Oriented)
+def _is_round_oriented(law):
+    return False
+
+
+def axis(state, i):
+    """Return a component of the present direction of axis 1, a line of the body."""
+    a = state.elastic.F.at()
+    line = [a[k, 0] for k in range(3) if (k, 0) in a]
+    size = sqrt(total([x * x for x in line]))
+    return (line[i] if i < len(line) else size - size) / size
+
+
+@laws.number
+def axis_x(law, kin, state):
+    return axis(state, 0)
+
+
+@laws.number
+def axis_y(law, kin, state):
+    return axis(state, 1)
+
+
+@laws.number
+def axis_z(law, kin, state):
+    return axis(state, 2)
+
+
+for _source in (axis_x, axis_y, axis_z):
+    laws.column(Oriented, _source.__name__, _source)
