@@ -274,3 +274,40 @@ def test_a_restarted_run_has_the_same_bits(run_interpreted):
     more = "fix(t, contact/bodies, a, b, mu=0.3)\nfix(j, joint, hinge, b, at=(5, 7.5))\n"
     boxes = [body("a", "block, 5, 6, 5, 6", "velocity=(0, 9)"), body("b", "block, 5, 6, 7, 8")]
     goes_on(run_interpreted, with_files(scene(boxes, more, "a_y, b_rz, t_y", dt=0.02, steps=10)))
+
+
+ON_SOFT = """
+method({method}, FLIP, linear, 1)
+dimension(2, 0, 10, 0, 12, 1)
+region(a, block, 3, 6, 2, 4)
+region(b, block, 4, 6, 4.2, 6.2)
+region(c, block, 4, 6, 6.21, 8.21)
+material(steel, rigid, {ratio})
+material(soft, linear, 1, 100, 0.3)
+solid(a, region, a, 1, soft, 1)
+solid(b, region, b, 1, steel, 1)
+solid(c, region, c, 1, steel, 1)
+fix(mb, rigid_body, b, velocity=(0.2, -1.5))
+fix(mc, rigid_body, c, velocity=(0, -2), spin=0.1)
+{touch}
+fix(t, contact/bodies, b, c, mu=0.3, restitution=0.5)
+group(a, particles, region, a, solid, a)
+compute(p, linear_momentum, a)
+compute(F, force_on, b)
+set_output(1)
+log_modify(custom, step, p_x, p_y, mb_vx, mb_vy, mc_vx, mc_vy, t_y, mb_fy, F_y)
+run(12)
+"""
+
+
+@pytest.mark.parametrize("ratio", [1000, 0.01])
+@pytest.mark.parametrize("method", ["ulmpm/contacts", "ulmpm"])
+def test_two_bodies_and_what_deforms(run_interpreted, method, ratio):
+    """One rigid block falls on another one on a soft block: momentum is conserved."""
+    touch = "contact/friction, a, b, 0.4" if "contacts" in method else "contact/rigid_body, all, b"
+    text = ON_SOFT.format(method=method, ratio=ratio, touch=f"fix(f, {touch})")
+    log = run_interpreted(text).log
+    for own, one, other in ((log.p_x, log.mb_vx, log.mc_vx), (log.p_y, log.mb_vy, log.mc_vy)):
+        total = own + 4 * ratio * (one + other)
+        assert total == pytest.approx(np.full(13, total[0]), rel=1e-7, abs=1e-8 * ratio)
+    assert np.abs(log.t_y).max() > 0 and log.F_y == pytest.approx(log.mb_fy, rel=1e-8)
