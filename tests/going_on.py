@@ -293,6 +293,14 @@ FREE = (
     "fix(touch, contact/rigid_body, all, b, 0.4)", "set_output(1)", "set_dt(0.003)",
     "log_modify(custom, step, b_x, b_vy, b_rz, b_wz, touch_x, touch_y)", "run(4)",
 )  # fmt: skip
+LINKED = (
+    "region(above, block, 0.4, 0.6, 0.45, 0.65)", "material(steel, rigid, 6)",
+    f"solid(b, region, above, 1, steel, {H})", "region(wall, block, 0.61, 0.8, 0.3, 0.8)",
+    "fix(b, rigid_body, b, velocity=(3, 0), spin=0.1)",
+    "fix(meet, contact/bodies, b, wall, mu=0.2)",
+    "fix(pull, joint, spring, b, at=(0.5, 0.5), end=(0.3, 0.8), stiffness=20)", "set_output(1)",
+    "set_dt(0.003)", "log_modify(custom, step, b_x, b_vx, b_rz, meet_x, pull_x)", "run(4)",
+)  # fmt: skip
 SERIAL = {  # scenes that one process takes
     "load steps": block(2, "scheme(quasi-static)", *IMPLICIT, size=SIZE),
     "large steps": block(2, "scheme(newmark)", *IMPLICIT, size=SIZE),
@@ -306,6 +314,7 @@ SERIAL = {  # scenes that one process takes
         "\nsolid(", WET, 1
     ),
     "rigid body that moves freely": block(2, *FREE, size=SIZE),
+    "rigid bodies that meet": block(2, *LINKED, size=SIZE),
     "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS, size=SIZE),
 }
 SCENES = {
@@ -359,6 +368,13 @@ SCENES = {
         "dump(d, all, particle, 2, d.*.txt, x, s11, s22, s33, volume)", "set_output(1)",
         "log_modify(custom, step, dt, time, p_x)", "run(4)",
     ).replace("region(box", "spherical(true)\nregion(box"),
+    "twist": block(
+        2, "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
+        "fix(v, initial_velocity_particles, all, 0.2*sin(9*x0), y0, x0)",
+        "fix(grip, angular_velocity_nodes, low, 3*time)",
+        "dump(d, all, particle, 2, d.*.txt, x, vtheta, twist, s12, s13, s23)", "set_output(1)",
+        "log_modify(custom, step, dt, time, grip_s)", "run(4)", size=SIZE,
+    ).replace("region(box", "axisymmetric(true, twist=true)\nregion(box"),
     "faces with heat": slab(FACE, ", lamp_s, air_s", "run(4)"),
     "fluids": FLUIDS,
     "ground": block(2, *EDGES, size=SIZE),
@@ -397,6 +413,7 @@ dump(d2, all, particle/gz, 2, all.gz, x, y, s11)
 dump(d3, all, particle/bin, 3, all.bin, x, y)
 dump(d4, all, hdf5, time(0.01), points.h5, x, y, s11)
 dump(d5, all, grid/hdf5, 3, nodes.h5, vx, mass, occupied=true)
+dump(raster, all, heights, 2, all.*.asc, 0.2)
 dump(d6, all, vtk, 4, p.*.vtu, vx)
 dump(d7, all, movie, 3, m.gif, 300, 300, vx)
 dump(d8, all, grid, 3, g.*.txt, vx, fx, mass)

@@ -62,7 +62,7 @@ def test_help_of_a_command_comes_before_styles_of_that_name_and_lists_its_styles
     status, out, _ = call(capsys, "help", "material")
     assert status == 0
     assert "material(ID, style[, arguments, ...])" in out
-    assert "one of arruda-boyce, cam-clay, eos-strength, gent, hencky, hill, holzapfel," in out
+    assert "one of arruda-boyce, cam-clay, eos-strength, gent, hashin, hencky, hill," in out
     assert "karamelo-py help material NAME" in out
 
 

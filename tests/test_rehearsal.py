@@ -54,6 +54,8 @@ CALLS = {
     "delete_compute": (SCENE, "delete_compute(E)"),
     "delete_dump": (SCENE, "delete_dump(d)"),
     "delete_fix": (SCENE, "delete_fix(g)"),
+    "activate": (SCENE + "deactivate(top)", "activate(top)"),
+    "deactivate": (SCENE, "deactivate(top)"),
     "delete_particles": (
         SCENE.replace("group(top, particles, region, high, all)", ""),
         "delete_particles(all, region, hole)",

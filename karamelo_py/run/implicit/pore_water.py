@@ -36,7 +36,7 @@ EPS = 50 * float(np.finfo(float).eps)
 
 
 def is_wet(equations: Equations) -> bool:
-    return any(isinstance(block.laws, Saturated) for block in equations.blocks)
+    return any(RelativeVelocity.needed(block.laws) for block in equations.blocks)
 
 
 class Seepage:
@@ -51,7 +51,7 @@ class Seepage:
         self.wet = [
             (block, seen)
             for block, (seen, _) in zip(equations.blocks, equations.parts, strict=True)
-            if isinstance(block.laws, Saturated)
+            if RelativeVelocity.needed(block.laws)
         ]
         self._read_points()
         self._read_stencils()

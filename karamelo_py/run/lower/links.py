@@ -42,7 +42,7 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
     ways = np.array([fix.dofs for fix in moving]) > 0
     free[:count][ways] = np.arange(ways.sum())
     touches: list[kernel.Meeting] = []
-    apart = [set(joint.bodies) for joint in joined]
+    apart = [set(joint.linked) for joint in joined]
     for fix in touching:
         parts = [
             kernel.LinkedPart(of_solid.get(part.solid, count), part.region.outline(),
@@ -76,13 +76,12 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
 
 
 def _refuse(fix: ContactBodies | Joint, moving: Sequence[RigidBody]) -> None:
-    solids = [part.solid for part in fix.parts] if isinstance(fix, ContactBodies) else fix.bodies
     bodies = {body.body: body for body in moving}
-    for solid in solids:
+    for solid in fix.linked:
         if solid is not None and solid not in bodies:
             hint = f"fix(ID, rigid_body, {solid.id}, ...); motion=(0, 0) holds it"
             raise _error(fix, f"solid '{solid.id}' has no fix rigid_body", hint)
-    if not any(bodies[solid].dofs.any() for solid in solids if solid is not None):
+    if not any(bodies[solid].dofs.any() for solid in fix.linked if solid is not None):
         raise _error(fix, "none of its bodies moves freely", "a body without motion= and fixed=")
 
 
@@ -109,7 +108,7 @@ def _joints(
 ) -> np.ndarray:
     records = motion.records(kernel.JOINT, len(joined))
     for record, joint in zip(records, joined, strict=True):
-        first, second = (of_solid.get(solid, len(of_solid)) for solid in joint.bodies)
+        first, second = (of_solid.get(solid, len(of_solid)) for solid in joint.linked)
         record.first, record.second = first, second
         spring = joint.spring is not None
         record.at = constants[first].start if joint.at is None else joint.at

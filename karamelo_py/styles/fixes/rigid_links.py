@@ -114,6 +114,7 @@ class ContactBodies(Fix):
         super().__init__(hub)
         judge_friction(hub, mu)
         self.parts, self.mu, self.restitution = (first, second, *more), mu, restitution
+        self.linked = [part.solid for part in self.parts]
         for k, part in enumerate(self.parts):
             if any(part.ID == other.ID for other in self.parts[:k]):
                 message = f"'{part.ID}' is named twice"
@@ -208,8 +209,8 @@ class Joint(Fix):
     ):
         super().__init__(hub)
         d = hub.require_domain().dimension
-        self.kind, self.bodies = kind, (first, second)
-        for k, solid in enumerate(self.bodies):
+        self.kind, self.linked = kind, (first, second)
+        for k, solid in enumerate(self.linked):
             if solid is not None and not solid.rigid:
                 raise ScriptError(
                     f"solid '{solid.id}' deforms: its material '{solid.material.id}' is not rigid",
@@ -281,7 +282,7 @@ def _passed(fix: RigidBody, scene: Any) -> dict[str, str] | None:
         names = [part.ID for part in contact.parts]
         linked |= set(names) if fix.body.id in names else set()
     for joint in joints(fix.hub):
-        linked |= {s.id for s in joint.bodies if s} if fix.body in joint.bodies else set()
+        linked |= {s.id for s in joint.linked if s} if fix.body in joint.linked else set()
     others = [s.id for s in fix.hub.solids.values() if s.rigid and s.id not in linked]
     return {"others": ", ".join(others), "one": others[0]} if others else None
 
