@@ -109,5 +109,5 @@ def test_a_block_slides_down_a_profile(run_script, tmp_path):
     a = radians(20)
     exact = 9.81 * (sin(a) - 0.2 * cos(a))
     along = log["v_x"] * cos(a) - log["v_y"] * sin(a)
-    time = log["Time"] if "Time" in log else log["time"]
+    time = log["Time"]
     assert (along[-1] - along[10]) / (time[-1] - time[10]) == pytest.approx(exact, rel=0.01)
