@@ -791,16 +791,21 @@ def find(links, bodies, control, kin):
 
 
 @noinline
-def solve(links, bodies, control):
-    """Find the velocities of all bodies at the end of the step, and the impulses of their links."""
-    dt, kick, values = control.values[arrays.DT], control.step[0].kick, control.values
-    _collide(links, bodies, dt)
-    _solve(links, bodies)
+def _sum_impulses(links):
     links.given[:] = 0.0
     for i in range(links.count[0]):
         link = links.rows[i]
         _set_levers(links, link)
         _give(links, link, link.impulse, links.given, False)
+
+
+@noinline
+def solve(links, bodies, control):
+    """Find the velocities of all bodies at the end of the step, and the impulses of their links."""
+    dt, kick, values = control.values[arrays.DT], control.step[0].kick, control.values
+    _collide(links, bodies, dt)
+    _solve(links, bodies)
+    _sum_impulses(links)
     for n, body in enumerate(bodies):
         for a in range(6):
             body.solution.momentum[a] += links.given[n, a]
@@ -811,17 +816,8 @@ def solve(links, bodies, control):
             link.impulse[c] += link.hit[c]
         _set_levers(links, link)
         _publish(link, values, kick)
-    _sum_given(links, bodies)
-
-
-@noinline
-def _sum_given(links, bodies):
-    """Tell bodies the impulses of their links, for the forces that they publish."""
-    links.given[:] = 0.0
-    for i in range(links.count[0]):
-        link = links.rows[i]
-        _set_levers(links, link)
-        _give(links, link, link.impulse, links.given, False)
+    # with the hits, for the forces that bodies publish
+    _sum_impulses(links)
     for n, body in enumerate(bodies):
         for a in range(6):
             body.solution.given[a] = links.given[n, a]
