@@ -1,5 +1,10 @@
 """Stages of a job: points that are absent for a time, and displacements from a stage on."""
 
+import os
+import subprocess
+import sys
+
+import meshio
 import numpy as np
 import pytest
 from scenes import block
@@ -109,3 +114,32 @@ def test_points_in_the_way_of_fill_are_named(run_interpreted):
              "activate(fill)", "run(1)")  # fmt: skip
     result = run_interpreted(block(2, *lines))
     assert "are where points of group 'fill' come in" in result.err
+
+
+def test_stages_and_surfaces_need_no_scipy(tmp_path):
+    """`pip install .` has none: fill that comes in, and a closed surface from a file."""
+    box = meshio.Mesh(
+        np.array([[x, y, z] for x in (0.2, 0.7) for y in (0.2, 0.7) for z in (0.2, 0.7)]),
+        [("quad", np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
+                            [1, 5, 7, 3]]))],
+    )  # fmt: skip
+    meshio.write(tmp_path / "box.obj", box)
+    (tmp_path / "in.surface").write_text("""
+    dimension(3, 0, 1, 0, 1, 0, 1, 0.25)
+    method(tlmpm, FLIP, linear, 1)
+    region(box, stl, box.obj)
+    material(m, linear, 1, 1, 0)
+    solid(s, region, box, 1, m, 0.25)
+    run(1)
+    """)
+    fill = PIT.format(begin="deactivate(high)", then="activate(high)")
+    fill = fill.replace("scheme(quasi-static)", "").replace("set_dt(1)", "set_dt(1e-4)")
+    (tmp_path / "in.fill").write_text(fill)
+    for name in ("in.surface", "in.fill"):
+        hidden = "import sys; sys.modules['scipy'] = None; sys.argv = ['karamelo-py', {!r}]\n"
+        text = hidden.format(name) + "from karamelo_py.app.cli import main; sys.exit(main())"
+        done = subprocess.run(
+            [sys.executable, "-c", text], cwd=tmp_path, capture_output=True, text=True,
+            env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr

@@ -152,15 +152,14 @@ class Fields(PointTable):
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
         """Return numbers of the points nearer to one of `x` (n, d) than `half` (n, d) along all
         axes."""
-        from scipy.spatial import KDTree
-
         size, found = half.min(axis=0), []
-        tree = KDTree(x / size)
+        x = x / size
+        lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
         for some in self.some(None):
-            if some.count:
-                place = some.position / size
-                distance, _ = tree.query(place, distance_upper_bound=1.0, p=inf)
-                found.append(some.numbers[np.isfinite(distance)])
+            place = some.position / size
+            around = np.flatnonzero(((place > lo) & (place < hi)).all(axis=1))
+            hit = [k for k in around if (np.abs(x - place[k]) < 1).all(axis=1).any()]
+            found.append(some.numbers[hit])
         of_all = self.comm.allgather(np.concatenate([np.empty(0, np.int64), *found]))
         return np.sort(np.concatenate(of_all))
 

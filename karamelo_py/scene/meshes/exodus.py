@@ -1,12 +1,14 @@
 """Read Exodus II files of Cubit, MOOSE and Sierra (Schoof and Yarberry 1994)."""
 
 import re
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh
+from karamelo_py.script.errors import ScriptError
 
 ENDINGS = (".e", ".exo", ".ex2", ".g", ".gen")
 FAMILIES = {
@@ -46,6 +48,9 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
             items = [(name, of) for name, of in root.items() if MESH.match(name)]
             arrays = {name: (of[()], of.attrs.get("elem_type", "")) for name, of in items}
     else:
+        if find_spec("scipy") is None:
+            hint = "pip install '.[implicit]' in the folder of karamelo-py"
+            raise ScriptError(f"{path}: meshes in NetCDF need SciPy", hint=hint)
         from scipy.io import netcdf_file
 
         with netcdf_file(path, mmap=False) as root:

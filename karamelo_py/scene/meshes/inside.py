@@ -220,12 +220,14 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
 
 
 def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_array((np.ones(len(a), bool), (a, b)), (count, count))
-    label = connected_components(graph, directed=False)[1]
-    return np.unique(label, return_index=True, return_inverse=True)[1][label]
+    """Return the lowest node of each node's component, with links from nodes `a` to `b`."""
+    lowest = np.arange(count)
+    while (apart := lowest[a] != lowest[b]).any():
+        ends = np.sort([lowest[a[apart]], lowest[b[apart]]], axis=0)
+        np.minimum.at(lowest, ends[1], ends[0])
+        while (lowest[lowest] != lowest).any():
+            lowest = lowest[lowest]
+    return lowest
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
