@@ -19,8 +19,8 @@ class HeightsDump(Dump):
     Parameters
     ----------
     cell
-        Side of a cell of the raster; 0 or more points lie in it, so at least two distances of
-        points.
+        Side of a cell of the raster: at least two distances of points, or cells inside the deposit
+        remain empty.
     of
         ``depth``: volume of the points in a cell over its area. ``top``: height of their highest
         upper face, -9999 (NODATA) in empty cells.
@@ -32,9 +32,9 @@ class HeightsDump(Dump):
 
     Notes
     -----
-    The raster covers the domain; the sum of depths times the area of a cell is the volume of the
-    points. The name needs a ``*``. In 2D it has one row. QGIS, ArcGIS and GDAL read the files, and
-    region heights.
+    The raster covers the domain, in 2D with one row. The sum of the depths times the area of a cell
+    is the volume of the points. The file name needs a ``*``, because a raster has one snapshot.
+    QGIS, ArcGIS, GDAL and region heights read the files.
 
     See Also
     --------
