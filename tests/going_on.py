@@ -329,7 +329,7 @@ SCENES = {
     "flow with averaged volumes": of_laws("ulmpm, FLIP, linear, 1", FLOWS).replace(
         "dimension(", "scheme(usf)\nanti_volumetric_locking(true)\ndimension("
     ),
-    "elastic laws": of_laws("tlmpm, FLIP, linear, 1", ELASTIC, "true"),
+    "elastic laws": of_laws("tlmpm, PolyPIC, linear", ELASTIC, "true"),
     "rate of plastic strain": sheared(", epdot"),
     "step that varies": block(
         2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",

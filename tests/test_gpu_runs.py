@@ -76,6 +76,7 @@ def alike(one, other, error=1e-12):
     [
         ({}, 1e-12),
         ({"method": "ulmpm, MLS, quadratic-spline", "scheme": "usl"}, 1e-12),
+        ({"method": "tlmpm, PolyPIC, linear", "scheme": "usl"}, 1e-12),
         ({"method": "tlmpm, FLIP, linear, 0.99", "scheme": "usf", "precision": "single"}, 2e-4),
     ],
 )

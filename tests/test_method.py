@@ -1,10 +1,13 @@
 """The command method, and parts of a step with parameters of their own, which a plug-in brings."""
 
+import re
 import sys
 
 import pytest
+from conftest import ROOT
 from plugged import install, offer
 
+from karamelo_py.advice.choices import CHOICES
 from karamelo_py.app.cli import main
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
@@ -140,3 +143,78 @@ def test_a_name_that_is_taken_disturbs_only_scripts_that_ask_for_it(plugin):
     assert registry.name_of("basis", type(chosen.method.basis)) == "linear"
     with pytest.raises(ScriptError, match=r"offered by two packages: karamelo-py .* and mpm-taken"):
         update("method(ulmpm, PIC, cubic-spline)")
+
+
+AUTO = """
+method(auto)
+dimension({d}, {domain}, 0.1)
+region(box, block, {box})
+{material}
+solid(body, region, box, 2, m, 0.1)
+{more}
+run(10)
+"""
+RUBBER = "material(m, neo-hookean, 1000, 1e6, 0.3)"
+OTHER = "region(b2, block, 0.8, 1.2, 0.2, 0.6)\nsolid(other, region, b2, 2, m, 0.1)\n"
+FAST = "fix(v, initial_velocity_particles, g, 1e3, 0)"
+PAIR = f"{OTHER}group(g, particles, region, box, solid, body)\n{FAST}"
+
+
+def fluid(eos, strength="fluid, 0"):
+    return f"eos(e, {eos})\nstrength(s, {strength})\nmaterial(m, eos-strength, e, s)"
+
+
+@pytest.mark.parametrize(
+    ("material", "more", "lines"),
+    [
+        (RUBBER, "", "method(tlmpm, PolyPIC, linear); scheme(usl)"),
+        (RUBBER, "scheme(newmark)\nset_dt(1)", "method(tlmpm, FLIP, linear, 1)"),
+        (RUBBER, PAIR, "method(ulmpm/contacts, FLIP, linear, 1); scheme(usavg)"),
+        (RUBBER, OTHER, "method(ulmpm, AFLIP, cubic-spline, 1, mass=corrected)"),
+        (f"{RUBBER}\nboundary(periodic, x)", "", "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
+        ("material(m, linear, 1000, 1e6, 0.3, 500, 50)", "", "linear, thermo-mechanical)"),
+        (fluid("fluid, 1000, 1e5, 7"), "", "method(ulmpm, APIC, quadratic-spline)"),
+        (fluid("ideal-gas, 1, 1.4, p=1e5"), "",
+         "method(ulmpm, APIC, cubic-spline, mass=corrected)"),
+        (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 30"), "",
+         "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
+        (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "", "method(ulmpm, FLIP, linear, 0.99)"),
+    ],
+)  # fmt: skip
+def test_auto_by_the_scene(run_interpreted, material, more, lines):
+    """Materials, bodies, speeds and contact select the row of docs/choose.md."""
+    text = AUTO.format(
+        d=2, domain="0, 2, 0, 1", box="0.2, 0.6, 0.2, 0.6", material=material, more=more
+    )
+    said = run_interpreted(text, command="check").out
+    assert lines in re.search("which writes +(.*)", said)[1]
+    if "usavg" in lines:
+        assert re.search("^method .* usavg$", said, re.M)
+
+
+def test_auto_leaves_what_the_script_names(run_interpreted):
+    """A scheme of the script remains, and a mistake after method(auto) is reported at its line."""
+    text = AUTO.format(d=1, domain="0, 1", box="0, 0.5", material=RUBBER, more="scheme(musl)")
+    result = run_interpreted(text, command="check")
+    assert re.search("^method +tlmpm PolyPIC linear musl$", result.out, re.M)
+    assert "warning" not in result.out + result.err
+    for wrong, line, words in (
+        (text.replace("rubber", "m").replace("0.3)", "0.7)"), 5, "Poisson's ratio 0.7"),
+        (text.replace("auto", "auto, FLIP"), 2, "one argument too many"),
+        (f"{text.replace('auto', 'ulmpm, FLIP, linear, 1', 1)}method(auto)\nrun(1)", 9,
+         "the method cannot change once there are solids"),
+        ("method(auto)", 1, "method(auto) reads the script ahead"),
+    ):  # fmt: skip
+        with pytest.raises(ScriptError) as raised:
+            Interpreter(Hub()).run_text(wrong, "in.script")
+        assert words in raised.value.render() and raised.value.mark.line == line
+
+
+def test_auto_is_the_table_of_the_page():
+    """docs/choose.md lists the rows in order, with lines, reason and scenes of evidence."""
+    page = (ROOT / "docs" / "choose.md").read_text("utf-8").partition("## Chosen by the program")[2]
+    rows = [line.split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
+    for choice, row in zip(CHOICES, rows, strict=False):
+        lines = ", ".join(f"`{line.replace('{grid}', 'ulmpm')}`" for line in choice.lines)
+        scenes = ", ".join(f"`{name}`" for name in choice.evidence)
+        assert row == [f"| {choice.scene}", lines, choice.why, f"{scenes} |"]

@@ -1,5 +1,6 @@
 """Transfers of velocity: definitions, and what they conserve when a point meets the grid."""
 
+import re
 from itertools import product
 from types import SimpleNamespace
 
@@ -29,6 +30,7 @@ from karamelo_py.points.transfers import (
 )
 from karamelo_py.points.transfers.affine import AFLIP, APIC, ASFLIP
 from karamelo_py.points.transfers.flip import FLIP, PIC
+from karamelo_py.points.transfers.polynomial import MIXED, PolyPIC
 from karamelo_py.points.transfers.taylor import MLS, TFLIP, TPIC
 from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.scene.lattice import Lattice
@@ -185,6 +187,41 @@ def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data)
     assert np.reshape(kept, (d, d)) == pytest.approx(expected, abs=1e-11)
     momentum = met.given(transfer, 1.0, tuple(v), kept)
     assert momentum == pytest.approx(met.weights[:, None] * field, abs=1e-11)
+
+
+@every_kinematics
+@given(data=st.data())
+def test_polypic_returns_any_field_of_a_cell(kin, data):
+    """Hats have 2^d modes in a cell, and PolyPIC stores all (Fu et al. 2017, section 5.1)."""
+    d = kin.dimension
+    met = Met(Linear(), kin, position(kin, data.draw(st.tuples(inner, inner, inner))))
+    field = np.reshape(data.draw(numbers(d * 2**d)), (2**d, d))
+    kept = met.taken(PolyPIC(), field)
+    assert len(kept.mixed) == len(MIXED[d]) == 2**d - 1 - d
+    v = met.weights @ field
+    momentum = met.given(PolyPIC(), 2.5, tuple(v), kept)
+    assert momentum == pytest.approx(2.5 * met.weights[:, None] * field, abs=1e-9)
+    assert momentum.sum(axis=0) == pytest.approx(2.5 * v, abs=1e-9)
+
+
+def test_polypic_belongs_to_the_total_frame(run_interpreted):
+    """It conserves energy that APIC loses, with linear shape functions alone."""
+    lines = (
+        "fix(v, initial_velocity_particles, all, 0.02*cos(PI*(x0 - 0.3)/0.4), 0)",
+        "set_output(60)", "run(60)",
+    )  # fmt: skip
+    text = block(2, *lines, size=(0.4, 0.1), scheme="usl")
+    lost = {}
+    for method in ("tlmpm, APIC, linear", "tlmpm, PolyPIC, linear"):
+        result = run_interpreted(text.replace("ulmpm, FLIP, linear, 1", method))
+        lost[method] = -float(re.search(r"energy +(\S+) % of", result.out)[1])
+    assert lost["tlmpm, APIC, linear"] > 5 and abs(lost["tlmpm, PolyPIC, linear"]) < 2
+    for method, wrong in (
+        ("ulmpm, PolyPIC, linear", "method ulmpm"),
+        ("tlmpm, PolyPIC, quadratic-spline", "the basis quadratic-spline"),
+    ):
+        error = run_interpreted(text.replace("ulmpm, FLIP, linear, 1", method), status=1).err
+        assert f"transfer PolyPIC does not support {wrong}" in error and error.count("error") == 1
 
 
 @over("transfer", [*AFFINE, *TAYLOR], str)

@@ -6,7 +6,6 @@ variable `refine`: cells are h / refine.
 """
 
 import re
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -54,22 +53,30 @@ def case(name: str) -> Case:
     return import_module(f"comparisons.defaults.{name}").CASE
 
 
-def run(name: str, folder: Path, refine: float, dt: float | None = None) -> Result:
-    """Run the script of a case in a folder of its own, with its own step or another."""
-    place = folder / f"{name}_{refine:g}_{dt or 0:g}"
+def run(
+    name: str, folder: Path, refine: float, dt: float | None = None, *, auto: bool = False
+) -> Result:
+    """Run the script of a case in a separate folder, with another step or ``method(auto)``."""
+    place = folder / f"{name}_{refine:g}_{dt or 0:g}{'_auto' * auto}"
     place.mkdir(parents=True)
     text = (INPUTS / f"in.{name}").read_text(encoding="utf-8")
     if dt is not None:
         head, line, tail = text.rpartition("\nrun")
         text = f"{head}\nset_dt({dt!r}){line}{tail}"
     for part in INPUTS.glob("*.block"):  # that scripts include
-        shutil.copy(part, place)
+        block = place / part.name
+        block.write_text(chosen(part.read_text(encoding="utf-8"), auto), encoding="utf-8")
     script = place / f"in.{name}"
-    script.write_text(text, encoding="utf-8")
+    script.write_text(chosen(text, auto), encoding="utf-8")
     command = [sys.executable, "-m", "karamelo_py.app.cli", str(script)]
     command += ["-var", "refine", f"{refine:g}"]
     done = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
     return Result(done.returncode, done.stdout, done.stderr, place)
+
+
+def chosen(text: str, auto: bool) -> str:
+    """A script as it is, or with ``method(auto)``."""
+    return re.sub(r"^method\(.*$", "method(auto)", text, flags=re.M) if auto else text
 
 
 def step_of(result: Result) -> float:

@@ -21,10 +21,11 @@ and averaging. `python -m comparisons.defaults` writes it.
 | error | relative to the exact number; where that is 0, the number itself |
 | order in h | how fast the error falls with smaller cells; "exact" means an error below 0.1 % |
 | at half the step | the error with half the time step |
+| auto | the error with [`method(auto)`](choose.md#chosen-by-the-program) |
 | warnings | the warnings of the program; an error above 5 % needs one, or 1 % if easy |
 
-| scene | quantity | exact | default | error | order in h | at half the step | warnings |
-|---|---|---|---|---|---|---|---|
+| scene | quantity | exact | default | error | order in h | at half the step | auto | warnings |
+|---|---|---|---|---|---|---|---|---|
 """
 
 
@@ -57,6 +58,7 @@ def row(name: str, folder: Path) -> tuple[str, bool]:
         dt = defaults.step_of(results[-1]) / 2
         halved = defaults.run(name, folder, case.refine[-1], dt)
         half = f"{100 * case.error(number(case, halved)):+.2f} %"
+    auto = 100 * case.error(number(case, defaults.run(name, folder, case.refine[-1], auto=True)))
     said = defaults.said(results[-1])
     error = case.error(found[-1])
     told = any(case.advice in line for line in said) if case.advice else False
@@ -70,6 +72,7 @@ def row(name: str, folder: Path) -> tuple[str, bool]:
         f"{100 * error:+.2f} %",
         order(case, found),
         half,
+        f"{auto:+.2f} %",
         words,
     )
     return f"| {' | '.join(cells)} |", good

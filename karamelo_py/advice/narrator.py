@@ -84,6 +84,7 @@ class Narrator(Listener):
         }
         shown = {
             "method": facts["method"],
+            **(hub.update.chosen.words if hub.update.chosen else {}),
             "points": facts["points"],
             "volumes": words_of_volumes(hub),
             "nodes": facts["nodes"],

@@ -47,6 +47,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
     word = thin[s.kin.dimension] if hub.domain.thin else s.kin.word
     say(f"dimension      {s.kin.dimension} ({word})")
     say(f"method         {hub.update.words}")
+    for name, words in (hub.update.chosen.words if hub.update.chosen else {}).items():
+        say(f"{name:<15}{words}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
     if volumes := words_of_volumes(hub):

@@ -5,6 +5,7 @@ from contextlib import suppress
 from itertools import groupby
 from typing import Annotated, Any, Literal
 
+from karamelo_py.advice import choosing
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.rules import Feature, compare
@@ -71,11 +72,7 @@ def method(
     """
     call = _Call(hub, {"method": kind, "transfer": transfer, "basis": basis}, options)
     parts = call.parts()
-    if hub.solids:
-        message = "the method cannot change once there are solids"
-        expected = "method(...) before the first solid"
-        hint = f"move it above line {next(iter(hub.solids.values())).mark.line}"
-        raise ScriptError(message, expected=expected, hint=hint, code="too-late")
+    _refuse_after_solids(hub)
     before = hub.update.method
     if before is not None:
         hub.warn(
@@ -95,6 +92,36 @@ def method(
         )
     chosen.mark, chosen.corrected = hub.mark, mass == "corrected"
     hub.update.thermal = chosen.thermal
+
+
+def _refuse_after_solids(hub: Hub) -> None:
+    if hub.solids:
+        message = "the method cannot change once there are solids"
+        expected = "method(...) before the first solid"
+        hint = f"move it above line {next(iter(hub.solids.values())).mark.line}"
+        raise ScriptError(message, expected=expected, hint=hint, code="too-late")
+
+
+def auto(hub: Hub, kind: Literal["auto"]) -> None:
+    """Choose the method for the scene that the rest of the script describes.
+
+    The script is read up to its first run; materials, bodies, speeds, contact and duration select
+    a row of the table in docs/choose.md. Banner and ``check`` show the lines. A
+    ``scheme``, ``anti_volumetric_locking`` or ``dt_factor`` of the script remains.
+    """
+    _refuse_after_solids(hub)
+    interpreter = hub.interpreter
+    if not interpreter.has_more:
+        message = "method(auto) reads the script ahead, and there is nothing after it"
+        hint = "in Python: Simulation.script(...) with the whole scene, or a method by name"
+        raise ScriptError(message, expected="the whole scene and a run after it", hint=hint)
+    chosen = choosing.choose(hub)
+    update, own_scheme = hub.update, hub.update.scheme_mark
+    interpreter.perform(chosen.lines)
+    update.chosen, update.scheme_mark = chosen, own_scheme
+
+
+signature.also_called(method, "auto", auto)
 
 
 def scheme(

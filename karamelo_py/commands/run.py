@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from karamelo_py.advice import known_failures
+from karamelo_py.advice.choosing import AtFirstRun
 from karamelo_py.advice.narrator import Narrator
 from karamelo_py.advice.report import report
 from karamelo_py.language import registry
@@ -34,6 +35,8 @@ def carry_out(hub: Hub, **length: Any) -> None:
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
+    if hub.scouting:
+        raise AtFirstRun(run)
     if hub.rehearsing:
         hub.begun += 1
         if hub.settings.card:

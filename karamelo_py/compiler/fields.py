@@ -221,9 +221,9 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """Return the array of the field of this class, or None."""
+    """Return the array of the field of this class, or of one derived from it, or None."""
     for one in fields:
-        if type(one) is kind:
+        if kind is not None and isinstance(one, kind):
             return one.array
     return None
 

@@ -677,6 +677,8 @@ def _act_on_motion(members, task, call, count):
                 # otherwise nodes, and strains around, follow what the point had from the grid
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
+                for k in range(d * d + c if leads else moment.shape[0], moment.shape[0], d):
+                    moment[k, p] = 0  # mixed derivatives
             if slot >= 0:
                 totals.add_to(control.totals, slot + c, total)
                 _add_torque(call, q, c, slot, total)

@@ -2,7 +2,7 @@
 
 import inspect
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -99,11 +99,18 @@ class Interpreter:
         elsewhere = self.hub.folder / name
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
-    def rehearse(self, hub: Any) -> None:
-        """Execute the rest on another hub, with copied variables, to find mistakes before a long
-        run."""
+    def perform(self, lines: Sequence[str]) -> None:
+        """Execute commands instead of the present line."""
+        for statement in parse("\n".join(lines)):
+            assert isinstance(statement, syntax.CommandCall)
+            self._call(statement)
+
+    def rehearse(self, hub: Any, first: Sequence[str] = ()) -> None:
+        """Execute `first` and the rest on another hub, with copied variables, to find mistakes
+        before a long run."""
         other = self._copy(hub)
         try:
+            other.perform(first)
             other._finish()
         except Quit:
             return

@@ -95,6 +95,8 @@ def call(
     `name` is ``run``, or ``fix body_force``. ScriptError, with a mark, for anything wrong in the
     arguments or the target.
     """
+    if arguments and (forms := forms_by_word(target)):
+        target = forms.get(arguments[0].word(), target)
     try:
         expected = parameters(target)
     except TypeError as error:
@@ -303,6 +305,19 @@ def syntax(target: Callable, name: str) -> str:
 
 def variants_of(style: Any) -> Mapping[str, Any]:
     return getattr(style, "variants", {})
+
+
+def forms_by_word(command: Any) -> Mapping[str | None, Callable]:
+    """Map first arguments to other forms of a command."""
+    return _forms_by_word.get(command, {})
+
+
+_forms_by_word: dict[Callable, Mapping[str | None, Callable]] = {}
+
+
+def also_called(command: Callable, word: str, form: Callable) -> None:
+    """Let `word` as the first argument select another form of a command."""
+    _forms_by_word[command] = {**forms_by_word(command), word: form}
 
 
 def default_variant(style: Any) -> str | None:

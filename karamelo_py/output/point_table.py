@@ -172,15 +172,15 @@ class PointTable:
         In present coordinates: in the total frame, the arms X - x are F times the reference arms.
         """
         rows = self._rows
-        if (kept := rows.declared(Moment)) is None:
-            return None
         have = [
             piece
             for piece in rows.parts
             if fields.field(piece.block.points.fields, Moment) is not None
         ]
+        if not have:
+            return None
         local = [(piece.places, _velocity_moment(rows.s, piece)) for piece in have]
-        return rows._filled(np.zeros(kept.T.shape, kept.dtype), local)
+        return rows._filled(np.zeros((Moment.shape(rows.s.kin), len(rows.ids))), local)
 
     def declared(self, kind: type) -> np.ndarray | None:
         return self._rows.declared(kind)
@@ -275,7 +275,7 @@ def shown_velocity(s: Setup, points: Points) -> np.ndarray:
 def _velocity_moment(s: Setup, piece: Part) -> np.ndarray:
     points = piece.points
     kept = fields.field(points.fields, Moment)
-    moment = kept.copy()
+    moment = kept[: Moment.shape(s.kin)].copy()
     if s.transfer.traits.keeps_gradient:
         where = points.x[s.control.motion[0].now] if points.home is None else points.home
         at = OnGrids(s.basis, s.kin, s.grids, points.grid, where)

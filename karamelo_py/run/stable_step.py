@@ -162,6 +162,8 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
     courant = _courant_of_scheme(hub, longer=longer)
     if stores_moment(update.transfer) and total:
         courant = min(courant, hub.simulation.light_nodes)
+        if update.scheme.traits.maps_velocity_again:
+            courant *= update.transfer.traits.share_in_total
     return courant * corrected_share(hub)
 
 

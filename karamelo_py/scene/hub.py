@@ -116,6 +116,7 @@ class Update:
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
+        self.chosen: Any = None  # `advice.choosing.Chosen` by method(auto)
         self.transfer: Any = None
         self.scheme: Any = MUSL()
         self.scheme_mark: Mark | None = None
@@ -187,6 +188,7 @@ class Hub:
         # Nothing runs and nothing is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
+        self.scouting = False  # the first run ends the rehearsal
         self.begun = 0  # with a rehearsal's
         self.answered = False  # the script printed, wrote or ended something
         self.checking = False  # ``karamelo-py check``: the first run only reports

@@ -10,8 +10,8 @@ The defaults are PIC.
 from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
-from karamelo_py.compiler.fields import Field, declared, planar
-from karamelo_py.language.rules import known_failure
+from karamelo_py.compiler.fields import Field, planar
+from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.points import noise
 
 
@@ -21,6 +21,9 @@ class TransferTraits(NamedTuple):
     per_time: bool = False  # alpha refers to a stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
     series: bool = False  # the new velocity is a series, summed in further visits of the points
+    # Fraction of the stable step that remains with musl in the total frame.
+    share_in_total: float = 1.0
+    restrictions: Restrictions | None = None  # what it does not support
 
 
 class Moment(Field):
@@ -35,7 +38,7 @@ def flip_coefficient(transfer) -> float:
 
 
 def stores_moment(transfer) -> bool:
-    return Moment in declared([transfer], "point_fields")
+    return zero_moment.defined(type(transfer))
 
 
 @point_function()

@@ -100,6 +100,7 @@ def _write(hub: Hub, path: Path, within: bool, point: RollbackPoint | None, grou
         "presets": interpreter.presets,
         "variables": {name: str(value) for name, value in interpreter.variables.items()},
         "runs": hub.runs,
+        "chosen": hub.update.chosen and hub.update.chosen.lines,
         "scene": described(hub),
         "values": {name: hub.values.get(name) for name in hub.values.names()},
         "begun": [ID for ID, fix in hub.fixes.items() if fix in hub.simulation.begun],

@@ -173,8 +173,12 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
         yield fix.restrictions, f"fix {fix.style}", fix.mark
     for compute in hub.computes.values():
         yield compute.restrictions, f"compute {compute.style}", compute.mark
-    name = registry.name_of("scheme", type(update.scheme))
-    yield update.scheme.traits.restrictions, f"scheme {name}", update.scheme_mark
+    for family, item, mark in (
+        ("scheme", update.scheme, update.scheme_mark),
+        ("transfer", update.transfer, update.method.mark),
+    ):
+        name = registry.name_of(family, type(item))
+        yield item.traits.restrictions, f"{family} {name}", mark
 
 
 def _check_restrictions(hub: Hub) -> None:

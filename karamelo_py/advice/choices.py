@@ -1,0 +1,141 @@
+"""The rules of ``method(auto)``: what a scene is, and the lines that suit it. The first row counts.
+
+`when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`). Braces in `lines`
+take attributes of the facts. `evidence` names the scenes that the row follows from.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+
+class Choice(NamedTuple):
+    when: Callable[[Any], Any]
+    lines: tuple[str, ...]
+    scene: str
+    why: str
+    evidence: tuple[str, ...]
+
+
+CHOICES = (
+    Choice(
+        lambda s: s.implicit and s.elastic_only and s.alone,
+        ("method(tlmpm, FLIP, linear, 1)",),
+        "load steps of an elastic body",
+        "points stay in their cells, so a linear basis is second order",
+        ("in.elastica", "in.rotor"),
+    ),
+    Choice(
+        lambda s: s.implicit and s.soil and s.dilates,
+        ("method(ulmpm, FLIP, linear, 1)", "anti_volumetric_locking(true)"),
+        "load steps of soil without friction, or that dilates",
+        "limit loads are right within 4 %, of a vertical cut within 9 %",
+        ("in.static_footing", "in.cut"),
+    ),
+    Choice(
+        lambda s: s.implicit,
+        ("method(ulmpm, FLIP, quadratic-spline, 1)",),
+        "load steps of a material that flows, or of several bodies",
+        "limit loads are closer than with a linear basis",
+        ("in.thick_cylinder",),
+    ),
+    Choice(
+        lambda s: s.gas and s.speed > 1,
+        ("method(ulmpm, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
+        "a gas that moves faster than its waves",
+        "densities behind the shock are the closest",
+        ("in.noh",),
+    ),
+    Choice(
+        lambda s: s.gas,
+        ("method(ulmpm, APIC, cubic-spline, mass=corrected)",),
+        "a gas",
+        "shocks, sound and free expansion are right within 6 %",
+        ("in.strong_shock", "in.sod"),
+    ),
+    Choice(
+        lambda s: s.gas,
+        ("method({grid}, APIC, cubic-spline)",),
+        "a gas that meets bodies, or whose walls yield",
+        "shocks are right within 4 %",
+        ("in.strong_shock", "in.sod"),
+    ),
+    Choice(
+        lambda s: s.grains,
+        ("method(ulmpm, TPIC, quadratic-spline)",),
+        "dense granular flow",
+        "pressures scatter least",
+        ("in.plane_flow",),
+    ),
+    Choice(
+        lambda s: s.liquid,
+        ("method({grid}, APIC, quadratic-spline)",),
+        "a liquid",
+        "waves and vortices lose little, and angular momentum is conserved",
+        ("in.slosh", "in.taylor_green"),
+    ),
+    Choice(
+        lambda s: s.soil and s.pressed and s.alone and s.dilates,
+        ("method(tlmpm, FLIP, linear, 0.99)", "anti_volumetric_locking(true)"),
+        "soil that fixes press towards its limit load",
+        "F-bar frees the plastic flow, and points stay in their cells",
+        ("in.footing_friction", "in.footing"),
+    ),
+    Choice(
+        lambda s: s.soil,
+        ("method({grid}, FLIP, quadratic-spline, 0.99)",),
+        "soil that may flow",
+        "gradients are continuous where points cross cells",
+        ("in.collapse", "in.slump"),
+    ),
+    Choice(
+        lambda s: s.shocked and not s.elastic_only,
+        ("method({grid}, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
+        "a shock",
+        "a linear basis loses pressure in every cell that stressed material crosses",
+        ("in.plates",),
+    ),
+    Choice(
+        lambda s: not s.elastic_only,
+        ("method({grid}, FLIP, linear, 0.99)",),
+        "a metal that flows",
+        "the cheapest basis that does not lock",
+        ("in.taylor_bar", "in.billet"),
+    ),
+    Choice(
+        lambda s: s.alone,
+        ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
+        "one elastic body",
+        "points stay in their cells, so a linear basis is second order, conserves energy and "
+        "rotation, and takes half of the visits",
+        ("in.energy_disk", "in.turns", "in.cantilever"),
+    ),
+    Choice(
+        lambda s: s.rubs,
+        ("method(ulmpm/contacts, FLIP, linear, 0.99)",),
+        "elastic bodies that slide on each other",
+        "friction is right within 1 %, also on leaning faces",
+        ("in.slope_20", "in.slope_33", "in.slide"),
+    ),
+    Choice(
+        lambda s: s.grid == "ulmpm/contacts",
+        ("method(ulmpm/contacts, FLIP, linear, 1)", "scheme(usavg)"),
+        "elastic bodies that meet",
+        "rebounds lose least, for the cheapest basis",
+        ("in.rods", "in.punch"),
+    ),
+    Choice(
+        lambda s: True,
+        ("method(ulmpm, AFLIP, cubic-spline, 1, mass=corrected)",),
+        "elastic bodies on one grid",
+        "corrected accelerations, and hardly any noise where points cross cells",
+        ("in.vibrating_bar",),
+    ),
+)  # fmt: skip
+PLAIN = Choice(
+    lambda s: True,
+    ("method(ulmpm, FLIP, quadratic-spline, 0.99)",),
+    "a scene that no row of the table suits",
+    "",
+    (),
+)
+RESUMED = PLAIN._replace(scene="the run that wrote the restart file")

@@ -1,0 +1,215 @@
+"""``method(auto)``: the rest of the script is executed once on a copy, up to the first run.
+
+The facts of that scene choose a row of :data:`karamelo_py.advice.choices.CHOICES`; a row that the
+program refuses for this scene is skipped.
+"""
+
+import copy
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import cached_property
+from math import inf
+from typing import NamedTuple
+
+from karamelo_py.advice.basics import is_zero
+from karamelo_py.advice.bodies import fixes_at
+from karamelo_py.advice.choices import CHOICES, PLAIN, RESUMED, Choice
+from karamelo_py.advice.crossing import boxes_of, meetings
+from karamelo_py.advice.facts import SceneFacts
+from karamelo_py.points.laws import can, conductivity, law_kind, law_traits, parameter
+from karamelo_py.points.laws.eos import taken_heat
+from karamelo_py.points.laws.eos.by_formula import MieGrueneisen
+from karamelo_py.points.laws.eos.p_alpha import PAlpha
+from karamelo_py.points.laws.eos.shock import Shock
+from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.laws.strengths.mu_i import MuI
+from karamelo_py.run.loop import RunLoop
+from karamelo_py.scene.comm import SerialComm
+from karamelo_py.scene.hub import Hub
+from karamelo_py.script.errors import ScriptError
+
+# To look at a scene with: the first that the program does not refuse.
+NEUTRAL = (
+    "method(ulmpm, FLIP, linear, 1)",
+    "method(ulmpm/contacts, FLIP, linear, 1)",
+    "method(tlmpm, FLIP, linear, 1)",
+    "method(ulmpm, FLIP, linear, 1, thermo-mechanical)",
+    "method(ulmpm/contacts, FLIP, linear, 1, thermo-mechanical)",
+)
+
+
+CROSSED = 0.1  # cells that stressed material moves through
+FAST = 0.005  # of the speed of waves: shocks, not rebounds
+
+
+class AtFirstRun(Exception):
+    """A copy of the scene has reached its first run."""
+
+    def __init__(self, run: RunLoop):
+        self.run = run
+
+
+class Chosen(NamedTuple):
+    choice: Choice
+    lines: Sequence[str]
+
+    @property
+    def words(self) -> dict[str, str]:
+        """Describe the choice for the banner."""
+        reason = ": ".join(filter(None, (self.choice.scene, self.choice.why)))
+        return {"chosen for": reason, "which writes": "; ".join(self.lines)}
+
+
+class Scouted(SceneFacts):
+    """Facts of the scene that decide its method."""
+
+    @cached_property
+    def soft(self) -> list:
+        return [solid for solid in self.hub.solids.values() if not solid.rigid]
+
+    @cached_property
+    def laws(self) -> list:
+        return [solid.material.whole for solid in self.soft]
+
+    @cached_property
+    def strengths(self) -> list:
+        return [part for law in self.laws if (part := parameter(law, "strength", None))]
+
+    implicit = property(lambda s: s.scheme.traits.implicit)
+    hot = property(
+        lambda s: any(can(law, conductivity) and conductivity(law, 1.0) > 0 for law in s.laws)
+    )
+    elastic_only = property(lambda s: all(law_traits(law).rebounds for law in s.laws))
+    gas = property(lambda s: any(can(law, taken_heat) for law in s.laws))
+    grains = property(lambda s: any(MuI in law_kind(law) for law in s.laws))
+
+    @property
+    def liquid(self) -> bool:
+        return any(not (holds_shape(law) or has_solid_eos(law)) for law in self.laws)
+
+    @property
+    def soil(self) -> bool:
+        return any(holds_shape(law) and any(map(flows, law_kind(law))) for law in self.laws)
+
+    @property
+    def dilates(self) -> bool:
+        """Return True if the soil has no friction, or dilates when it flows."""
+        return all(
+            parameter(part, "dilation", 0.0) > 0 or not parameter(part, "friction", 0.0) > 0
+            for part in self.strengths
+        )
+
+    @property
+    def pressed(self) -> bool:
+        """Return True if fixes drive a boundary that touches a body from the start."""
+        return any(
+            len(x) and not all(map(is_zero, fix.formulas))
+            for body in self.bodies
+            for fix, x in fixes_at(self, body)
+        )
+
+    @property
+    def shocked(self) -> bool:
+        """Return True if bodies collide fast enough for a linear basis to lose their pressure."""
+        return self.crossing.cells > CROSSED and self.impact > FAST
+
+    @property
+    def wall_ahead(self) -> bool:
+        """Return True if fixes hold nodes where no body is yet."""
+        near = {fix for body in self.bodies for fix, x in fixes_at(self, body) if len(x)}
+        fixes = self.hub.fixes.values()
+        return any(f.prescribes_velocity and len(f.nodes) and f not in near for f in fixes)
+
+    @cached_property
+    def apart(self) -> bool:
+        """Return True if a body begins apart from another that it will meet."""
+        boxes = boxes_of([body.motion for body in self.bodies])
+        soft = [body for body in self.bodies if not body.solid.rigid]
+        times = (meetings(body.motion, boxes, body.solid.h) for body in soft)
+        return any((time < self.duration).any() for time in times)
+
+    rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
+
+    @property
+    def grid(self) -> str:
+        """The method of bodies that slide on each other, or that stick where they meet."""
+        contacts = self.method.fields_per_solid or self.apart or self.rubs
+        return "ulmpm/contacts" if contacts else "ulmpm"
+
+    @cached_property
+    def alone(self) -> bool:
+        """Return True if no body meets another, or a wall, but by fixes of points."""
+        touching = {solid.id for fix in self.hub.fixes.values() for solid in fix.solids}
+        touching |= {
+            solid.id
+            for fix in self.hub.fixes.values()
+            for solid in self.hub.solids.values()
+            if fix.presses or (fix.touches and (fix.touches is solid or fix.group.touches(solid)))
+        }
+        several = len(self.hub.solids) > 1 and any(ID not in touching for ID in self.hub.solids)
+        return not (several or self.wall_ahead or self.hub.domain.periodic)
+
+
+def flows(kind: type) -> bool:
+    return law_traits(kind).flows
+
+
+def holds_shape(law: tuple) -> bool:
+    strength = parameter(law, "strength", None)
+    return strength is None or shear_modulus(strength) > 0
+
+
+def has_solid_eos(law: tuple) -> bool:
+    return isinstance(parameter(law, "eos", None), (Shock, PAlpha, MieGrueneisen))
+
+
+def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
+    """Execute `lines` and the rest of the script on a copy; None if it runs nothing."""
+    other, settings = hub.rehearsal(), copy.copy(hub.settings)
+    other.scouting, other.settings = True, settings
+    settings.comm, settings.ranks = SerialComm(), 1
+    settings.engine, settings.card = "processor", None
+    try:
+        hub.interpreter.rehearse(other, lines)
+    except AtFirstRun as reached:
+        run, simulation = reached.run, other.simulation
+        simulation.begin(run.end_time)
+        steps = inf if run.steps is None else run.steps
+        duration = min(run.end_time - simulation.time, steps * simulation.dt)
+        return Scouted(other, simulation, duration)
+    return None
+
+
+def choose(hub: Hub) -> Chosen:
+    """Choose a row, and write its lines for this scene.
+
+    ScriptError, as the script would raise it, for a mistake further on.
+    """
+    if hub.restart is not None and (lines := hub.restart.content.get("chosen")):
+        return Chosen(RESUMED, lines)  # a longer run may suit another row
+    if hub.rehearsing:
+        return Chosen(PLAIN, PLAIN.lines)
+    facts = _facts(hub)
+    for choice in CHOICES:
+        if facts is not None and choice.when(facts):
+            lines = _written(choice, facts)
+            with suppress(ScriptError):
+                scouted(hub, lines)
+                return Chosen(choice, lines)
+    return Chosen(PLAIN, PLAIN.lines)
+
+
+def _written(choice: Choice, facts: Scouted) -> tuple[str, ...]:
+    first, *others = (line.format(grid=facts.grid) for line in choice.lines)
+    heat = ", thermo-mechanical" * facts.hot
+    return f"{first[:-1]}{heat})", *others
+
+
+def _facts(hub: Hub) -> Scouted | None:
+    errors = []
+    for line in NEUTRAL:
+        try:
+            return scouted(hub, (line,))
+        except ScriptError as error:
+            errors.append(error)
+    raise errors[0]
