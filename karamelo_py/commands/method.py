@@ -58,6 +58,9 @@ def method(
     -----
     Before the first solid.
 
+    ``method(auto)``, without further arguments, reads the script up to its first run and chooses
+    method, transfer, basis, scheme, mass and F-bar for the scene (docs/choose.md).
+
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
     a temperature), also between bodies with common nodes. Only fixes add or remove
@@ -106,8 +109,8 @@ def auto(hub: Hub, kind: Literal["auto"]) -> None:
     """Choose the method for the scene that the rest of the script describes.
 
     The script is read up to its first run; materials, bodies, speeds, contact and duration select
-    a row of the table in docs/choose.md. Banner and ``check`` show the lines. A
-    ``scheme``, ``anti_volumetric_locking`` or ``dt_factor`` of the script remains.
+    a row of the table in docs/choose.md. Banner and ``check`` show the lines. A ``scheme``,
+    ``anti_volumetric_locking`` or ``dt_factor`` of the script remains.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
@@ -121,7 +124,7 @@ def auto(hub: Hub, kind: Literal["auto"]) -> None:
     update.chosen, update.scheme_mark = chosen, own_scheme
 
 
-signature.also_called(method, "auto", auto)
+signature.FORMS[method] = {"auto": auto}
 
 
 def scheme(

@@ -43,6 +43,8 @@ __all__ = [
     "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile",
     "Parameter", "Positive", "TableFile",
 ]  # fmt: skip
+# Other forms of a command, by its first argument.
+FORMS: dict[Callable, dict[str | None, Callable]] = {}
 
 
 @cache
@@ -95,8 +97,8 @@ def call(
     `name` is ``run``, or ``fix body_force``. ScriptError, with a mark, for anything wrong in the
     arguments or the target.
     """
-    if arguments and (forms := forms_by_word(target)):
-        target = forms.get(arguments[0].word(), target)
+    if arguments and target in FORMS:
+        target = FORMS[target].get(arguments[0].word(), target)
     try:
         expected = parameters(target)
     except TypeError as error:
@@ -305,19 +307,6 @@ def syntax(target: Callable, name: str) -> str:
 
 def variants_of(style: Any) -> Mapping[str, Any]:
     return getattr(style, "variants", {})
-
-
-def forms_by_word(command: Any) -> Mapping[str | None, Callable]:
-    """Map first arguments to other forms of a command."""
-    return _forms_by_word.get(command, {})
-
-
-_forms_by_word: dict[Callable, Mapping[str | None, Callable]] = {}
-
-
-def also_called(command: Callable, word: str, form: Callable) -> None:
-    """Let `word` as the first argument select another form of a command."""
-    _forms_by_word[command] = {**forms_by_word(command), word: form}
 
 
 def default_variant(style: Any) -> str | None:
