@@ -5,6 +5,8 @@ own step. Errors are compared at equal cost, in visited nodes: points times step
 point times visits in a step. Results that the folder has are used, except those of auto.
 """
 
+import contextlib
+import io
 import json
 import os
 import re
@@ -19,6 +21,8 @@ from itertools import chain
 from math import exp, inf, isfinite, log, nan, pi, radians, sqrt
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from comparisons import defaults, exact, lesser, slopes
 from comparisons.defaults import plane_flow
@@ -83,6 +87,13 @@ def of_defaults(name: str, result: Result) -> float:
     return abs(case.error(case.measure(result)))
 
 
+def of_cantilever(result: Result) -> float:
+    """Mean deviation of the tip from finite elements, over its largest way, until it is back."""
+    time, tip = exact.cantilever_curve()
+    off = abs(result.log.tip_s - abs(np.interp(result.log.Time, time, tip)))
+    return off.mean() / abs(tip).max()
+
+
 def default(name: str, **more) -> Scene:
     refine = defaults.case(name).refine
     sizes = ("1", "2") if len(refine) > 1 else ("0.5", "1")
@@ -118,11 +129,10 @@ SEEN = {
     "axis_aligned_1d": Scene(f"{IN}.axis_aligned_1d", last("error_z"), more=("G", "0.1")),
     "axis_aligned_3d": Scene(f"{IN}.axis_aligned_3d", last("error_z"), ("0.5", "1"), domain="R8"),
     "bar": Scene(f"{IN}.vibrating_bar", last("err_history"), ("0.4", "1")),
-    "cantilever": Scene(
-        f"{IN}.cantilever", partial(extreme, "tip_s", 3.305), ("0.5", "1"), more=("T", "1.3")),
+    "cantilever": Scene(f"{IN}.cantilever", of_cantilever, ("0.5", "1"), more=("T", "2.6")),
     "column": Scene(f"{IN}.column", last("share"), ("0.5", "1")),
     "vertical_bar": Scene(
-        f"{IN}.vertical_bar", partial(extreme, "tip_s", 1.7146), ("0.5", "1"), domain="R8"),
+        f"{IN}.vertical_bar", partial(extreme, "tip_s", 1.662), ("0.5", "1"), domain="R8"),
     "sod": Scene(f"{IN}.sod", last("err"), ("0.5", "1")),
     "vortex": Scene(f"{IN}.vortex", last("error_z"), ("0.5", "1")),
     "disk": Scene(f"{IN}.spinning_disk", partial(lost, ("Ek", "Es")), more=("turns", "5")),
@@ -348,8 +358,28 @@ def row(name: str, folder: Path) -> tuple[str, float]:
     return f"| {' | '.join(cells)} |", ratio
 
 
+WARM = """\
+method(auto)
+dimension(1, 0, 1, 0.1)
+region(line, block, 0, 1)
+material(m, linear, 1, 1, 0)
+solid(bar, region, line, 2, m, 0.1)
+run(1)
+"""
+
+
+def warm(folder: Path) -> None:
+    """Run a small scene in this process: forks of it need not import the program."""
+    folder.mkdir(parents=True, exist_ok=True)
+    script = folder / "in.warm"
+    script.write_text(WARM, encoding="utf-8")
+    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
+        cli.main([str(script), "--threads", "1"])
+
+
 def main() -> None:
     folder, *names = sys.argv[1:]
+    warm(Path(folder))
     for group in (UNSEEN, SEEN):
         ratios = []
         for name in group:

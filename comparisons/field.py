@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from comparisons.auto import EXACT, SCENES, SETUPS, run
+from comparisons.auto import EXACT, SCENES, SETUPS, run, warm
 
 PICTURE = Path(__file__).parent.parent / "docs" / "_static" / "field.png"
 SIZES = {  # finer than the two of `comparisons.auto`
@@ -67,6 +67,8 @@ def gain(before: Front, after: Front) -> float:
 
 
 def main() -> None:
+    folder = Path(sys.argv[1])
+    warm(folder)
     import matplotlib
 
     matplotlib.use("Agg")
