@@ -417,13 +417,21 @@ def _tried(lines, dimension, folder):
             interpreter.run_text(f"solid({words[3]}, region, disk, 2, lead, {h}, 0)")
         if words[2] == "angular_velocity_nodes":
             interpreter.hub.domain.kin = Twisted()
-        if "pore_pressure" in words[2]:
+        if "pore_pressure" in words[2] or words[2] in ("seepage_face", "flux"):
             wet = "pore_water(wet, n=0.4, permeability=1)\nsolid(wet, region, disk, 2, wet, h, 0)"
             wet = wet.replace("h,", f"{STAGES[dimension][0].split()[-1]},")
             interpreter.run_text(f"material(wet, linear, 1000, 1000, 0.3)\n{wet}")
         kind = (
             "nodes"
-            if words[2] in ("absorbing", "body_force", "ground_motion", "pore_pressure")
+            if words[2]
+            in (
+                "absorbing",
+                "body_force",
+                "flux",
+                "ground_motion",
+                "pore_pressure",
+                "seepage_face",
+            )
             or "_nodes" in line
             else "particles"
         )

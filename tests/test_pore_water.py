@@ -104,6 +104,28 @@ def test_steady_seepage_follows_darcy(run_script):
 
 
 @same_kernels
+def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(run_script):
+    """Darcy: p = q/k rho g x. Drawn out instead, water lowers the pressure of a closed column."""
+    tail = """
+        fix(lid, velocity_nodes, top, 0)
+        fix(face, seepage_face, top, 0)
+        fix(rain, flux, bottom, {q}, xlo)
+        fix(start, initial_pore_pressure, all, 9810*{q}/1e-2*(1 - x0))
+        compute(p, probe, all, pore_pressure)
+        log_modify(custom, step, time, face_s, rain_s, p)
+        set_output(10000)
+        run(10000)
+        """
+    log = last(run_script(COLUMN + tail.format(q=1e-3)))
+    assert abs(log["face_s"] - 1) < 1e-4
+    assert abs(log["rain_s"] + 1) < 1e-6
+    assert abs(log["p"] / (9810 * 0.1 / 2) - 1) < 1e-3
+    log = last(run_script(COLUMN + tail.format(q="(-1e-6)").replace("10000", "1000")))
+    assert log["face_s"] == 0
+    assert abs(log["p"] / (-9810e-4 / 2 - 2.2e9 / 0.4 * 1e-6 * log["Time"]) - 1) < 0.01
+
+
+@same_kernels
 def test_water_and_soil_rest_under_gravity(run_script):
     """The reaction is the weight of both; the wall carries the water next to it."""
     log = last(
@@ -274,6 +296,12 @@ MISTAKES = [
     ),
     ({"water": "", "tail": "pore_water(clay, n=0.4, permeability=1)"}, (), "has this material"),
     ({"water": "", "tail": "fix(p, initial_pore_pressure, all, 0)"}, (), "no solid has water"),
+    ({"tail": "group(n, nodes, region, body, all)\nfix(q, flux, n, 1, zhi)"}, (), "direction z"),
+    (
+        {"water": USUAL["water"][:-1] + ", suction=1000)"},
+        (),
+        "with suction does not support scheme musl",
+    ),
 ]
 
 

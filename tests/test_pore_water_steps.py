@@ -43,6 +43,11 @@ LOADED = """fix(load, force_nodes, top, -{0!r})
     fix(start, initial_pore_pressure, all, {0!r})"""
 
 
+def how_to():
+    page = (INPUTS.parent / "docs/howto/soil-and-water.md").read_text("utf-8")
+    return [part.split("```")[0] for part in page.split("```karamelo\n")[1:]]
+
+
 def column(fixes, steps, *, law="linear, 1590, 1e7, 0", kozeny="", more="drain_s"):
     """The layer with fixes and `steps`, (duration, count) of load steps or a text."""
     if not isinstance(steps, str):
@@ -240,12 +245,43 @@ def test_a_restart_and_threads_change_no_bit(run_script):
 
 
 def test_water_and_soil_rest_under_gravity(run_script):
-    """In one step from nothing: the pressure is hydrostatic, the base carries both weights."""
+    """From nothing: the pressure is hydrostatic, the base carries both weights, in every step."""
     fixes = """fix(weight, body_force, all, -9.81)
     fix(drain, pore_pressure, top, 0)"""
-    log = last(run_script(column(fixes, [(1e10, 1)])))
-    assert abs(log["base_x"] / (9.81 * 1990) - 1) < 1e-9
-    assert abs(log["p"] / (9810 * (1 - 1 / 64)) - 1) < 1e-3
+    log = run_script(column(fixes, [(3e10, 3)])).log
+    assert abs(log["base_x"][1] / (9.81 * 1990) - 1) < 1e-9
+    # The settlement lets water out, 4.8 N in weight.
+    assert np.abs(log["base_x"][1:] / (9.81 * 1990) - 1).max() < 3e-4
+    assert np.abs(log["p"][1:] / (9810 * (1 - 1 / 64)) - 1).max() < 1e-3
+
+
+def test_rain_seeps_to_a_water_table_as_gardner_has_it(run_script):
+    """Steady infiltration (1958): k(p)/k = q/k + (1 - q/k) exp(-rho g x/a)."""
+    fixes = """fix(still, velocity_nodes, all, 0)
+    fix(weight, body_force, all, -9.81)
+    fix(table, pore_pressure, bottom, 0)
+    fix(start, initial_pore_pressure, all, -9810*x0)
+    fix(rain, flux, top, 3e-10, xhi)
+    compute(top, probe, all, pore_pressure, x=1)"""
+    log = last(
+        run_script(
+            column(
+                fixes, [(4e6, 4), (1e12, 1)], kozeny=", suction=2000", more="top, rain_s, table_s"
+            )
+        )
+    )
+    exact = 2000 * np.log(0.3 + 0.7 * np.exp(-9810 * (1 - 1 / 64) / 2000))
+    assert abs(log["top"] / exact - 1) < 1e-3
+    assert abs(log["table_s"] / 3e-7 - 1) < 1e-3
+    assert abs(log["rain_s"] / -3e-7 - 1) < 1e-12
+
+
+def test_a_dam_of_earth_lets_through_what_dupuit_found(run_script):
+    """k (H1^2 - H2^2)/(2 L), exact for a rectangular dam without suction (Charny 1951)."""
+    text = next(block for block in how_to() if "seepage_face" in block)
+    excess = [last(run_script(text, "-var", "suction", a))["q"] - 1 for a in ("500", "250")]
+    assert 0.02 < excess[0] < 0.025
+    assert abs(2 * excess[1] - excess[0]) < 0.001
 
 
 @pytest.mark.parametrize(

@@ -24,6 +24,7 @@ def pore_water(
     rho: Annotated[float, Positive] = 1000.0,
     gravity: Annotated[float, Positive] = 9.81,
     kozeny: bool = False,
+    suction: Annotated[float, Positive] | None = None,
 ) -> None:  # fmt: skip
     """Fill the pores of a material with water: consolidation, seepage, undrained loads.
 
@@ -49,6 +50,9 @@ def pore_water(
         Gravity in the definition of the conductivity; it is no load (see fix body_force).
     kozeny
         true: the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
+    suction
+        Pores empty above the water table (load steps): at a pressure p < 0, saturation and relative
+        permeability are exp(p/suction) (Gardner 1958). Without it pores stay full.
 
     Example
     -------
@@ -131,4 +135,4 @@ def pore_water(
             f"density {dry:g} over 1 - n",
             hint="a material takes the dry density, (1 - n) times the density of its grains",
         )
-    material.fluid = PoreWater(n, drag, K, rho, float(kozeny))
+    material.fluid = PoreWater(n, drag, K, rho, float(kozeny), K if suction is None else suction)

@@ -18,16 +18,25 @@ like one of mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixe
 that holds it has the reaction of soil and water.
 """
 
-from math import exp, inf
+from math import exp, inf, nan, sqrt
 from typing import NamedTuple
 
 from karamelo_py.compiler import real, where
-from karamelo_py.compiler.fields import Field, StepField, SummedField, field, numbers, store, vector
+from karamelo_py.compiler.fields import (
+    Field,
+    StepField,
+    SummedField,
+    field,
+    numbers,
+    pair,
+    store,
+    vector,
+)
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.equations.strain import increment
-from karamelo_py.kernels.records import row
+from karamelo_py.kernels.records import put_at, row
 from karamelo_py.points import laws
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import digits
@@ -45,6 +54,7 @@ from karamelo_py.points.transfers import nodal_momentum, updated_velocity
 
 RIM = 0.5  # of V / h: |B| above which a spline's node is at the surface
 SMOOTHING = 0.05  # R
+WAYS = "xlo", "xhi", "ylo", "yhi", "zlo", "zhi", "surface", "volume"
 SMALL = 1e-4  # b below which (1 - exp(-b)) / b is a series
 
 
@@ -107,9 +117,20 @@ class Flux(Field):
 
 
 class GivenPressure(StepField):
-    """Prescribed pressure at a node; NaN: none."""
+    """Prescribed pressure at a node (NaN: none); 1 if water may only leave there."""
 
+    shape = pair
     start = float("nan")
+
+
+class GivenFlux(StepField):
+    """Mass of water given to a node per time, by `WAYS`.
+
+    Per area of faces with an outward normal along a direction (lo, hi of each), per area of any
+    face, per volume. After the step, the mass per time that each of them gave.
+    """
+
+    shape = numbers(2, 2)
 
 
 POINT_FIELDS = RelativeVelocity, UnseenPressure
@@ -269,9 +290,45 @@ def _is_rim(nodes, kin, n, rim):
     return squared >= rim * rim * V * V
 
 
+def _is_open(nodes, n):
+    p = field(nodes.fields, GivenPressure)[n, 0]
+    return p == p
+
+
+def _close_if_dry(nodes, kin, n):
+    """Close a node of a seepage face, unless its pressure or its flow is outward."""
+    given, sums = field(nodes.fields, GivenPressure), field(nodes.fields, PoreSums)
+    if given[n, 1] == 1 and sums[n, 2] <= given[n, 0] * sums[n, 0]:
+        water, force = field(nodes.fields, WaterSums), field(nodes.fields, PoreForce)
+        m, m_s, across = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], real(0, sums[n, 0])
+        for k in range(kin.dimension):
+            of_momentum = arrays.of_momentum(kin) + k
+            w = water[n, of_momentum] / m - nodes.sums[n, of_momentum] / m_s
+            across += w * force[n, kin.dimension + k]
+        if across <= 0:
+            given[n, 0] = nan
+
+
 def _is_closed(nodes, kin, n, rim):
-    prescribed = field(nodes.fields, GivenPressure)[n, 0]
-    return prescribed != prescribed and _is_rim(nodes, kin, n, rim)
+    return not _is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
+
+
+def _mass_given(nodes, kin, n, V):
+    """Return the mass of water that a node gets per time; store it by `WAYS`."""
+    given, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
+    whole, squared = real(0, V), real(0, V)
+    if given is None:
+        return whole
+    for k in range(d):
+        area = force[n, d + k]
+        squared += area * area
+        given[n, 2 * k] *= max(-area, real(0, V))
+        given[n, 2 * k + 1] *= max(area, real(0, V))
+    given[n, 2 * d] *= sqrt(squared)
+    given[n, 2 * d + 1] *= V
+    for k in range(2 * d + 2):
+        whole += given[n, k]
+    return whole
 
 
 def _is_wet_node(nodes, n):
@@ -294,12 +351,12 @@ class ShareForces(NamedTuple):
             return
         water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
         force, d = field(nodes.fields, PoreForce), kin.dimension
-        prescribed = field(nodes.fields, GivenPressure)[n, 0]
+        _close_if_dry(nodes, kin, n)
         m, m_s = water[n, arrays.MASS], nodes.sums[n, arrays.MASS]
         V, D = sums[n, 0], sums[n, 4]
         p = along = real(0, m)
-        if prescribed == prescribed:
-            p = prescribed
+        if _is_open(nodes, n):
+            p = field(nodes.fields, GivenPressure)[n, 0]
         elif _is_closed(nodes, kin, n, task.rim):
             p = sums[n, 2] / V
         if _is_closed(nodes, kin, n, task.surface):
@@ -366,8 +423,9 @@ class MakeFlux(NamedTuple):
         flux, d = field(nodes.fields, Flux), kin.dimension
         across = real(0, dt)
         if not _is_wet_node(nodes, n):
-            for k in range(d + 4):
-                flux[n, k] = 0
+            put_at(flux, n, 0, (0,) * (d + 4))
+            if field(nodes.fields, GivenFlux) is not None:
+                put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
             return
         m, V = field(nodes.fields, WaterSums)[n, arrays.MASS], field(nodes.fields, PoreSums)[n, 0]
         again, force = field(nodes.fields, WaterAgain), field(nodes.fields, PoreForce)
@@ -378,8 +436,10 @@ class MakeFlux(NamedTuple):
         closed = _is_closed(nodes, kin, n, task.rim)
         for k in range(2):
             flux[n, d + 2 + k] = field(nodes.fields, PoreSums)[n, 2 + k] / V
-        flux[n, d] = across / V if closed else real(0, dt)
-        flux[n, d + 1] = real(0, dt) if closed else across
+        supply, drained = _mass_given(nodes, kin, n, V), _is_open(nodes, n)
+        stays = across + supply if closed else supply
+        flux[n, d] = real(0, dt) if drained else stays / V
+        flux[n, d + 1] = across + supply if drained else real(0, dt)
 
 
 # --- nodes to points ------------------------------------------------------------------------------

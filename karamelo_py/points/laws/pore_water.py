@@ -1,12 +1,15 @@
 """Saturated soil: any law as the skeleton, with effective stress, and water in its pores.
 
 The state adds the volume of the water at zero pressure and of the pores, per volume before
-deformation: p = K ln(content / pores). `advance` alone is undrained; in a run the flux through the
-nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
+deformation: p = K ln(content / pores). With a suction a < K, p = a ln S where the saturation S =
+content / pores is below 1, and the relative permeability is S (Gardner 1958). `advance` alone is
+undrained; in a run the flux through the nodes changes the content
+(:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from typing import Any, NamedTuple
 
+from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import exponential, logarithm
 from karamelo_py.points import laws
 
@@ -20,6 +23,7 @@ class Saturated(NamedTuple):
     K: float  # bulk modulus of the water
     rho: float  # density of the water at zero pressure
     kozeny: float  # 1: permeability follows the porosity; 0: constant
+    suction: float  # below zero, where pores hold 1/e of their water; K: they stay full
 
     in_lanes = True
 
@@ -86,7 +90,8 @@ def pore_pressure(law, kin, state):
 
 @pore_pressure.on(Saturated)
 def _pore_pressure_saturated(law, kin, state):
-    return law.K * logarithm(state.content / state.pores)
+    ratio = state.content / state.pores
+    return where(ratio < 1, law.suction, law.K) * logarithm(ratio)
 
 
 @laws.number
@@ -112,7 +117,7 @@ def _water_content_saturated(law, kin, state):
 
 
 def with_pore_pressure(law, kin, state, p):
-    return state._replace(content=state.pores * exponential(p / law.K))
+    return state._replace(content=state.pores * exponential(p / where(p < 0, law.suction, law.K)))
 
 
 def drag_per_volume(law, kin, state):

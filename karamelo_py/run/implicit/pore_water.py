@@ -20,6 +20,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import MASS, Block, Tag, of_force
 from karamelo_py.kernels.equations.pore_water import (
     Flux,
+    GivenFlux,
     GivenPressure,
     RelativeVelocity,
     WaterSums,
@@ -32,6 +33,7 @@ from karamelo_py.run.implicit.equations import Equations, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
+OUTLET = 1e3  # conductance of a seepage face, over that of its cells
 EPS = 50 * float(np.finfo(float).eps)
 
 
@@ -55,20 +57,27 @@ class Seepage:
         ]
         self._read_points()
         self._read_stencils()
+        of_water, first = field(s.nodes.fields, WaterSums), of_force(s.kin)
+        of_water[equations.nodes, first : first + self.d] = 0.0  # of the step before
         take_rows((AtWater(),), s, equations.mode, hooks)
-        sums, first = field(s.nodes.fields, WaterSums)[equations.nodes], of_force(s.kin)
+        sums = of_water[equations.nodes]
         self.weight = sums[:, first : first + self.d].astype(float)
         mass = np.where(sums[:, MASS] > 0, sums[:, MASS], 1.0)[:, None]
-        density = self.rho * self.content / self.pores
+        density = self.rho * self.full / self.pores
         self.gravity = density[:, None] * (self.N @ (self.weight / mass))
         volumes = self.N.T @ self.volume
         self.present = volumes > 0
         volumes[~self.present] = 1.0
         self.p = self.N.T @ (self.volume * self.before) / volumes
         self.density = self.N.T @ (self.volume * density) / volumes
-        self.given = field(s.nodes.fields, GivenPressure)[equations.nodes, 0].astype(float)
-        self.open = self.present & ~np.isnan(self.given)
+        every = self.N.T @ (self.volume * ~self.drains) == 0
+        self.softest = np.where(every, self.N.T @ (self.volume * self.suction) / volumes, np.inf)
+        given = field(s.nodes.fields, GivenPressure)[equations.nodes].astype(float)
+        self.given = given[:, 0]
+        faces = self.present & (given[:, 1] == 1)
+        self.open = self.present & ~np.isnan(self.given) & ~faces
         self._lay_out_flow()
+        self.outlet = np.where(faces, OUTLET * self.L.diagonal(), 0.0)
         self.respond(np.zeros((self.m, self.d)))
 
     def _read_points(self) -> None:
@@ -80,14 +89,20 @@ class Seepage:
             law, records = Saturated(None, *numbers), _laws_of(block)
             state = State(None, points.state[-2], points.state[-1])
             n = porosity(law, kin, state)
-            mobility = n * n / drag_per_volume(law, kin, state) * state.content / state.pores
+            mobility = n * n / drag_per_volume(law, kin, state)
             per_mass = np.array([float(specific_volume(one)) for one in records])[of]
             M = np.array([_modulus(one.law, kin) for one in records])[of]
-            numbers = [law.n, law.K, law.rho, mobility, M, grids.spacing[points.grid]]
+            numbers = [law.n, law.K, law.rho, law.suction, mobility, M, grids.spacing[points.grid]]
             columns.append((per_mass * points.mass, *state[1:], *numbers))
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
-        self.V0, self.content, self.pores, self.n, self.K, self.rho, self.mobility, M, h = every
-        self.before = self.K * np.log(self.content / self.pores)  # pressure
+        self.V0, self.content, self.pores, self.n, self.K, self.rho, *every = every
+        self.suction, self.mobility, M, h = every
+        self.drains = self.suction < self.K  # whether pores empty
+        ratio = self.content / self.pores
+        self.before = self._scale(ratio - 1) * np.log(ratio)  # pressure
+        # The water of full pores: its density gives weight and mobility.
+        self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
+        self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)
         self.compliance = np.maximum(0, 3 / M - 12 * self.mobility * self.dt / (h * h))
 
@@ -112,25 +127,61 @@ class Seepage:
         shares = within.T @ sp.diags(self.volume)
         self.mean = within @ sp.diags(1 / np.bincount(cells, self.volume)) @ shares
         self.D = (self.N - self.mean @ self.N).tocsr()
-        flow = self.dt * self.volume * self.mobility
+        self.inflow = self._flux()
+        self._conduct(np.ones(len(points)))
+
+    def _conduct(self, saturation: np.ndarray) -> None:
+        """Find the flow by pressures and gravity, and how it changes with the saturation."""
+        pairs = [*zip(self.G, self.gravity.T, strict=True)]
+        flow = self.dt * self.volume * (self.mobility * saturation)
         self.L = sum((g.T @ sp.diags(flow) @ g for g in self.G), sp.csr_matrix((self.m, self.m)))
-        self.pull = sum(g.T @ (flow * f) for g, f in zip(self.G, self.gravity.T, strict=True))
+        self.pull = sum(g.T @ (flow * f) for g, f in pairs) + self.inflow
+        self.rate = sp.csr_matrix((self.m, self.m))
+        if np.any(saturation < 1):
+            slope = flow * (saturation < 1) / self.suction
+            self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
+
+    def _flux(self) -> np.ndarray:
+        """Return the volume (m,) given to nodes; store the mass per time, as `MakeFlux` does."""
+        given = field(self.equations.s.nodes.fields, GivenFlux)
+        if given is None:
+            return np.zeros(self.m)
+        areas = [g.T @ self.volume for g in self.G]
+        sides = [np.maximum(sign * area, 0) for area in areas for sign in (-1, 1)]
+        surface = np.sqrt(sum(area * area for area in areas))
+        amounts = np.stack([*sides, surface, self.N.T @ self.volume], 1)
+        amounts *= given[self.equations.nodes, : amounts.shape[1]]
+        given[self.equations.nodes, : amounts.shape[1]] = amounts
+        return self.dt * amounts.sum(1) / self.rho[0]
+
+    def _scale(self, p: np.ndarray) -> np.ndarray:
+        return np.where(p < 0, self.suction, self.K)
 
     def respond(self, u: np.ndarray) -> None:
         """Update forces and balances after displacements (m, d) and pressures."""
         at = self.N @ self.p
         self._strain(u)
         self.lift = self.volume * (1 + self.growth)
-        self.loads = (self.B.T @ (self.lift * at)).reshape(-1, self.d) + self.weight
-        ratio, rise = self.content / self.pores, np.expm1((at - self.before) / self.K)
+        # Where water drains, a fraction of the pressure acts on the soil (Bishop 1959).
+        dry = self.drains & (at < 0)
+        self.filled = np.where(dry, np.exp(np.minimum(at, 0) / self.suction), 1.0)
+        self.acting = self.filled * (1 + np.where(dry, at / self.suction, 0.0))
+        if np.any(self.drains):
+            self._conduct(self.filled)
+        self.loads = (self.B.T @ (self.lift * (self.filled * at))).reshape(-1, self.d) + self.weight
+        scale = self._scale(at)
+        more = self.before * (1 / scale - 1 / self._scale(self.before))
+        ratio, rise = self.content / self.pores, np.expm1((at - self.before) / scale + more)
         more = (self.pores + 1 - self.n) * self.growth
         self.pores_after = self.pores + more
         self.gain = ratio * (more * (1 + rise) + self.pores * rise)
-        self.capacity = self.V0 * ratio * self.pores_after * (1 + rise) / self.K
+        self.capacity = self.V0 * ratio * self.pores_after * (1 + rise) / scale
         departs = at - self.before
         damped = self.D.T @ (self.volume * self.compliance * (departs - self.mean @ departs))
         held, moved = self.N.T @ (self.V0 * self.gain), self.L @ self.p
-        self.rest = held + moved - self.pull + damped
+        above = np.where(self.outlet > 0, self.p - self.given, 0.0)
+        self.seeps, self.lets = self.outlet * np.maximum(above, 0), self.outlet * (above > 0)
+        self.rest = held + moved - self.pull + damped + self.seeps
         self.size = max(float(np.linalg.norm(one)) for one in (held, moved, damped))
 
     def _strain(self, u: np.ndarray) -> None:
@@ -159,21 +210,36 @@ class Seepage:
         self, A: sp.spmatrix, b: np.ndarray, jump: np.ndarray, free: np.ndarray, kept: dict
     ) -> np.ndarray:
         """Correct the pressures; return the change of displacements (m d,)."""
-        Q = (self.B.T @ sp.diags(self.lift) @ self.N).tocsr()
+        Q = (self.B.T @ sp.diags(self.lift * self.acting) @ self.N).tocsr()
+        R = (self.B.T @ sp.diags(self.lift * self.filled) @ self.N).tocsr()
         slow = self.D.T @ sp.diags(self.volume * self.compliance) @ self.D
-        C = (self.L + slow + self.N.T @ sp.diags(self.capacity) @ self.N).tocsr()
+        C = (
+            self.L
+            + self.rate
+            + sp.diags(self.lets)
+            + slow
+            + self.N.T @ sp.diags(self.capacity) @ self.N
+        ).tocsr()
         step = np.where(self.open, self.given - self.p, 0.0)
-        into = -self.rest - C @ step - Q.T @ jump.ravel()
+        into = -self.rest - C @ step - R.T @ jump.ravel()
         moves, seen = free.ravel().astype(float), (self.present & ~self.open).astype(float)
         b = b + moves * (Q @ step)
         unknown = sp.diags(seen)
-        Q = sp.diags(moves) @ Q @ unknown
+        Q, R = (sp.diags(moves) @ one @ unknown for one in (Q, R))
         C = unknown @ C @ unknown + sp.diags(1 - seen)
-        whole = sp.bmat([[A.tocsr(), -Q], [Q.T, C]], format="csr")
+        whole = sp.bmat([[A.tocsr(), -Q], [R.T, C]], format="csr")
         x = direct(whole, np.concatenate([b, seen * into]), kept)
-        self.p += x[len(b) :] + step
+        self._change(x[len(b) :] + step)
         self.p[self.open] = self.given[self.open]
         return x[: len(b)]
+
+    def _change(self, step: np.ndarray) -> None:
+        """Add a change of the pressures; where water drains, one of the saturation exp(p/a)."""
+        a, whole = self.softest, self.p + step
+        S = np.exp(np.minimum(self.p, 0) / a)
+        left = np.where(self.p < 0, S * (1 + step / a), 1 + whole / a)
+        dried = a * np.log(np.maximum(left, 0.1 * S))
+        self.p = np.where((a < np.inf) & (left < 1), dried, whole)
 
     def end(self, fixes: Iterable[Fix]) -> None:
         """Write the water of the points; let fixes publish what left through their nodes."""
@@ -186,13 +252,17 @@ class Seepage:
             w = field(block.points.fields, RelativeVelocity)
             w[:] = flow[:, some] * (n + 1 - self.n[some]) / n
         nodes = self.equations.nodes
-        left = np.where(self.open, -self.density * self.rest / self.dt, 0.0)
+        left = self.density * np.where(self.open, -self.rest, self.seeps) / self.dt
         flux = field(self.equations.s.nodes.fields, Flux)
         flux[nodes, self.d + 1] = left
         for fix in fixes:
             if Flux in fix.node_fields:
                 leaves = float(left[np.isin(nodes, fix.nodes)].sum())
                 fix.hub.values.set(f"{fix.id}_s", leaves)
+            if GivenFlux in fix.node_fields:
+                given = field(self.equations.s.nodes.fields, GivenFlux)[nodes]
+                some = given[np.isin(nodes, fix.nodes), int(fix.formulas[1].constant)]
+                fix.hub.values.set(f"{fix.id}_s", -float(some.sum()))
 
 
 def _laws_of(block: Block) -> list[Tag]:

@@ -168,7 +168,8 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
         yield THIN, "plane_stress" if box.dimension == 2 else "uniaxial_stress", None
     for solid in hub.solids.values():
         if solid.material.fluid is not None:
-            yield solid.material.fluid.restrictions, "pore_water", solid.mark
+            fluid = solid.material.fluid
+            yield fluid.restrictions, fluid.words, solid.mark
     for fix in hub.fixes.values():
         yield fix.restrictions, f"fix {fix.style}", fix.mark
     for compute in hub.computes.values():

@@ -24,7 +24,6 @@ RESTRICTIONS = Restrictions(
 
 
 class PoreWater(NamedTuple):
-    restrictions = RESTRICTIONS
     tag, tag_in_load_steps = rows.Water(), rows.SlowWater()
     point_fields, node_fields = rows.Water.point_fields, rows.Water.node_fields
 
@@ -33,6 +32,16 @@ class PoreWater(NamedTuple):
     K: float
     rho: float
     kozeny: float
+    suction: float
+
+    @property
+    def words(self) -> str:
+        return "pore_water" if self.suction == self.K else "pore_water with suction"
+
+    @property
+    def restrictions(self) -> Restrictions:
+        slow = {**RESTRICTIONS.only, "scheme": ("quasi-static",)}
+        return RESTRICTIONS if self.suction == self.K else RESTRICTIONS._replace(only=slow)
 
     def around(self, law: NamedTuple) -> NamedTuple:
         return Saturated(law, *self)

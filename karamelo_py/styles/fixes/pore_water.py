@@ -1,9 +1,11 @@
 """Fixes for water in the pores."""
 
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from karamelo_py.kernels.equations.pore_water import Flux, GivenPressure
+from karamelo_py.compiler import where
+from karamelo_py.kernels.equations.pore_water import WAYS, Flux, GivenFlux, GivenPressure
 from karamelo_py.kernels.pore_water import impose_pore_pressure
+from karamelo_py.points.kinematics import total
 from karamelo_py.points.laws.pore_water import Saturated
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
@@ -14,7 +16,24 @@ from karamelo_py.script.expressions import Expression
 
 def give(flux, values, dt):
     """Return the pressure; publish the mass of water that left per time in the last step."""
-    return values[0], flux[-3]
+    return (values[0], 0 * values[0]), flux[-3]
+
+
+def give_one_way(flux, values, dt):
+    return (values[0], 1 + 0 * values[0]), flux[-3]
+
+
+def supply(given, values, dt):
+    """Return the given flux; publish minus the mass per time that it gave in the last step."""
+    q, way, rho = values
+    ways = range(len(given))
+    gave = total([where(way == k, given[k], 0) for k in ways])
+    return tuple([where(way == k, rho * q, given[k]) for k in ways]), -gave
+
+
+FROM_FLUX: dict[str, Any] = {
+    "reads": (Flux,), "writes": (GivenPressure,), "publishes": True, "nodes": True,
+}  # fmt: skip
 
 
 class PorePressure(Fix):
@@ -46,9 +65,7 @@ class PorePressure(Fix):
     node_fields = (GivenPressure, Flux)
     conserves = True
 
-    post_particles_to_grid = vector_hook(
-        give, reads=(Flux,), writes=(GivenPressure,), publishes=True, nodes=True
-    )
+    post_particles_to_grid = vector_hook(give, **FROM_FLUX)
 
     def __init__(self, hub: Hub, group: NodeGroup, p: Expression):
         super().__init__(hub, group)
@@ -58,6 +75,92 @@ class PorePressure(Fix):
     def defined(self) -> None:
         if self.hub.domain.h is not None:
             self.group.refuse_past_domain()
+
+
+class SeepageFace(PorePressure):
+    """Let water seep out of nodes at a surface, but not in: a slope, a well, a dam's toe.
+
+    Parameters
+    ----------
+    p
+        Pressure where water leaves, usually 0: a number or a formula as in pore_pressure.
+
+    Example
+    -------
+    fix(face, seepage_face, slope, 0)
+
+    Notes
+    -----
+    A node is open, at the pressure p, while the pressure in the soil is above p. Otherwise it is
+    impermeable. Publishes ID_s, as fix pore_pressure does.
+
+    See Also
+    --------
+    pore_pressure, flux, pore_water
+    """
+
+    post_particles_to_grid = vector_hook(give_one_way, **FROM_FLUX)
+
+
+class WaterFlux(Fix):
+    """Give water to nodes at a rate: rain, wells, injection.
+
+    Parameters
+    ----------
+    q
+        Volume of water that enters per time and area of the surface (negative: leaves): a number or
+        a formula of x0, y0, z0, time and published values.
+    through
+        Faces that it enters through: by their outward direction (xlo, xhi, ...), or any
+        ``surface``. ``volume``: q is per volume of the body, not per area.
+
+    Example
+    -------
+    fix(rain, flux, top, 1e-6, yhi)
+    fix(well, flux, screen, -2e-4, volume)
+
+    Notes
+    -----
+    Nodes that are open at the same time (fix pore_pressure, or a fix seepage_face under water) let
+    the flux out at once: rain runs off. Publishes ID_s, the mass of water per time that left in the
+    previous step: negative if it entered.
+
+    See Also
+    --------
+    pore_pressure, seepage_face, pore_water
+    """
+
+    published = ("s",)
+    node_fields = (GivenFlux,)
+
+    post_particles_to_grid = vector_hook(
+        supply, reads=(GivenFlux,), writes=(GivenFlux,), publishes=True, nodes=True
+    )
+
+    def __init__(
+        self, hub: Hub, group: NodeGroup, q: Expression, through: Annotated[str, Literal[WAYS]]
+    ):
+        super().__init__(hub, group)
+        refuse_dry(hub)
+        d, way = hub.domain.dimension, WAYS.index(through)
+        if 2 * d <= way < WAYS.index("surface"):
+            raise ScriptError(
+                f"the scene has no direction {through[0]}",
+                argument="through",
+                expected=", ".join((*WAYS[: 2 * d], *WAYS[-2:])),
+            )
+        fluids = (solid.material.fluid for solid in hub.solids.values())
+        densities = sorted({fluid.rho for fluid in fluids if fluid is not None})
+        if len(densities) > 1:
+            raise ScriptError(
+                "solids have water of different densities, " + " and ".join(map(str, densities)),
+                argument="group",
+                expected="pore_water with one rho",
+            )
+        way -= (6 - 2 * d) * (way >= 6)  # as `GivenFlux` counts them
+        self.formulas = (q, Expression(float(way)), Expression(densities[0]))
+
+    defined = PorePressure.defined
 
 
 class InitialPorePressure(Fix):
