@@ -433,10 +433,12 @@ class MakeFlux(NamedTuple):
             j = (again[n, k] - m * nodes.velocity[n, k]) / V
             flux[n, k] = j
             across += j * force[n, d + k]
-        closed = _is_closed(nodes, kin, n, task.rim)
+        enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
+        drained = _is_open(nodes, n) and not enters
+        closed = not drained and _is_rim(nodes, kin, n, task.rim)
         for k in range(2):
             flux[n, d + 2 + k] = field(nodes.fields, PoreSums)[n, 2 + k] / V
-        supply, drained = _mass_given(nodes, kin, n, V), _is_open(nodes, n)
+        supply = _mass_given(nodes, kin, n, V)
         stays = across + supply if closed else supply
         flux[n, d] = real(0, dt) if drained else stays / V
         flux[n, d + 1] = across + supply if drained else real(0, dt)
