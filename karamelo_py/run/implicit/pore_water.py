@@ -95,8 +95,8 @@ class Seepage:
             numbers = [law.n, law.K, law.rho, law.suction, mobility, M, grids.spacing[points.grid]]
             columns.append((per_mass * points.mass, *state[1:], *numbers))
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
-        self.V0, self.content, self.pores, self.n, self.K, self.rho, *every = every
-        self.suction, self.mobility, M, h = every
+        self.V0, self.content, self.pores, self.n, self.K, self.rho, *more = every
+        self.suction, self.mobility, M, h = more
         self.drains = self.suction < self.K  # whether pores empty
         ratio = self.content / self.pores
         self.before = self._scale(ratio - 1) * np.log(ratio)  # pressure
