@@ -120,3 +120,73 @@ def test_an_edge_is_not_taken_for_another_direction(run_interpreted):
     """
     assert "lie at y = 0 to 10" in run_interpreted(script.replace("SIDE", "yhi"), status=1).err
     run_interpreted(script.replace("SIDE", "xhi"))
+
+
+# Between rollers, cos(kx x) is a pair of waves at an angle; 16 cells long, in a packet of 40.
+OBLIQUE = """
+    W = {wide}
+    L = 200
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, W, 0, L, 1)
+    region(ground, block, 0, W, 0, L)
+    material(rock, linear, 2500, 50e9, 0.25)
+    {water}
+    solid(rock, region, ground, 2, rock, 1, 0)
+    region(sides, block, 1e-6, W - 1e-6, -INF, INF, exterior)
+    region(top, block, -INF, INF, L - 1e-6, INF)
+    region(base, block, -INF, INF, -INF, 1e-6)
+    group(sides, nodes, region, sides, all)
+    group(top, nodes, region, top, all)
+    group(base, nodes, region, base, all)
+    fix(sides, velocity_nodes, sides, 0, NULL)
+    fix(top, absorbing, top, rock, yhi)
+    fix(base, absorbing, base, rock, ylo)
+    fix(damp, mass_damping, all, {rate}*(max(abs(y0 - L/2) - L/2 + 20, 0)/20)^2)
+    kx = PI/W
+    ky = kx/tan(radians({angle}))
+    s = y0 - L/2
+    f = cos(ky*s)*exp(-(s/40)^2)
+    df = -(ky*sin(ky*s) + s/800*cos(ky*s))*exp(-(s/40)^2)
+    S = {S}
+    vx = if(S, sin(kx*x0)*df, -kx*sin(kx*x0)*f)
+    vy = if(S, -kx*cos(kx*x0)*f, cos(kx*x0)*df)
+    fix(v, initial_velocity_particles, all, vx, vy)
+    compute(k, kinetic_energy, all)
+    set_output(10000)
+    log_modify(custom, time, k)
+    c = sqrt(if(S, 20e9, 60e9 + {stiffer})/{rho})
+    run_time(190/c/cos(radians({angle})))
+"""
+DRY = {"water": "", "stiffer": 0, "rho": 2500}
+WET = {"water": "pore_water(rock, n=0.3, permeability=1e-7)", "stiffer": "2.2e9/0.3", "rho": 2800}
+
+
+@pytest.mark.xdist_group("absorbing")
+@pytest.mark.parametrize(
+    ("S", "angle", "wide", "soil", "edge"),
+    [
+        (1, 30, 16, DRY, 0.05),
+        *(
+            pytest.param(*case, marks=pytest.mark.full)
+            for case in [
+                (0, 15, 31, DRY, 0.003), (0, 30, 16, DRY, 0.005), (0, 45, 11, DRY, 0.015),
+                (1, 15, 31, DRY, 0.01), (1, 45, 11, DRY, 0.04), (0, 45, 11, WET, 0.01),
+                (1, 30, 16, WET, 0.025), (1, 45, 11, WET, 0.02),
+            ]
+        ),
+    ],
+)  # fmt: skip
+def test_oblique_waves_leave_through_a_layer_with_damping(run_script, S, angle, wide, soil, edge):
+    """Plane waves: dashpots alone reflect up to 4.7 % (S, 30 degrees), a layer below 0.2 %."""
+    left = {}
+    for rate in (0, 1500):
+        script = OBLIQUE.format(S=S, angle=angle, wide=wide, rate=rate, **soil)
+        energy = run_script(script).log["k"]
+        left[rate] = energy[-1] / energy[0]
+    assert left[1500] < 0.002 < left[0] < edge
+
+
+def test_a_negative_rate_of_damping_is_refused(run_interpreted):
+    script = ROCK.format(way="ulmpm, FLIP, linear, 1", water="") + "fix(d, mass_damping, all, -1)"
+    err = run_interpreted(script + "\nrun(1)", status=1).err
+    assert "of at least 0" in err and err.count("error:") == 1

@@ -77,6 +77,14 @@ def test_layers_in_2d(run_interpreted):
     assert abs(log["base_y"][-1] / 33900 - 1) < 0.01
 
 
+def test_each_layer_has_its_k0(run_interpreted):
+    """Of a column: the mean of k0 sigma_v, with 1.2 in the lower half and 0.4 above it."""
+    script = LAYERS.format(**LINE).replace("k0=0.4", "k0=if(x0 < 0.5, 1.2, 0.4)")
+    log = run_interpreted(script.replace("base_x, base_y", "base_x")).log
+    exact = -1590 * 10 * (1.2 * 0.75 + 0.4 * 0.25) / 2
+    assert abs(log["s_s22"][-1] / exact - 1) < 1e-5
+
+
 def test_a_stress_that_follows_from_deformation_is_refused(run_interpreted):
     script = LAYERS.format(**LINE).replace("clay, linear", "clay, neo-hookean")
     err = run_interpreted(script, status=1).err

@@ -20,7 +20,6 @@ STYLES = {
 }
 # Lines that must be refused, after a domain in 2D.
 LINES = {
-    "sheared periodic": "boundary(sheared, x)",
     "grids refined": "refine_grid(0.05)",
 }
 

@@ -107,6 +107,54 @@ def test_a_viscous_layer_has_the_profile_of_nusselt(run_script):
     assert abs(result.log["base_x"][-1] + 0.1 * 0.25) < 0.002
 
 
+SHEARED = """
+    N = 8
+    rate = 0.1
+    method(ulmpm, {way})
+    dimension({d}, 0, 1, 0, 1, {deep}1/N)
+    boundary(periodic, x, y, {more}shear=rate)
+    region(cell, block, INF, INF, INF, INF{inf})
+    eos(oil, fluid, 1, 200, 1)
+    strength(oil, {law})
+    material(oil, eos-strength, oil, oil)
+    solid(oil, region, cell, 2, oil, 1/N, 0)
+    fix(v, initial_velocity_particles, all, rate*y, 0.5{zero})
+    compute(s, average_stress, all)
+    compute(p, linear_momentum, all)
+    log_modify(custom, step, time, s_11, s_22, s_12, p_x, p_y)
+    dump(d, all, particle, 100000, d.*.txt, y, vx)
+    set_output(20)
+"""
+PLANE = {"d": 2, "deep": "", "more": "", "inf": "", "zero": "", "law": "fluid, 0.1"}
+
+
+@pytest.mark.xdist_group("sheared")
+@pytest.mark.parametrize(
+    "way",
+    ["FLIP, linear, 0.99", pytest.param("APIC, quadratic-spline", marks=pytest.mark.full)],
+)
+def test_a_sheared_cell_of_oil(run_script, way):
+    """Lees & Edwards 1972: s12 = mu rate and vx = rate (y - vy t), through the edge."""
+    result = run_script(SHEARED.format(way=way, **PLANE) + "run_time(5)")
+    log, points = result.log, columns(final(result))
+    assert np.abs(log["s_12"][1:] / 0.01 - 1).max() < 1e-9
+    assert np.abs(log["s_11"]).max() < 1e-12 and np.abs(log["p_y"] - 0.5).max() < 1e-12
+    assert np.abs(points["vx"] - 0.1 * (points["y"] - 2.5)).max() < 1e-9
+
+
+@pytest.mark.xdist_group("sheared")
+def test_threads_and_restarts_change_no_bit_of_a_sheared_cell(run_script):
+    script = SHEARED.format(way="FLIP, linear, 0.99", **PLANE)
+    script = script.replace("0.5)", "0.5 + 0.01*sin(2*PI*x))")
+    script += "run(33)\nwrite_restart(half.h5)\nrun(44)\n"
+    whole = run_script(script)
+    assert abs(whole.log["p_y"][-1] - 0.5) < 1e-13
+    lines = final(whole).read_text("utf-8")
+    assert final(run_script(script, "-restart", "half.h5")).read_text("utf-8") == lines
+    threads = run_script(script, "--threads", "2", folder="threads")
+    assert final(threads).read_text("utf-8") == lines
+
+
 REFUSED = {
     "method(tlmpm, FLIP, linear, 1)": "method tlmpm",
     "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",
@@ -139,6 +187,7 @@ MISTAKES = [
     ({"directions": ""}, (), "no direction is named"),
     ({"directions": ", z"}, (), "no such direction"),
     ({"water": "pore_water(m, n=0.4, permeability=1)"}, (), "does not support pore_water"),
+    ({"directions": ", x, shear=1"}, (), "a sheared cell is periodic in x and y"),
     ({}, ("--gpu",), "does not support --gpu"),
 ]
 
@@ -150,7 +199,13 @@ def test_mistakes_get_one_message(run_interpreted, change, options, told):
     assert err.count("error:") == 1
 
 
-@pytest.mark.parametrize("line", ["boundary(error, x)", "dimension(2, 0, 1.1, 0, 1, 0.25)"])
+def test_a_sheared_cell_is_full(run_interpreted):
+    script = SCENE.format(**USUAL | {"directions": ", x, y, shear=1"})
+    tall = script.replace("dimension(2, 0, 1, 0, 1,", "dimension(2, 0, 1, 0, 16,")
+    assert "a sheared cell has empty places" in run_interpreted(tall, status=1).err
+
+
+@pytest.mark.parametrize("line", ["boundary(error, x)", "boundary(error, shear=1)", "dimension(2, 0, 1.1, 0, 1, 0.25)"])
 def test_directions_and_lengths_are_checked(run_interpreted, line):
     script = SCENE.format(**USUAL)
     if line.startswith("dim"):
@@ -158,4 +213,4 @@ def test_directions_and_lengths_are_checked(run_interpreted, line):
     else:
         script = script.replace("boundary(periodic, x)", line)
     err = run_interpreted(script, status=1).err
-    assert "is for all directions" in err or "is no multiple of the cells" in err
+    assert "is for all directions" in err or "has no shear" in err or "is no multiple of the cells" in err

@@ -24,6 +24,7 @@ WORDS = {
     "studies/elsewhere": "cluster Dask Slurm PBS MPI pool distributed batch array job",
     "studies/fit": "calibrate calibration inverse least squares parameter identification",
     "studies/advise": "cheapest set-up accuracy target optimisation which mesh size",
+    "studies/find": "bisection factor of safety limit load critical value root threshold",
     "studies/stability": "stable time step map Courant unstable limit",
     "studies/live": "monitor progress browser dashboard watch",
     "energy": "conservation drift energy error instability blow up hourglass gain loss",

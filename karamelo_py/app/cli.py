@@ -87,6 +87,7 @@ ELSEWHERE = {
     "chart": ("karamelo_py.app.studies.chart", "Draw the table of a sweep: error against cost."),
     "advise": ("karamelo_py.app.studies.advise", "Find the cheapest set-up within an error."),
     "fit": ("karamelo_py.app.studies.fit", "Find the values of variables that match measurements."),
+    "find": ("karamelo_py.app.studies.find", "Find the value at which a condition changes."),
     "sensitivity": ("karamelo_py.app.studies.sensitivity", "Find which variables matter."),
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),

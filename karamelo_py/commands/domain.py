@@ -107,6 +107,7 @@ def boundary(
     hub: Hub,
     style: Literal["error", "delete", "reflect", "periodic"],
     *directions: Literal["x", "y", "z"],
+    shear: float = 0.0,
 ) -> None:
     """Set what happens to points that reach the edge of the domain.
 
@@ -118,11 +119,15 @@ def boundary(
         velocity is reversed. ``periodic``: the point returns at the other end.
     directions
         x, y, z: with ``periodic`` alone.
+    shear
+        Velocity gradient dvx/dy of a cell that is periodic in x and y (Lees & Edwards 1972): the
+        cell above moves by `shear` times the height faster.
 
     Example
     -------
     boundary(delete)
     boundary(periodic, x)
+    boundary(periodic, x, y, shear=0.1)
 
     Notes
     -----
@@ -143,6 +148,10 @@ def boundary(
     transfer but XPIC, and one process without a GPU. It refuses the other styles of boundary,
     axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
 
+    In a sheared cell, start with fix initial_velocity_particles of the mean velocity `shear` y.
+    Bodies fill the cell. Positions and velocities belong to the image in the cell. Momentum is
+    conserved to round-off; the energy balance is not monitored.
+
     Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
 
     See Also
@@ -150,8 +159,10 @@ def boundary(
     dimension, fix velocity_nodes
     """
     if style == "periodic":
-        set_periodic(hub, ["xyz".index(name) for name in directions])
+        set_periodic(hub, ["xyz".index(name) for name in directions], shear)
         return
+    if shear:
+        raise ScriptError(f"boundary({style}) has no shear", argument="shear", expected="periodic")
     if directions:
         message = f"boundary({style}) is for all directions"
         raise ScriptError(message, argument="directions", expected=f"boundary({style})")
@@ -159,7 +170,7 @@ def boundary(
     hub.update.boundary_mark = hub.mark
 
 
-def set_periodic(hub: Hub, directions: list[int]) -> None:
+def set_periodic(hub: Hub, directions: list[int], shear: float) -> None:
     domain = require_grid(hub)
     h = domain.lattice.h
     if not directions or max(directions) >= domain.dimension:
@@ -183,6 +194,10 @@ def set_periodic(hub: Hub, directions: list[int]) -> None:
             expected="boundary(periodic, ...) after dimension and before the first solid",
             code="too-late",
         )
+    if shear and not {0, 1} <= {*directions}:
+        expected = "boundary(periodic, x, y, shear=...)"
+        raise ScriptError("a sheared cell is periodic in x and y", argument="shear", expected=expected)
+    domain.shear = shear
     domain.periodic, domain.node_fields = tuple(sorted(set(directions))), (InUse,)
 
 

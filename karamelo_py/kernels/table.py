@@ -14,7 +14,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
-from karamelo_py.kernels.equations import fbar, loss, strain, xpic
+from karamelo_py.kernels.equations import fbar, loss, sheared, strain, xpic
 from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.corrected_acceleration import (
     Acceleration,
@@ -446,14 +446,16 @@ def light_node(s):
     return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-def seams(task: type) -> Any:
+def seams(task: type, across: dict) -> Any:
     """Return rows that join the images of nodes in periodic directions."""
+    further = tuple(NodeTask(kind, make=make) for kind, make in across.items())
 
     def rows(s):
         ranks = s.control.ranks
-        return (
-            tuple([NodeTask(task(axis)) for axis in ranks.axes]) if isinstance(ranks, Seam) else ()
-        )
+        if not isinstance(ranks, Seam):
+            return ()
+        joins = tuple([NodeTask(task(axis)) for axis in ranks.joined])
+        return (*joins, *further) if isinstance(ranks.shear, sheared.Shear) else joins
 
     return rows
 
@@ -462,8 +464,10 @@ def sort_in_time(s: Setup) -> tuple:
     return (Once(ask_to_sort),) if isinstance(s.control.ranks, Seam) else ()
 
 
-SEAM = SceneTask(seams(Join), "sums of nodes a period apart")
-SEAM_AGAIN = SceneTask(seams(JoinVelocity), "momentum of nodes a period apart")
+SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
+SEAM_AGAIN = SceneTask(
+    seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of nodes a period apart",
+)
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
 FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
 LOSS = SceneTask(

@@ -38,6 +38,8 @@ def unknown_work(hub: Hub) -> str:
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
+    if hub.domain.shear:
+        return "the sheared edges"
     for fix in hub.fixes.values():
         acts = any(not isinstance(hook, CompiledHook) for hook in fix.hooks().values())
         if acts and not fix.first_step_only and not fix.conserves:

@@ -216,7 +216,7 @@ class SceneArrays:
             return_points(self.setup, domain)
         self.tiles.sort(self.setup)
         if domain.periodic:
-            mark_nodes(self.setup)
+            mark_nodes(self.setup, domain)
 
     def sort_if_due(self) -> None:
         motion = self.control.motion[0]

@@ -34,6 +34,7 @@ class Domain:
     thickness = 1.0  # in 2D; cross-section in 1D
     mark: Mark | None = None
     periodic: tuple[int, ...] = ()  # directions
+    shear = 0.0  # velocity gradient of images, x along y
     node_fields: tuple[type, ...] = ()
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):

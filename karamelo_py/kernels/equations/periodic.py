@@ -31,6 +31,8 @@ class Axis(NamedTuple):
 
 class Seam(NamedTuple):
     axes: tuple  # of `Axis`
+    joined: tuple  # the axes whose images are at nodes
+    shear: tuple = ()  # or `sheared.Shear`
 
 
 @counts.on(Seam)

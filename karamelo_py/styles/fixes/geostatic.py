@@ -12,6 +12,7 @@ from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
 from karamelo_py.scene.solid import Solid
+from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.forces import refuse_following
 
 
@@ -21,7 +22,8 @@ class GeostaticStress(Fix):
     Parameters
     ----------
     k0
-        Horizontal over vertical effective stress.
+        Horizontal over vertical effective stress: a number, or a formula of x, y, z, x0, y0, z0,
+        such as if(y0 < 5, 1.2, 0.5) for two layers.
     gravity
         Acceleration downwards, against the last direction of the scene: y in 2D, z in 3D.
 
@@ -51,17 +53,18 @@ class GeostaticStress(Fix):
         hub: Hub,
         group: ParticleGroup,
         *,
-        k0: Annotated[float, NonNegative] = 0.5,
+        k0: Annotated[Expression, NonNegative] = 0.5,
         gravity: Annotated[float, Positive] = 9.81,
     ):
         super().__init__(hub, group)
-        self.k0, self.gravity = k0, gravity
+        self.k0, self.gravity = Expression(k0), gravity
         refuse_following(hub, group)
 
     def initial_integrate(self, points: PointsView) -> None:
         d, ids, x = self.hub.domain.dimension, points.ids - 1, points.position.astype(float)
         if not len(ids):
             return
+        k0 = self.k0.evaluate_points(self.hub.values, x.copy(), points.reference_position)
         size = 2 * from_solids(self.hub, ids, _half, d)
         x += from_solids(self.hub, ids, lambda solid, rows: to_middles(
             solid.x0_of(rows), 2 * _half(solid, rows)), d)  # fmt: skip
@@ -70,7 +73,7 @@ class GeostaticStress(Fix):
         load = load_above(x, size, weights)
         pressure = np.where(water > 0, load[:, 1], 0.0)
         vertical = pressure - load[:, 0]
-        names = {f"{k}{k}": self.k0 * vertical for k in (1, 2, 3)}
+        names = {f"{k}{k}": k0 * vertical for k in (1, 2, 3)}
         shears = dict.fromkeys(("12", "13", "23"), np.zeros(len(ids)))
         points.set_stress(names | shears | {f"{d}{d}": vertical})
         for solid in self.hub.solids.values():
