@@ -64,7 +64,7 @@ def test_the_factor_of_safety_of_a_slope(tmp_path, monkeypatch, capsys):
     page = Path(__file__).parent.parent / "docs" / "howto" / "safety-factor.md"
     script = re.search(r"^```karamelo\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
     Path("in.slope").write_text(script[1], "utf-8")
-    words = "-var F=1.34:1.46 -var N=80 -within 0.01 -when".split()
+    words = ["-var", "F=1.34:1.46", "-var", "N=80", "-within", "0.01", "-when"]
     assert main(["find", "in.slope", *words, "time < 15"]) == 0
     factor = float(re.search(r"F = ([\d.]+) \+-", capsys.readouterr().out)[1])
     assert abs(factor / 1.380 - 1) < 0.006 and abs(factor / 1.4 - 1) < 0.02

@@ -195,8 +195,8 @@ def set_periodic(hub: Hub, directions: list[int], shear: float) -> None:
             code="too-late",
         )
     if shear and not {0, 1} <= {*directions}:
-        expected = "boundary(periodic, x, y, shear=...)"
-        raise ScriptError("a sheared cell is periodic in x and y", argument="shear", expected=expected)
+        message = "a sheared cell is periodic in x and y"
+        raise ScriptError(message, argument="shear", expected="boundary(periodic, x, y, shear=...)")
     domain.shear = shear
     domain.periodic, domain.node_fields = tuple(sorted(set(directions))), (InUse,)
 

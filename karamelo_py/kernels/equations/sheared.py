@@ -52,7 +52,7 @@ def _pair(images, n, side):
     along, across = images.along, images.across
     i = _place(along, n)
     at = i + side * images.shift
-    first = int(floor(at))
+    first = floor(at)
     rows = int(n) + side * across.period * across.stride
     a = index(rows + (first % along.period - i) * along.stride)
     b = index(rows + ((first + 1) % along.period - i) * along.stride)
@@ -90,8 +90,8 @@ def _spread(images, nodes, array, n, first):
     mass = sums[n, MASS]
     if (mass > 0) & (sums[a, MASS] > 0) & (sums[b, MASS] > 0):
         for c in range(first, int(array.shape[1])):
-            value = (1 - second) * array[a, c] / sums[a, MASS] + second * array[b, c] / sums[b, MASS]
-            array[n, c] = mass * value
+            value = (1 - second) * array[a, c] / sums[a, MASS]
+            array[n, c] = mass * (value + second * array[b, c] / sums[b, MASS])
         array[n, first] -= mass * real(side * images.speed, mass)
 
 

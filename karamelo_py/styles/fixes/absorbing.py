@@ -68,7 +68,8 @@ class Absorbing(Fix):
     The traction is -rho c v, with the P wave speed for the normal velocity and the S wave speed
     along the surface. A pulse 20 cells long at normal incidence reflects 0.2 % of its energy.
     Plane waves at up to 45 degrees reflect up to 1.4 % (P) and 4.7 % (S, at 30 degrees), 0.2 %
-    with a layer of fix mass_damping before the edge. In saturated ground, soil and water move as one at the edge.
+    with a layer of fix mass_damping before the edge. In saturated ground, soil and water move as
+    one at the edge.
 
     The fix balances the force that it measures on each node in its first step. Ground that begins
     with its stress (fix initial_stress) therefore stays at rest; a later load, such as weight,

@@ -30,8 +30,8 @@ class MassDamping(Fix):
     Notes
     -----
     A layer before fix absorbing, as thick (L) as a wave is long, whose rate grows with the square
-    of the depth to 6 c/L at the edge, with the P wave speed c, reflects below 0.2 % of the energy of
-    P and S waves at up to 45 degrees. Rigid motion slows down, too: the rate is the
+    of the depth to 6 c/L at the edge, with the P wave speed c, reflects below 0.2 % of the energy
+    of P and S waves at up to 45 degrees. Rigid motion slows down, too: the rate is the
     mass-proportional part of Rayleigh damping. In saturated ground it acts on the soil, which drags
     the water along.
 
