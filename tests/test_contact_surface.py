@@ -275,7 +275,7 @@ def test_a_region_without_an_inside_is_refused(run_interpreted, tmp_path, outsid
         "region(union, union, die, line)", f"fix(F, contact/surface, all, {outside})", "run(1)",
     )  # fmt: skip
     said = run_interpreted(block(2, *lines), status=1).err
-    assert f"region '{outside}' has lines or surfaces, which nothing can be in" in said
+    assert f"region '{outside}' has lines or surfaces and no inside" in said
     assert "fix(F, contact/surface" in said and "a region with an inside" in said
 
 

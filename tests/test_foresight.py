@@ -507,7 +507,7 @@ def test_check_tells_too(run_interpreted):
     assert "angular momentum: " in said
 
 
-GIVES = "gives 36 points of this group another {}: this fix decides"
+GIVES = "gives 36 points of this group a different {}: this fix decides"
 VELOCITIES = [
     (["velocity_particles, left, 0.1, 0", "velocity_particles, left, 0.2, 1"], "vx and vy"),
     (["velocity_particles, left, 0.1, 0", "velocity_particles, all, NULL, 1"], "vy"),
@@ -558,7 +558,7 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     fixes = ["velocity_nodes, held, 0, 0", f"velocity_particles, left, {velocity}"]
     scene = _with_fixes(*fixes).replace("set_dt", lines + "\n    set_dt").replace("ulmpm", method)
     said = run_interpreted(scene, command="check").err
-    told_of = "gives all nodes around 36 points of this group another vx: this fix decides how"
+    told_of = "gives all nodes around 36 points of this group a different vx: this fix decides how"
     assert (told_of in said) == told and ("another v" in said) == told
     assert ("fix: nodes that these points do not see" in said) == told
 
@@ -592,7 +592,7 @@ def test_one_step_for_the_whole_run_is_told(run_interpreted, command, lines, tol
     """Waves of 8.2 cross cells of 0.1 in 0.012."""
     start = "fix(v, initial_velocity_particles, all, 0.01, 0)"
     said = run_interpreted(block(2, start, *lines), command=command).err
-    assert ("one step covers the whole run, where one of 0.012" in said) == told
+    assert ("one step covers the whole run, but the stable step is 0.012" in said) == told
     assert ("units of densities, moduli, lengths and times may be mixed" in said) == told
 
 

@@ -85,7 +85,7 @@ def test_a_file_is_integrated_exactly(run_interpreted, tmp_path):
     ("changes", "says"),
     [
         ({"record": "none.csv"}, "none.csv"),
-        ({"record": "flat.csv"}, "of which the times increase"),
+        ({"record": "flat.csv"}, "rows of increasing time"),
         ({"record": "x0*time"}, "the acceleration depends on x0"),
         ({"more": ", through=quakes"}, "unknown fix 'quakes'"),
         ({"more": ", through=hold", "edge": "fix(hold, velocity_nodes, base, 0)"},

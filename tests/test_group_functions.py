@@ -137,7 +137,7 @@ def test_reaction_of_a_part_of_a_fix_is_refused(run_interpreted):
         ),
         status=1,
     ).err  # fmt: skip
-    assert "fix 'hold' holds nodes of group 'foot' and further ones" in err
+    assert "fix 'hold' holds nodes inside and outside of group 'foot'" in err
 
 
 def test_mean_stress_of_a_given_state(run_interpreted):

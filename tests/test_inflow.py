@@ -62,10 +62,10 @@ def test_a_slug_is_repeated_as_it_is(run_interpreted):
     [
         ("jet, 2, 0,", "jet, 2, 1,", "2 components of the velocity are not 0"),
         ("jet, 2, 0,", "jet, 0, 0,", "0 components of the velocity are not 0"),
-        ("until=1", "until=0.01", "no layer enters until then"),
+        ("until=1", "until=0.01", "no layer enters by then"),
         ("jet, 2, 0,", "jet, 2,", "1 component in 2 dimensions"),
         ("fix(feed", "solid(other, region, nozzle, 2, water, 0.125)\nfix(feed",
-         "would put points into matter"),
+         "would put points into other material"),
         ("fix(feed", "group(g, particles, region, nozzle, all)\nfix(feed", "group 'g' was"),
         ("fix(feed", "run(1)\nfix(feed", "have been in a run"),
         ("ulmpm,", "tlmpm,", "inflow"),

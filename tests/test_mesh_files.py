@@ -208,7 +208,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
     solid = MeshSolid(hub, tmp_path / "a.inp", hub.materials["steel"], 0.25)
     assert solid.count == 1
     assert hub.warnings == [
-        "elements of a.inp that no solid has are left out: 2 SPRINGA, 1 S4R"
+        "elements of a.inp that belong to no solid are left out: 2 SPRINGA, 1 S4R"
     ]  # fmt: skip
 
 

@@ -326,7 +326,7 @@ def test_what_is_measured_and_shown_nowhere(advice):
     text = plane(more="compute(Ek, kinetic_energy, all)\ncompute(Es, strain_energy, all)\n"
                       "# Ek is not shown\nlog_modify(custom, step, Es)")  # fmt: skip
     said = advice(text)
-    assert "compute Ek (kinetic_energy) is measured at each output and shown nowhere" in said
+    assert "compute Ek (kinetic_energy) is measured at each output but never shown" in said
     assert "name Ek in log_modify" in said and "Es" not in said
 
 
@@ -553,7 +553,7 @@ PULLED = "fix(pull, body_force, all, 0, -1)"
 def test_a_scene_with_two_equal_sides(advice):
     """A square of 4 x 4 cells about x = 4, a plane of nodes; its weight acts along y."""
     said = advice(plane(more=PULLED))
-    assert said.startswith("the scene is the same on both sides of x = 4: twice the points")
+    assert said.startswith("the scene is symmetric about x = 4: twice the points")
     assert said.endswith("half of it, and the nodes at x = 4 held in x")
     assert "y = 4" in advice(plane(more=PULLED.replace("0, -1", "-1, 0")))
 

@@ -273,7 +273,7 @@ def test_points_from_arrays_and_files(interpreted):
         assert (warm.points["T"] == 310).all()
         for wrong, says in (
             ({"T": np.ones(24)}, "a material of this scene has no temperature T"),
-            ({"volume": np.zeros(24)}, "point 1 of the table has no place, or no volume above 0"),
+            ({"volume": np.zeros(24)}, "point 1 of the table has no position, or no volume above"),
             ({"volume": np.ones(3)}, "has columns of several lengths"),
             ({"x": np.full(24, 9.0)}, "all of them lie outside the domain"),
             ({"seq": np.ones(24)}, "'seq' cannot be set: it follows from other columns"),
@@ -347,7 +347,10 @@ def test_a_function_of_a_module(run_interpreted, tmp_path):
         ("ropes.column", "PointsView has no ['vy']: write .velocity[:, 1]"),
         ("ropes.column", "\n  ropes.py:12 in column: deeper(points)\n  ropes.py:10 in deeper: "),
         ("ropes.nothing", "its attributes are force, heat_supply, mass, position"),
-        ("ropes.library", "hint: mend the function there:\n  ropes.py:16 in library: def library"),
+        (
+            "ropes.library",
+            "hint: correct the function there:\n  ropes.py:16 in library: def library",
+        ),
     ],
 )
 def test_functions_with_faults(run_interpreted, tmp_path, line, says):

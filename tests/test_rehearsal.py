@@ -208,7 +208,7 @@ def test_points_move_and_go_once(run_interpreted, rest, centre):
 
 def test_mistakes_behind_a_run_are_found_before_it(run_interpreted):
     run = run_interpreted(f"{BLOCK}run(5)\ntranslate_particles(a, region, every, 1, 0)", status=1)
-    assert "the points have been in a run" in run.err
+    assert "the points have already been in a run" in run.err
     assert not (run.folder / "log.mpm").exists()
 
 

@@ -245,7 +245,7 @@ def test_what_a_function_forgets_is_told(run_interpreted, tmp_path):
     assert err.count("Rope has changed pulled, and") == 1
     assert "remembers = ('length', 'pulled') in the class Rope" in err
     wrong = run_interpreted(FLY + "fix(p, python, all, ropes.wrong)\nrun(1)\n", status=1).err
-    assert "the class Wrong remembers 'there', which it does not have" in wrong
+    assert "the class Wrong lists 'there' in remembers, but does not have it" in wrong
 
 
 def test_a_longer_run_with_other_steps(run_interpreted):
@@ -305,10 +305,10 @@ def test_variables_of_the_command_line(run_interpreted):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("100, 0.3", "100, 0.2", "there this statement was material(rubber,linear,2,100,0.3)"),
+        ("100, 0.3", "100, 0.2", "this statement was material(rubber,linear,2,100,0.3) there"),
         ("run(4)", "", "this one ends before"),
-        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there a run stood here"),
-        ("FLIP, linear, 1", "FLIP, linear, 0.9", "there this statement was method("),
+        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there a run was here"),
+        ("FLIP, linear, 1", "FLIP, linear, 0.9", "this statement was method("),
     ],
 )
 def test_another_script(run_interpreted, old, new, says):
@@ -327,7 +327,7 @@ def test_a_file_from_behind_the_last_run(run_interpreted):
     said = run_interpreted(text, "-restart", "end.h5").out
     assert "note: end.h5 holds the end of the last run" in said and "read_restart(end.h5)" in said
     longer = run_interpreted(text.replace("run(4)", "run(9)"), "-restart", "end.h5", status=1).err
-    assert "end.h5 was written when this run was over, by run(4)" in longer
+    assert "end.h5 was written after this run, by run(4)" in longer
     assert "run(4) as it was, another run command after write_restart(end.h5)" in longer
     further = run_interpreted(text + "run(5)\n", "-restart", "end.h5")
     assert further.log.Step[-1] == 9 and "note:" not in further.out

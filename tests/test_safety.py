@@ -27,7 +27,7 @@ def test_a_log_of_somebody_else(run_interpreted, tmp_path, text):
     path = tmp_path / "run" / "log.mpm"
     path.write_bytes(text.encode("latin-1"))
     result = run_interpreted(RUN, status=1)
-    assert "is there, and no run has written it" in result.err
+    assert "exists and is not the log of a run" in result.err
     assert path.read_bytes() == text.encode("latin-1")
     run_interpreted(RUN, "-log", "log.mpm")
     assert path.read_text().startswith("Step")

@@ -126,7 +126,7 @@ def test_the_axis_of_a_cylinder_is_a_word():
         ("group(g, nodes, region, left)", None, "all | solid, solidID, ..."),
         ("group(g, particles, region, left, solid)", "solid", "no solid is named"),
         ("group(g, particles, region, left, solid, s9)", "s9", "unknown solid 's9'"),
-        ("dimension(2, 0, 1, 0, 1, 0.1)", None, "the domain is set already"),
+        ("dimension(2, 0, 1, 0, 1, 0.1)", None, "the domain is already set"),
         ("axisymmetric(true)", "true", "begins at x = -0.5"),
         ("axisymmetric(yes)", "yes", "true or false"),
     ],

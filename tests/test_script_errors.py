@@ -66,7 +66,7 @@ SYNTAX = [
     ("a = 3 *", 7, "ends after '*'"),
     ("a = * 3", 5, "nothing on its left"),
     ("a = 3 + * 4", 9, "'*' follows operator '+'"),
-    ("a = ()", 5, "nothing in these parentheses"),
+    ("a = ()", 5, "these parentheses are empty"),
     ("a = max(1,)", 11, "missing after ','"),
     ("run(1) run(2)", 8, "write two statements on two lines"),
     ("if (3 > 2) run(1)", 12, "there are no loops and blocks"),

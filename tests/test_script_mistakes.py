@@ -270,7 +270,7 @@ def test_names_of_commands_and_styles_depend_on_nothing(run_interpreted, lines, 
         ("material(linear, steel, 1, 1, 0.3)", "'linear' is a style, and the ID comes first"),
         ("material(steel, 1, 1, 0.3)", "must be one of arruda-boyce, cam-clay, eos-strength,"),
         ("run(1)\nprecision(single)", "the precision cannot change after the first run"),
-        ("run(1)\nset_output(1, csv)", "the form of the log cannot change after the first run"),
+        ("run(1)\nset_output(1, csv)", "the format of the log cannot change after the first run"),
     ],
 )
 def test_words_in_each_others_places(run_interpreted, line, told):

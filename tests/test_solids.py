@@ -214,7 +214,7 @@ def test_parts_too_thin_to_be_seen_are_told(style, tmp_path):
     thin = slanted(hub, tmp_path, 5, 0.01)
     block = hub.region("block", BlockRegion, 0, 4, 0, 2)
     hub.solid("s", hub.combine("r", style, block, thin), ppc=1, points="cut")
-    assert "thinner than points=cut sees, 0.0312" in hub.warnings[0]
+    assert "too thin for points=cut, 0.0312" in hub.warnings[0]
 
 
 def test_a_thin_sheet_in_space_is_told(tmp_path):
@@ -224,7 +224,7 @@ def test_a_thin_sheet_in_space_is_told(tmp_path):
     turn = np.linalg.qr(np.array([(1, 2, 3), (4, 1, -1), (0.3, -1, 2.0)]))[0]
     path = write(tmp_path / "s.stl", (nodes * (0.9, 0.9, 0.004)) @ turn, {"triangle": triangles})
     hub.solid("s", hub.regions.add("sheet", STL(hub, path)), ppc=1, points="cut")
-    assert "thinner than points=cut sees, 0.0312" in hub.warnings[0]
+    assert "too thin for points=cut, 0.0312" in hub.warnings[0]
 
 
 def test_a_thin_ring_has_its_area():

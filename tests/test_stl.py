@@ -302,8 +302,8 @@ def test_a_shape_from_a_file_has_its_mass(tmp_path):
 @pytest.mark.parametrize(
     ("length", "told"),
     [
-        (800, "with lengths times 0.001 it would fit (a file in millimetres, a script in metres)"),
-        (0.02, "with lengths times 25.4 it would fit (a file in inches, a script in millimetres)"),
+        (800, "scaled by 0.001 it would fit (a file in millimetres, a script in metres)"),
+        (0.02, "scaled by 25.4 it would fit (a file in inches, a script in millimetres)"),
         (0.3, ""),
         (20, ""),
     ],

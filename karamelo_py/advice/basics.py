@@ -1,4 +1,4 @@
-"""Facts of a scene that need no judgement: parts and motions."""
+"""Basic facts of a scene: parts and motions."""
 
 from functools import cached_property
 from math import isfinite
@@ -41,7 +41,7 @@ class BasicFacts:
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
         self.hats = self.linear or bool(traits.shape)  # linear on nodes or on domains of points
         solids = hub.solids.values()
-        # Laws that store all work and sustain tension.
+        # laws that store all work and sustain tension
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
         # Solids with about one point per cell and direction.
         self.single = [s.id for s in solids if stable_step.one_a_cell(s)]

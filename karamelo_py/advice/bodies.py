@@ -1,4 +1,4 @@
-"""Bodies in motion: energy gain by drift and rotation, lag of rotation, fixes that hold them."""
+"""Moving bodies: energy gain by drift and rotation, lag of rotation, fixes that hold bodies."""
 
 from collections.abc import Iterator
 from math import inf
@@ -16,7 +16,7 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.expressions import POINT_SEEDS
 
-SLOW = 0.01  # of the wave speed: slower drift gained no energy for any duration
+SLOW = 0.01  # fraction of the wave speed: a slower drift never gained energy
 TORN = 9.0, 14.0  # tolerable rotation (radians) with one point per cell: FLIP, affine transfers
 # Mean squared distance of a point from its nodes over h^2, by weight, per direction: linear basis
 # with two points per cell; second-order bases.
@@ -114,7 +114,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Lag of a free rotation in the total frame.
 
-    The grid lacks sum m tr D, the contribution within stencils, of the angular momentum sum m r^2.
+    Of the angular momentum sum m r^2, the grid lacks sum m tr D, the contribution within stencils.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
@@ -162,7 +162,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Return True if smooth plates hold all sides of a box but one.
+    """Return True if smooth plates hold all sides of a box except one.
 
     A plate is a fix that holds all nodes of one side in its normal direction.
     """

@@ -19,9 +19,9 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
 
-STRESSED = 0.1  # of the initial energy; below, there is no initial stress
-OF_ENERGY = 0.1  # of the energy besides drift: a smaller loss gives no warning
-LOADED = 0.5  # of the energy: if loads supply more, they maintain the stress
+STRESSED = 0.1  # fraction of the initial energy, below which there is no initial stress
+OF_ENERGY = 0.1  # fraction of the energy without drift: a smaller loss gives no warning
+LOADED = 0.5  # fraction of the energy: if loads supply more, they maintain the stress
 
 
 class Crossing(NamedTuple):
@@ -128,7 +128,7 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Describe the loss for the closing table, with a warning once."""
+    """Describe the loss for the summary, with a single warning."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}

@@ -13,8 +13,8 @@ from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
-LOSS = 0.05  # of the largest energy, at the end of a run: more gives a warning; WITHIN before
-LEAST = 5e-4  # of the largest energy: smaller losses by contact are not shown
+LOSS = 0.05  # of the largest energy at the end of a run (before: WITHIN), above which it warns
+LEAST = 5e-4  # fraction of the largest energy: smaller losses by contact are not shown
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
@@ -115,7 +115,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Nodal velocities lack unresolved motion.
+    # Nodal velocities lack motion within cells.
     if flip_coefficient(transfer) < 1:
         coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{coefficient}")
@@ -151,8 +151,8 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
         return cause, "finer cells, or a smaller time step"
     if method.frame.moves:
         return (
-            "waves and fronts that the cells do not resolve (the grid does not see velocity "
-            "differences within a cell)",
+            "waves and fronts that the cells do not resolve (velocity differences within a cell "
+            "are lost)",
             "finer cells, TPIC or APIC, or method tlmpm for a solid",
         )
     return "waves that the cells do not resolve", "finer cells"

@@ -1,4 +1,4 @@
-"""Troubles of a run: what went wrong, the likely cause and the fix."""
+"""Failures of a run: message, likely cause and fix."""
 
 import numpy as np
 
@@ -119,7 +119,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
         f"than a millionth of the first: {named(hub, fastest)} moves at {speed:.3g}, "
         f"{named(hub, widest)} has {volume:.3g} x its initial volume ({when(simulation)})"
     )
-    fix = f"look at earlier dumps for what went wrong before; {_smaller_step(hub, simulation)}"
+    fix = f"look for the first error in earlier dumps; {_smaller_step(hub, simulation)}"
     return Trouble(message, fix, "step-collapsed")
 
 
@@ -142,10 +142,10 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
 def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
     wrong = [one for one in simulation.points.seen(_first_wrong) if one is not None]
     if not wrong and hub.update.thermal:
-        hint = "check fixes that act on heat: a formula that gives NaN, or heat without bounds"
+        hint = "check fixes that act on heat: a formula that gives NaN, or unbounded heat"
         return no_number(simulation, "the temperature of a point is not a number", hint)
     if not wrong:
-        return Trouble("a point went wrong", "a smaller time step", "point")
+        return Trouble("a point failed", "a smaller time step", "point")
     number, old, position, v, grid = min(wrong, key=lambda one: one[0])
     d, h, name = hub.domain.dimension, hub.lattices[grid].h, named(hub, number)
     old, new = old[:d], position[:d]
@@ -179,7 +179,7 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
             f"{name} leaves the domain at {where(new)} (through {'xyz'[side]} = "
             f"{lo[side] if new[side] < lo[side] else hi[side]:g})",
             "a larger domain, fix velocity_nodes at the wall, or boundary(delete); if the point "
-            f"should not have got there, {smaller}{keep}",
+            f"should not be there, {smaller}{keep}",
             "left-domain",
             f"point separated from its solid: numerical fracture ({APART})" if loose else "",
         )

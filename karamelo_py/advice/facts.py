@@ -20,7 +20,7 @@ from karamelo_py.points.laws import law_parts
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
-PIC = 0.21  # viscosity over (1 - alpha) h^2/dt of velocities taken from the grid
+PIC = 0.21  # numerical viscosity of the PIC part over (1 - alpha) h^2/dt
 TURN = 0.3  # radians beyond which a scene counts as rotating
 SEQ = methodcaller("particle", "seq")
 
@@ -85,13 +85,13 @@ class SceneFacts(BasicFacts):
 
     @property
     def locks(self) -> bool:
-        """Return True if linear cells contain several points, so that isochoric flow locks."""
+        """Return True if linear cells contain several points, so isochoric flow locks."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
     @property
     def grid_viscosity(self) -> float:
-        """Kinematic viscosity of velocities taken from the grid, `PIC` (1 - alpha) h^2/dt."""
+        """Kinematic numerical viscosity of the PIC part, `PIC` (1 - alpha) h^2/dt."""
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
@@ -164,7 +164,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def falls(self) -> float:
-        """Duration over sqrt(L/g), in which a solid falls by its size."""
+        """Duration over sqrt(L/g), the time in which a solid falls by its size."""
         sizes = [np.maximum(motion.high - motion.low, 1e-300) for motion in self.motions]
         rates = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(rate.max()) for rate in rates), default=0.0)

@@ -28,12 +28,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Mark, ScriptError
 
-PEEK = 100  # steps: shorter runs only inspect a scene
+PEEK = 100  # steps; shorter runs only inspect a scene
 ENDLESS = 1e8
-MIXED = 300  # step over the stable one; above, wrong units are likelier
-DENSITIES = 10.0, 1e5  # kg/m^3: foams to beyond osmium; gases excluded
+MIXED = 300  # step over the stable step, above which wrong units are likelier
+DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases excluded
 IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
-SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to beyond diamond
+SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to above diamond
 REST = "a scene at rest"
 UNITS = (
     "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
@@ -51,7 +51,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return True if nothing can move; plug-ins may do anything."""
+    """Return True if nothing can move. Plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -83,8 +83,8 @@ def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None
         why, hint = "", "a larger step with set_dt, or an earlier end"
     elif simulation.ruling_limit == "conduction":
         why = (
-            f"heat goes through cells of {hub.domain.h:g} that fast. The units of conductivities, "
-            "heat capacities, lengths and times may be mixed"
+            f"conduction through cells of {hub.domain.h:g} needs such steps. The units of "
+            "conductivities, heat capacities, lengths and times may be mixed"
         )
         hint = "an earlier end, or larger cells; in m, kg, s, K copper has kappa = 401, cp = 385"
     hub.warn(f"{about} {end_time:.6g}" + (f": {why}" if why else ""), hint=hint, code="many-steps")
@@ -157,7 +157,7 @@ def warn_about_steps(
             words += step_size.what_follows(simulation, asked)
             if step.fixed_dt and asked > MIXED * stable:
                 words += f"; {mixed_units(hub, simulation)}"
-                hint = f"{UNITS}. If they are as they should be, {hint}"
+                hint = f"{UNITS}. If they are correct, {hint}"
         if hub.update.first_time(name) or (again and step is present):
             hub.warn(words, mark=step.mark, hint=hint, code="step-above-limit")
     hub.later.clear()
@@ -210,7 +210,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     one_step = 0 < scene.duration <= simulation.dt * (1 + 1e-9) and isfinite(simulation.steps.limit)
     if one_step and simulation.ruling_limit == "end" and hub.update.first_time("one step"):
         limit = simulation.steps.limit
-        words = f"one step covers the whole run, where one of {limit:.3g} is stable"
+        words = f"one step covers the whole run, but the stable step is {limit:.3g}"
         hub.warn(f"{words}; {mixed_units(hub, simulation)}", hint=UNITS, code="one-step")
     if scene.waves > 0 and step_size.blows_up(simulation):
         scene.duration = 0.0
@@ -251,11 +251,11 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
             loads.append(fix)
     if loads and not moves and hub.update.first_time("loads at once"):
         hub.warn(
-            f"fix {loads[0].style} '{loads[0].id}' does not depend on time: all of its load acts "
-            "in the first load step, and nothing changes it in the others",
+            f"fix {loads[0].style} '{loads[0].id}' does not depend on time: its full load acts "
+            "in the first load step and does not change in later steps",
             mark=loads[0].mark,
-            hint="a formula of time, which each load step adds set_dt or 1 to: times time/40 in "
-            "run(40); or run(1)",
+            hint="a formula of time, which grows by set_dt or 1 per load step: multiply by "
+            "time/40 in run(40); or use run(1)",
             code="loads-at-once",
         )
 
@@ -290,9 +290,9 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 def _warn_about_precision(s: SceneFacts) -> None:
     """Warn if single precision cannot resolve the motion in a step.
 
-    The cell size matters too: a block that falls at 50 000 cells from the origin errs by 3.5 % of
-    its path, and at 200 000 it does not move. ScriptError if positions have a spacing of 1/500 cell
-    or more.
+    The cell size matters too: a block that falls at 50 000 cells from the origin has an error of
+    3.5 % of its path, and at 200 000 cells it does not move. ScriptError if positions have a
+    spacing of 1/500 cell or more.
     """
     if s.hub.settings.precision != "single":
         return

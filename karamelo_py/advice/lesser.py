@@ -1,4 +1,4 @@
-"""Suggestions of `check`: scenes that would do with fewer dimensions, or with half of the body."""
+"""Suggestions of `check`: scenes for which fewer dimensions, or half of the body, suffice."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -31,7 +31,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 
 def _given(fix: Fix) -> tuple:
-    """Return the formulas; NaN without any, because the fix may do anything."""
+    """Return the formulas; NaN if there are none, because the effect of the fix is unknown."""
     return tuple(fix.formulas) or (np.nan,) * 3
 
 
@@ -75,13 +75,14 @@ def _flat(hub: Hub) -> Words:
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, k, rest) else NO_LAYERS
         if layers and not _faces_held(hub, k, *faces):
             continue
-        # A radial scene costs as much per point: two layers are no waste.
+        # A radial scene costs as much per point: two layers waste nothing.
         if layers > (2 if round_ else 0) and _acts_alike(hub, rest):
             ends = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
             axes = " and ".join(AXES[axis] for axis in rest)
             renamed = "" if k == d - 1 else f", with {axes} called {' and '.join(AXES[: d - 1])}"
             yield (
-                f"all solids are the same along {AXES[k]}, in which nothing moves: {layers} times "
+                f"all solids are uniform along {AXES[k]}, and nothing moves in this direction: "
+                f"{layers} times "
                 f"the points of {'plane strain' if d == 3 else 'a line'}, which has the forces and "
                 f"energies of a {whole} of 1",
                 f"dimension({d - 1}, {', '.join(ends)}, {domain.h:g}){renamed}"
@@ -116,7 +117,7 @@ def _thin(hub: Hub) -> Words:
 
 
 def _is_led(hub: Hub, k: int) -> bool:
-    """Return True if some fix prescribes velocities along k."""
+    """Return True if a fix prescribes velocities along k."""
     led = (fix.formulas for fix in hub.fixes.values() if fix.prescribes_velocity)
     return any(len(formulas) <= k or formulas[k] is not None for formulas in led)
 
@@ -234,8 +235,8 @@ def _mirrored(hub: Hub) -> Words:
             _alike(hub, fix, sides) for fix in _acting(hub)
         ):
             yield (
-                f"the scene is the same on both sides of {AXES[k]} = {middle:g}: twice the points "
-                "(unless it is to buckle or to break unevenly); energies are halved, and bases "
+                f"the scene is symmetric about {AXES[k]} = {middle:g}: twice the points (unless "
+                "it may buckle or break unevenly); energies are halved, and bases "
                 "wider than linear change results by some per cent on coarse grids",
                 f"half of it, and the nodes at {AXES[k]} = {middle:g} held in {AXES[k]}",
             )

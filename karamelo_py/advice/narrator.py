@@ -1,4 +1,4 @@
-"""Texts about a run: banner, warnings, troubles, closing table."""
+"""Texts about a run: banner, warnings, errors, summary."""
 
 from math import inf
 from typing import Any
@@ -66,7 +66,7 @@ class Narrator(Listener):
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         hub, why = self.hub, unknown_work(self.hub)
-        # Of the first state: a failed one has no meaningful limit.
+        # The limit of the first state; that of a failed one is meaningless.
         if simulation.steps.too_large:
             self.smaller = self.smaller or own_step_instead(simulation)
         facts: dict[str, Any] = {
@@ -103,7 +103,7 @@ class Narrator(Listener):
             facts["energy_unwatched"], shown["energy"] = why, f"is {energy.not_watched(why)}"
         hub.record.begin(facts)
         if facts["processes"] > 1:
-            alone = f", one has all points: up to {DIRECT_UP_TO} are not shared out"
+            alone = f", one has all points: up to {DIRECT_UP_TO} are not distributed"
             shown["processes"] = f"{facts['processes']}{alone * simulation.tiles.direct}"
         shown["gpu"] = hub.settings.card and hub.settings.card.name
         shown |= {name: facts[name] for name in ("threads", "precision")}
@@ -124,8 +124,8 @@ class Narrator(Listener):
         if update.boundary == "reflect" and not update.warned_of_bounces and simulation.bounces:
             update.warned_of_bounces = True
             hub.warn(
-                f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected at "
-                "the edge of the domain; more are only counted",
+                f"by step {simulation.step}, time {simulation.time:.6g}, points were reflected "
+                "at the edge of the domain; further ones are only counted",
                 mark=update.boundary_mark,
             )
 

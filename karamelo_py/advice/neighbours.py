@@ -37,7 +37,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe a slender elastic body, one row of points, that its weight bends; else None."""
+    """Describe a slender elastic body, one row of points, that bends by its weight; or None."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
@@ -110,7 +110,7 @@ def uneven(facts: BasicFacts) -> Uneven:
 
 
 def _touch(motion: BodyMotion, boxes: BodyBoxes, h: float, duration: float) -> np.ndarray:
-    """Mask (n,) of bodies that touch one within `duration`."""
+    """Mask (n,) of bodies that touch a given one within `duration`."""
     touching = (np.maximum(motion.low - boxes.high, boxes.low - motion.high) < h).all(axis=1)
     # Mirrored: bodies at the back are ahead.
     mirrored = motion._replace(

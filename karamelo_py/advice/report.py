@@ -105,7 +105,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
     say(f"               {_size(sum(memory) + program + LOADED)} with the program itself")
     if (machine := machine_memory.machine_memory()) is not None:
         free = _size(machine.free)
-        say(f"               {free} are free on this machine, not counting what check has taken")
+        say(f"               {free} are free on this machine, without the memory of this check")
     if hub.settings.card:
         _say_of_gpu(say, simulation)
     if hub.settings.ranks > 1:

@@ -1,9 +1,9 @@
 """Displacement of soft elastic bodies by a weight that acts from the first step.
 
-A body that vibrates under a sudden load crosses cells of a linear basis repeatedly, loses stress
-and sinks further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24
-cells (FLIP 0.9; cpgimp and splines within 7 %; a load that grows over 7 periods 1 and 3 % at 0.26
-and 0.32 cells). Reactions are right.
+Points of a body that vibrates under a sudden load cross cells repeatedly. With a linear basis the
+body loses stress and sinks further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26,
+0.32, 0.64 and 1.24 cells (FLIP 0.9). With a load that grows over 7 periods it is 1 and 3 % at 0.26
+and 0.32 cells, with cpgimp and splines at most 7 %. Reactions are correct.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.script.expressions import Expression
 
-CELLS = 0.25  # displacement: below, hardly a point crosses a cell
+CELLS = 0.25  # displacement in cells, below which hardly any point crosses a cell
 
 
 class Settling(NamedTuple):

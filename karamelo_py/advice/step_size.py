@@ -7,7 +7,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-LOST = 2.05  # times the stable step: every run above it failed
+LOST = 2.05  # times the stable step, above which every run failed
 EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 
 
@@ -55,7 +55,7 @@ def own_step_instead_of(simulation: Simulation) -> float | None:
 
 def words_of_own_step(simulation: Simulation, step: float) -> str:
     after = own_step(simulation, still=False)
-    far = f", {after:.6g} once points have gone a quarter of a cell"
+    far = f", {after:.6g} once points have moved a quarter of a cell"
     return f"{step:.6g}" + (far if after < step else "")
 
 
@@ -98,7 +98,7 @@ def words_of_share(simulation: Simulation) -> str:
         words = f"{DEFAULT_SHARE if of_heat else float(step.dt_factor):g} of the stable step, "
         words += "the program's own"
         after = step_after_motion(simulation)
-        far = f"; {after:.2g} of that once points have gone a quarter of a cell"
+        far = f"; {after:.2g} of that once points have moved a quarter of a cell"
         return words if after == 1 else words + far
     else:
         fraction = asked

@@ -19,7 +19,7 @@ Words = Iterator[tuple[str, str]]
 # Core seconds (Intel Xeon): a point per step (linear), log line, picture, first picture, file of
 # points, number in it.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
-WORTHWHILE = 10.0  # seconds of output worth a suggestion
+WORTHWHILE = 10.0  # seconds of output that deserve a suggestion
 
 
 def seconds_of_step(hub: Hub, count: int) -> float:
@@ -43,8 +43,8 @@ def _unread(hub: Hub, simulation: Simulation) -> Words:
             names = [f"{ID}_{suffix}" if suffix else ID for suffix in item.published]
             if measures and "(" not in ID and names and hub.asked.isdisjoint(names):
                 yield (
-                    f"{catalogue.kind} {ID} ({item.style}) is measured at each output and shown "
-                    "nowhere",
+                    f"{catalogue.kind} {ID} ({item.style}) is measured at each output but never "
+                    "shown",
                     f"leave it out, or name {names[0]} in log_modify",
                 )
 
@@ -72,6 +72,6 @@ def _output(hub: Hub, simulation: Simulation) -> Words:
             f"output takes some {output:.1g} s of a core, and the steps {stepping:.1g} s: "
             f"{plural(lines, 'line')} of the log, {plural(tables, 'table')} of points, "
             f"{plural(round(pictures), 'picture')}",
-            "less often, or none of it where a study runs the scene many times (errors over the "
-            "history are those at outputs)",
+            "less often, or none if a study runs the scene many times (errors over the history "
+            "are sampled at outputs)",
         )

@@ -143,9 +143,9 @@ def boundary(
 
     In a periodic direction the domain repeats endlessly: points that leave at one end enter at the
     other, and bodies at both ends touch. Its length is a multiple of the cell size. Formulas of
-    nodes should be equal a period apart. Points return to the domain every 10 steps; until then,
-    dumps may show them outside. It needs method ulmpm with linear or splines, scheme musl, any
-    transfer but XPIC, and one process without a GPU. It refuses the other styles of boundary,
+    nodes should be periodic. Points return to the domain every 10 steps; until then, dumps may show
+    them outside. It needs method ulmpm with a linear basis or splines, scheme musl, any transfer
+    except XPIC, and one process without a GPU. It refuses the other styles of boundary,
     axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
 
     In a sheared cell, start with fix initial_velocity_particles of the mean velocity `shear` y.
@@ -189,7 +189,7 @@ def set_periodic(hub: Hub, directions: list[int], shear: float) -> None:
             )
     if hub.solids:
         raise ScriptError(
-            "the solids are there already",
+            "the scene already has solids",
             argument="style",
             expected="boundary(periodic, ...) after dimension and before the first solid",
             code="too-late",
@@ -242,7 +242,7 @@ def _refuse_second(hub: Hub) -> None:
             code="too-late",
         )
     expected = "one dimension(...) or create_domain(...) in a scene"
-    raise ScriptError("the domain is set already", expected=expected, code="too-late")
+    raise ScriptError("the domain is already set", expected=expected, code="too-late")
 
 
 def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) -> Domain:
@@ -286,8 +286,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
     arguments
         For ``region``: ``regionID, ppc, material, h[, T0]``: the region to fill, the points per
         cell in each direction, the material, the cell size, the initial temperature (default: the
-        material's). For ``mesh``: ``file, material, h[, T0]``. For others see the page of the
-        style.
+        material's). For ``mesh``: ``file, material, h[, T0]``. For other styles see their pages.
 
     Example
     -------
@@ -367,7 +366,7 @@ def group(
     nodes also gets nodes of the separate grids of later solids, unless `solids` are named. The
     group ``all`` always exists.
 
-    A set of faces, edges or nodes of a mesh selects what is nearer to it than half a cell.
+    A set of faces, edges or nodes of a mesh selects members within half a cell of it.
 
     Parameters
     ----------

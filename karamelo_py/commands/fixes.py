@@ -100,7 +100,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
         target = registry.called(kind, ID, style)
     if ID in others and set(others[ID].published) & set(target.published):
         message = f"'{ID}' is a {others.kind} already (line {others[ID].mark.line})"
-        expected = f"another ID: {ID}_x and the like would mean two things"
+        expected = f"another ID: {ID}_x and similar names would be ambiguous"
         raise ScriptError(message, argument="ID", expected=expected)
     catalogue.refuse_unnameable(ID)
     _check_names(hub, kind, ID, target)
@@ -208,9 +208,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Of nodes: the sum of the forces from the points, by stress and by fixes on points (contact,
-    tools, tractions). At held nodes with little acceleration it is minus the reaction. Of points:
-    the rate of change of their momentum in the last step, sum m a. It is 0 before the first step.
+    For nodes it is the sum of the forces from the points, by stress and by fixes on
+    points (contact, tools, tractions). At held nodes with little acceleration it is minus the
+    reaction. For points it is the rate of change of their momentum in the last step, sum m a. It is
+    0 before the first step.
 
     See Also
     --------
@@ -241,9 +242,10 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    Of nodes: by fixes on nodes, such as body_force and force_nodes. Of points: by fixes on points
-    (contact, tools, tractions). Forces that prescribe a velocity are omitted; their fixes publish
-    reactions. It is 0 before the first step. Karamelo returns the internal force instead.
+    For nodes these are fixes on nodes, such as body_force and force_nodes; for points,
+    fixes on points (contact, tools, tractions). Forces that prescribe a velocity are omitted; their
+    fixes publish reactions. It is 0 before the first step. Karamelo returns the internal force
+    instead.
 
     See Also
     --------

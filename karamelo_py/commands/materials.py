@@ -105,7 +105,7 @@ damage = _part(
 )
 temperature = _part(
     "temperature",
-    "Define a temperature: how a material heats, and what heat does to its pressure.",
+    "Define a temperature: how a material heats, and how temperature changes its pressure.",
     "temperature(warm, plastic_work, 0.9, 385, 0, 0, 298, 1356)",
     "strength, damage",
 )
@@ -147,7 +147,7 @@ def load_path(
     increments
         Number of increments.
     exx, eyy, ezz, exy, exz, eyz
-        Strain, summed over the increments: ln(length/initial length) if these are many. Shear
+        Strain, summed over the increments: ln(length/initial length) for many increments. Shear
         strains are tensor components, half the shear angle.
     gxy, gxz, gyz
         Angle of simple shear, twice the tensor strain. gxy is a displacement in x that grows with
@@ -256,8 +256,8 @@ def element(
     published as ID_exx, ID_sxx and so on.
 
     The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. For a rotation,
-    dt grad v is skew to first order. Laws in rate form and laws in F differ on its second-order
-    part: the program takes the one that stores the least energy. Prescribed stresses are found by
+    dt grad v is skew to first order. Laws in rate form and laws in F need different second-order
+    parts: the program takes the one that stores the least energy. Prescribed stresses are found by
     Newton's method with the exact tangent. An increment that does not converge is halved, up to
     eight times. If that fails, the files show the increments before it.
 

@@ -63,10 +63,10 @@ def method(
 
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
-    a temperature), also between bodies with common nodes. Only fixes add or remove
-    other heat. Points take temperature increments (FLIP, for any velocity transfer), so only
-    conduction smears temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho
-    cp/kappa in d dimensions. If ``mechanical``, points are heated only by their own work.
+    a temperature), also between bodies with common nodes. Only fixes add or remove other heat.
+    Points take temperature increments (FLIP, for any velocity transfer), so only conduction smooths
+    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
+    dimensions. If ``mechanical``, points are heated only by their own work.
 
     See Also
     --------
@@ -152,11 +152,11 @@ def scheme(
 
     Notes
     -----
-    Explicit positions belong to the end of a step, velocities to its middle. With ``full`` the
-    initial velocity belongs to half a step before the start: a projectile is g dt t/2 too far, and
-    logged velocities and kinetic energies are half a step early. With ``half`` both are
-    second-order accurate in the step, and points also store their previous velocity. Velocities set
-    later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
+    Explicit positions belong to the end of a step, velocities to its middle. With
+    ``full`` the initial velocity is the velocity half a step before the start: a projectile is g dt
+    t/2 too far, and logged velocities and kinetic energies are half a step early. With ``half``
+    both are second-order accurate in the step, and points also store their previous velocity.
+    Velocities set later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -186,7 +186,6 @@ def scheme(
         )
     update.scheme, update.scheme_mark, update.scheme_behind = chosen, hub.mark, runs
     for name in PUBLISHED:
-        # Values of earlier steps do not apply to an explicit scheme.
         if name in hub.values or chosen.traits.implicit:
             hub.values.publish(name)
 
@@ -232,7 +231,7 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
     fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
     sin(psi))). With the point's pressure alone, non-dilatant sand would lose half of its strength.
-    Load steps do use it alone: do not average such sand there.
+    Load steps use the point's pressure alone, so do not average such sand there.
 
     See Also
     --------
@@ -327,8 +326,7 @@ class _Call:
         if not fit:
             raise ScriptError(
                 f"method {kind} has no domains for {self.dimension} dimension",
-                hint=f"{self.instead(kind='ulmpm', basis='cpgimp')}: in one dimension that is the "
-                "same thing",
+                hint=f"{self.instead(kind='ulmpm', basis='cpgimp')}, which is the same in 1D",
             )
         shapes = {shape: a for a in self.options if (shape := _word(a, self.shapes))}
         for shape in (shape for shape in shapes if shape not in fit):

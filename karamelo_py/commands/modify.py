@@ -40,8 +40,8 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     a law of the total deformation it changes at once. The density (points have masses) and
     constants of the initial state, such as pc of cam-clay, cannot be changed.
 
-    With ``material``, it also changes constants of the parts of eos-strength, if only one part has
-    that name.
+    With ``material``, the command also changes constants of the parts of eos-strength, if only one
+    part has a constant of that name.
 
     See Also
     --------
@@ -130,12 +130,12 @@ def _check(hub: Hub, before: Material, after: Material, numbers: tuple[Argument,
             )
         kin = Space()
         if law_kind(after.law) != law_kind(before.law):
-            message = f"{names} would give the points of material '{after.id}' another law"
+            message = f"{names} would change the law of the points of material '{after.id}'"
             raise ScriptError(message, mark=numbers[0].mark, expected="numbers of the same law")
         if initial_state(after.law, kin, 1.0) != initial_state(before.law, kin, 1.0):
             raise ScriptError(
-                f"the state of the points of material '{after.id}' began from {names}, which "
-                "cannot change any more",
+                f"the initial state of the points of material '{after.id}' depends on {names}, "
+                "which can no longer change",
                 mark=numbers[0].mark,
                 expected="the number before the first solid of the material",
                 code="too-late",

@@ -126,7 +126,7 @@ def set_output(
     hub.output.log.every = every
     if form == "csv" and hub.output.log.file.suffix != ".csv":
         if hub.begun:
-            message = "the form of the log cannot change after the first run"
+            message = "the format of the log cannot change after the first run"
             expected = "set_output(..., csv) before the first run"
             raise ScriptError(message, argument="form", expected=expected, code="too-late")
         hub.output.log.file = hub.output.log.file.with_suffix(".csv")

@@ -142,7 +142,7 @@ def translate_particles(
     """
     formulas = per_direction(hub, "d", shift)
     if hub.has_run:
-        message = "the points have been in a run, which they would not have come out of"
+        message = "the points have already been in a run"
         expected = "translate_particles before the first run"
         hint = "fix(ID, velocity_particles, ...) moves points in a run"
         raise ScriptError(message, argument="solids", expected=expected, hint=hint, code="too-late")
@@ -281,7 +281,7 @@ def _polar(values: dict, places: dict) -> Placement:
 
 def _count(value: float, name: str, mark) -> int:
     if math.isnan(value):
-        return 1  # a result that a rehearsal does not have
+        return 1  # a rehearsal lacks the result
     if value < 1 or value != math.floor(value):
         raise ScriptError(f"{name} must be a whole number of at least 1, not {value:g}", mark=mark)
     return int(value)

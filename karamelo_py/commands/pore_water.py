@@ -10,7 +10,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9  # porosities
-HEAVIEST = 3.2  # density of grains over the density of water: soils have 2.6 to 2.8, saturated 3.5
+HEAVIEST = 3.2  # density of grains over the density of water: 2.6 to 2.8 in soils, 3.5 if saturated
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -74,14 +74,14 @@ def pore_water(
 
     The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
     and never shortens it. With N cells over a drainage path of length L, consolidation to Tv = 1
-    takes about 2 N L c/c_v steps, too many at 1e-9 m/s: take scheme(quasi-static), whose load steps
-    last as long as the consolidation, or multiply the densities by a factor, as inputs/in.terzaghi
+    takes about 2 N L c/c_v steps, too many at 1e-9 m/s. Use scheme(quasi-static) then, whose load
+    steps follow the consolidation, or multiply the densities by a factor, as inputs/in.terzaghi
     does.
 
     Use the command before the solid of the material. It needs method ulmpm or tlmpm with FLIP or
-    PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and bodies of 1D,
-    plane strain or 3D on one process without a GPU. With ulmpm and linear, strains above 10 % are
-    less accurate.
+    PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a scene in
+    1D, plane strain or 3D on one process without a GPU. With ulmpm and linear, strains above 10 %
+    are less accurate.
 
     See Also
     --------

@@ -33,9 +33,9 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
     and fix angular_velocity_nodes holds and rotates nodes. Columns of points: ``vtheta``, this
     velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the
-    one about the axis, which steps conserve to round-off, as ID_y. Needs ulmpm or tlmpm on one
-    process and no GPU, an explicit scheme, no rigid solids, and neither contact between solids nor
-    fixes velocity_nodes with bounds or friction.
+    angular momentum about the axis as ID_y; steps conserve it to round-off. Needs ulmpm or tlmpm on
+    one process and no GPU, an explicit scheme, no rigid solids, and neither contact between solids
+    nor fixes velocity_nodes with bounds or friction.
 
     See Also
     --------
@@ -117,7 +117,7 @@ def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) ->
         expected = f"{domain.kin.word}(false) first, or no {name}(true)"
         raise ScriptError(message, argument="active", expected=expected)
     if hub.solids and active != same:
-        message, expected = "the points of solids are made already", "before the first solid"
+        message, expected = "the solids already have points", "before the first solid"
         expected = f"{name}({str(active).lower()}) {expected}"
         raise ScriptError(message, argument="active", expected=expected, code="too-late")
     if active != same:

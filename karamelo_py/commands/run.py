@@ -30,8 +30,8 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 def carry_out(hub: Hub, **length: Any) -> None:
     """Run for `length` (see `RunLoop`), or do what replaces the run.
 
-    A rehearsal notes the run, a `Pause` stops before it, and ``check`` reports instead. A run that
-    was over in the restart file of a resumed script is skipped.
+    A rehearsal records the run, a `Pause` stops before it, and ``check`` reports instead. Runs that
+    were complete in the restart file of a resumed script are skipped.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
@@ -274,7 +274,7 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and values that the script has read. A run killed while writing leaves the previous file.
     The last state of each run is written too. A failed run writes last_good.<step>.h5 instead: if
-    its energy has grown, the last state before the growth, to within ten steps; if its step was
+    its energy has grown, the last state before the growth, accurate to ten steps; if its step was
     above the stable limit from the start, the state before the first step. There is no such file
     with boundary(delete), or if the run was resumed from a file at that step.
 

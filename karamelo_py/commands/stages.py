@@ -1,4 +1,4 @@
-"""Commands for the stages of a job: points that are absent for a time."""
+"""Commands for construction stages: points that are inactive for a time."""
 
 import numpy as np
 
@@ -11,12 +11,12 @@ from karamelo_py.script.errors import ScriptError, plural, render_message
 
 
 def deactivate(hub: Hub, group: ParticleGroup) -> None:
-    """Take points out of a scene: an excavation, or fill that comes later.
+    """Remove points from a scene: an excavation, or fill that is placed later.
 
     Parameters
     ----------
     group
-        Group of points. They have no mass, no stress and no place until they are activated.
+        Group of points. They have no mass, stress or position until they are activated.
 
     Example
     -------
@@ -25,8 +25,8 @@ def deactivate(hub: Hub, group: ParticleGroup) -> None:
 
     Notes
     -----
-    Before the first run or between runs. Output, groups and fixes then lack the points; their
-    numbers do not change. Between runs, their mass and energy are printed, and the energy balance
+    Before the first run or between runs. Output, groups and fixes then omit the points;
+    ids do not change. Between runs, their mass and energy are printed, and the energy balance
     counts the energy as work.
 
     See Also
@@ -50,7 +50,7 @@ def deactivate(hub: Hub, group: ParticleGroup) -> None:
 
 
 def activate(hub: Hub, group: ParticleGroup) -> None:
-    """Put deactivated points into a scene: fill, a lift of a dam, a strut.
+    """Insert deactivated points into a scene: fill, a lift of a dam, a strut.
 
     Parameters
     ----------
@@ -65,10 +65,9 @@ def activate(hub: Hub, group: ParticleGroup) -> None:
 
     Notes
     -----
-    The points come in at their first places, at rest, without stress, with the mass, the
-    temperature and the state of their material at the start. For stress in them, define a fix
-    initial_stress or geostatic_stress of the group afterwards. A warning says if other points are
-    where they go.
+    The points enter at their initial positions, at rest, without stress, with their
+    initial mass, temperature and state. To give them a stress, define a fix initial_stress or
+    geostatic_stress of the group afterwards. A warning reports other points at these positions.
 
     See Also
     --------
@@ -92,8 +91,8 @@ def activate(hub: Hub, group: ParticleGroup) -> None:
     hit = hub.fields.near(places_before(hub, ids), 0.9 * halves)
     if len(hit):
         hub.warn(
-            f"{plural(len(hit), 'point')} are where points of group '{group.id}' come in, such as "
-            f"{named(hub, int(hit[0]))}: there is twice the mass",
+            f"{plural(len(hit), 'point')} are at positions where points of group '{group.id}' "
+            f"enter, such as {named(hub, int(hit[0]))}: the mass there doubles",
             hint="deactivate them before, or activate points above them",
         )
     energy = simulation.insert(ids)
@@ -113,7 +112,7 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """Return True in a rehearsal or replay, whose state is another one."""
+    """Return True in a rehearsal or replay, whose state differs."""
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

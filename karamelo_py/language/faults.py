@@ -46,7 +46,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
     package = f" (of {origin})" if origin else ""
     hint = f"tell the author of {style}{more}"
     if origin.startswith("the module "):
-        hint = f"mend it in {origin.removeprefix('the ')}{more}"
+        hint = f"correct it in {origin.removeprefix('the ')}{more}"
     error = ScriptError(f"{name}{package}: {message}", mark=mark, hint=hint, code="plug-in")
     error.complete = True
     return error

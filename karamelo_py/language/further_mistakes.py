@@ -1,6 +1,6 @@
 """Find further, independent mistakes of a script after the first.
 
-Statements that use what a wrong or skipped statement would have defined are skipped; command and
+Statements that depend on a wrong or skipped one are skipped; command and
 style names are still checked.
 """
 
@@ -99,7 +99,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     def follows(error: ScriptError) -> bool:
         if error.code == "unknown-ID":
-            # The second of two equal IDs was a slip, and other programs use other names.
+            # A repeated ID was a slip; other programs use other names.
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
             return error.kind in twice | dependents.kinds
         if error.code == "already-used":

@@ -158,7 +158,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # At a run, the rest has been rehearsed.
+            # At a run, the rest has already been rehearsed.
             if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -216,7 +216,7 @@ class Interpreter:
             error.complete = True
             raise
         except RecursionError:
-            message, hint = "this is nested too deeply", "use more names"
+            message, hint = "the expression is nested too deeply", "use more names"
             raise ScriptError(message, mark=statement.mark, hint=hint, code="syntax") from None
 
     def _execute_recorded(self, statement: syntax.Statement) -> None:
@@ -234,7 +234,7 @@ class Interpreter:
         last = replay.at_end
         self._execute(statement)
         if last and self.replay is replay:
-            raise replay.other_script("there a run stood here", statement.mark)
+            raise replay.other_script("there a run was here", statement.mark)
 
     def _including(self, depth: int) -> list[Mark]:
         frames = self.frames[:depth]
@@ -254,7 +254,7 @@ class Interpreter:
         equal = node if isinstance(node, syntax.BinaryOperation) and node.operator == "==" else None
         if equal and isinstance(left := equal.left, syntax.Name):
             right = statement.raw.code[equal.right.start : equal.right.end]
-            message = "this compares and does nothing with the result"
+            message = "the result of this comparison is not used"
             hint = f"an assignment has one =: {left.name} = {right}"
             raise ScriptError(message, mark=statement.mark, hint=hint)
         self.evaluate(node, statement.raw)
@@ -265,7 +265,7 @@ class Interpreter:
         if name in self.presets:
             return self.presets.stand_for(statement)
         if name not in self.variables:
-            means = "from here on it means the variable that is assigned here"
+            means = "from here on it means this variable"
             if name in FUNCTIONS or registry.knows("command", name):
                 kind = "function" if name in FUNCTIONS else "command"
                 message = f"'{name}' is a {kind}, too; {means}, and the {kind} cannot be called"

@@ -206,7 +206,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
         if NUMBER.fullmatch(word):
             raise Unfit(f"the number {word}", hint=f"begin it with a letter, such as n{word}")
         if re.search(r"[(),=]", word):
-            raise Unfit(word, hint="a word with such signs needs quotes")
+            raise Unfit(word, hint="a word with such characters needs quotes")
     if not word:
         raise Unfit("an empty text")
     return word

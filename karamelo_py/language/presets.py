@@ -22,12 +22,12 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
         self._script = script
-        # Texts that may have to be numbers, and mistakes blamed on them.
+        # Texts that may have to be numbers, and the mistakes that they cause.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
         # Presets on which each variable depends.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
-        if isinstance(texts, Presets):  # of the script that this one copies
+        if isinstance(texts, Presets):  # of the script being copied
             vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -88,7 +88,7 @@ class Presets(dict[str, str]):
             if re.search(rf"\b{name}\b", statement.spelled()):
                 self.blamed.add(name)
                 text = f"-var {name} {self[name]} is a text"
-                error.hint = f"{text}, and the script has a number, as in -var {name} {number}"
+                error.hint = f"{text}, but the script has a number, as in -var {name} {number}"
 
     def refuse_unused(self, statements: list[Statement]) -> None:
         scripts = list(self._scripts(statements, self._script.folder)) if self else [None]

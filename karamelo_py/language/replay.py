@@ -53,14 +53,14 @@ class Replay:
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, mark)
-            error = self.other_script(f"there this statement was {before}", mark)
+            error = self.other_script(f"this statement was {before} there", mark)
             error.hint = self._longer_by(before, text) or error.hint
             raise error
 
     def _was_over(self, run: str, mark: Mark | None) -> ScriptError:
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
         return ScriptError(
-            f"{self.file} was written when this run was over, by {run}",
+            f"{self.file} was written after this run, by {run}",
             mark=mark,
             expected=f"{run} as it was{behind}",
             hint=self._state_alone(),
@@ -85,8 +85,8 @@ class Replay:
         return ScriptError(
             f"{self.file} was written by another script: {message}",
             mark=mark,
-            expected="the script that wrote it; what it says about steps and output, and how long "
-            "the last run is, may change",
+            expected="the script that wrote it; settings of steps and output, and the length of "
+            "the last run, may change",
             hint=self._state_alone(),
         )
 

@@ -1,7 +1,7 @@
 """Declarations of parts: restrictions, known failures, needless costs, causes of energy gain.
 
-A fix, a scheme (in its traits) or a fluid has `Restrictions`: what it does not support. Rules are
-declared next to a basis, transfer, scheme, method, field, law or part of a law, or fix::
+A fix, a scheme (in its traits) or a fluid has `Restrictions`, which list unsupported features.
+Rules are declared next to a basis, transfer, scheme, method, field, law or part of a law, or fix::
 
     known_failure(
         PIC,
@@ -12,8 +12,8 @@ declared next to a basis, transfer, scheme, method, field, law or part of a law,
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
-returns whether the rule applies, or the numbers for its words by name, or a list of these, one per
-message. Braces in words take these numbers and attributes of ``part``, ``scene`` and ``owner`` (of
+returns whether the rule applies, or the numbers in its text by name, or a list of these, one per
+message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (of
 a law or its parts, the material), such as ``{scene.turn:.2g}``. Two names are special: ``mark``,
 the location in the script (default: of the fix, material or method), and ``share``, the size of
 noise over the tolerable amount.
@@ -45,18 +45,18 @@ class Feature(NamedTuple):
 
 
 class Restrictions(NamedTuple):
-    """Restrictions of a capability. What they do not mention is supported.
+    """Restrictions of a capability. Anything that they do not mention is supported.
 
     Parameters
     ----------
     option
-        Kind of the capability in the restrictions of others.
+        Kind of the capability in the restrictions of other capabilities.
     instead
         How to do without it.
     only
         Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
     without, but
-        Options that are not supported; and those to replace otherwise than by their ``instead``.
+        Unsupported options, and those with another replacement than their ``instead``.
     """
 
     option: str
@@ -82,7 +82,7 @@ class Restrictions(NamedTuple):
 
 
 def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:
-    """Refuse what the declarations exclude, each pair once, all in one message."""
+    """Refuse excluded combinations, each pair once, in one message."""
     errors: dict[frozenset[str], ScriptError] = {}
     features = [*features, *declared]
     for subject, restrictions in declared.items():

@@ -1,7 +1,7 @@
 """Signatures define syntax: they convert script arguments to a Python call, and give help.
 
 Commands are functions and styles are classes. The first parameter is the hub; annotations of the
-others define the arguments::
+remaining ones define the arguments::
 
     class Gravity(Fix):
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
@@ -51,7 +51,7 @@ FORMS: dict[Callable, dict[str | None, Callable]] = {}
 def parameters(target: Any) -> list[Parameter]:
     """Return the parameters of a command or style, without the hub.
 
-    TypeError for an unsupported signature, a fault of its author.
+    Raises TypeError for an unsupported signature.
     """
     record = is_record(target)
     try:
@@ -129,8 +129,8 @@ def call(
             file = f"{error.filename}: " if error.filename else ""
             raise ScriptError(f"{file}{error.strerror or error}", code="file") from error
         except OverflowError as error:
-            message = "a number is too large for what is done with it"
-            raise ScriptError(message, expected="numbers in proportion to each other") from error
+            message = "a number is too large for this calculation"
+            raise ScriptError(message, expected="numbers of compatible magnitude") from error
         except MemoryError as error:
             message = "there is not enough memory for this"
             raise ScriptError(message, hint="use larger cells or fewer points") from error
@@ -214,7 +214,7 @@ def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) ->
         raise
     except FAILURES as error:
         if not is_class and not registry.is_foreign(target):
-            raise  # a fault of the program
+            raise
         where = "__init__" if is_class else "it"
         raise faults.of_style(error, name, where, target, hub.mark) from error
 

@@ -78,10 +78,10 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
         return other
     if name == "i":
         return ScriptError(
-            "'i' is the number of a point in Karamelo, which no formula knows here",
+            "'i' is the number of a point in Karamelo, which formulas cannot use here",
             mark=mark,
             expected="a formula of positions",
-            hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) scatters over 0 to 1 as well",
+            hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) also scatters over 0 to 1",
         )
     published = [value for value in script.hub.values.names() if value not in SEEDS]
     hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])
@@ -117,7 +117,7 @@ def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None
     }
     close = "time" if name == "t" else nearest(name, names)
     close = close or by_style.get(nearest(name, by_style) or "")
-    if close and not (name in energies and close in script.variables):  # Ek is not a modulus E
+    if close and not (name in energies and close in script.variables):
         return f"did you mean '{close}'?", close
     if re.match("leq|geq", name):
         return f"{name[:3]} goes before a bound, in fix velocity_nodes only", None
@@ -189,10 +189,10 @@ def defined_later(script: Any, name: str, mark: Any) -> ScriptError | None:
             continue
         hint = f"move line {line} up"
         if statement.mark == script.hub.mark:
-            where, hint = f"it is set in this very line {line}", "give it a value first"
+            where, hint = f"it is set in this line, {line}", "give it a value first"
         elif assigned and _needs(script, name, assigned):
             hint = f"'{assigned}' and '{name}' need each other: set one of them without the other"
-        expected = f"a name that is known here; {where}"
+        expected = f"a name that is defined here; {where}"
         code = "used-before-defined"
         return ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
     return None
@@ -256,7 +256,7 @@ def in_own_words(script: Any, name: str) -> str | None:
         return f"method({', '.join([*(before[:1] or ['tlmpm']), *rest])}), {where}"
     if name == "partition_domain" and len(before) > 2:
         line = ", ".join([*before[:2], "linear", *before[3:]])
-        return f"method({line}), {where}: with linear weights no point acts across a line of nodes"
+        return f"method({line}), {where}: with a linear basis no point acts across a line of nodes"
     return None
 
 

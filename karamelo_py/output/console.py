@@ -1,4 +1,4 @@
-"""Terminal output: banner, log lines, progress, warnings, closing table.
+"""Terminal output: banner, log lines, progress, warnings, summary.
 
 Rich draws a progress bar on a terminal; pipes and files get plain lines. Every line is flushed.
 """
@@ -123,7 +123,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show the activity `within` a step, too; fast enough for each step.
+        """Show progress, and the activity `within` a step; fast enough to call in each step.
 
         `fraction` is None if the end is unknown (run_until, run_while).
         """

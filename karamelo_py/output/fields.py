@@ -132,7 +132,7 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        # Most of a quantile's thousands are 0.
+        # Most of the thousands of sums of a quantile are 0.
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
@@ -150,8 +150,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Return numbers of the points nearer to one of `x` (n, d) than `half` (n, d) along all
-        axes."""
+        """Return numbers of the points within `half` (n, d) of one of `x` (n, d) along all axes."""
         size, found = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -322,7 +321,8 @@ class ColumnFormula:
                 hub.warn(
                     f"'{name}' is the column here, not the variable of the script",
                     mark=argument.piece(name).mark,
-                    hint=f"another name for the variable, such as {name}_0, if it is meant",
+                    hint=f"another name for the variable, such as {name}_0, if you mean the "
+                    "variable",
                 )
         if not self.columns or len(self.columns) > self.MOST:
             many = "no column" if not self.columns else f"{len(self.columns)} columns"

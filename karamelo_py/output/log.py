@@ -107,7 +107,7 @@ class Log(Rhythmic):
             return
         if not end and not self.is_asked_for and not _is_log(path):
             raise ScriptError(
-                f"{path} is there, and no run has written it",
+                f"{path} exists and is not the log of a run",
                 expected="a folder without such a file",
                 hint="-log FILE or -out FOLDER sends the log elsewhere; -log "
                 f"{self.file} overwrites it",
@@ -169,5 +169,5 @@ def _row(cells: list[str], widths: list[int]) -> str:
 
 def begins_anew(path: Path) -> str:
     if not path.is_file():
-        return f"there is no {path} of the run that is gone on from: it begins anew"
-    return f"{path} is not as the run left it that is gone on from: it begins anew"
+        return f"the resumed run left no {path}: it begins anew"
+    return f"{path} has changed since the resumed run: it begins anew"

@@ -172,7 +172,7 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """Sums of N value over local points, (nodes, 2): whole units, and the remainder."""
+    """Sums of N times a value over local points, (nodes, 2): whole units, and the remainder."""
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
     terms = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]

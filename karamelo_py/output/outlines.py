@@ -13,7 +13,7 @@ FINE = 300  # steps along the longest side of a tool's outline
 # sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines between faces
-# Least and most points that measure spacing, and distances per batch.
+# Smallest and largest number of points to measure spacing, and distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
@@ -161,7 +161,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Lines (m, 3) that show the surface, but not a plane that cuts it off."""
+    """Lines (m, 3) on the surface, except on planes that cut it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(ends[0], ends[1], BETWEEN + 2)

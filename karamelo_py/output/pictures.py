@@ -93,7 +93,7 @@ class DrawnPoints(Artist):
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # rasterised in .pdf and .svg, too: viewers cannot show as many circles
+        if many:  # also rasterised in .pdf and .svg: viewers cannot show as many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.draw(self.rows[:, first : first + MARKS])
@@ -142,7 +142,7 @@ class Picture:
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark ends of the colour bar with values beyond."""
+        """Mark the ends of the colour bar that values exceed."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
         """Label lengths in a unit that suits the numbers; without a unit, with a power of 1000."""
@@ -210,7 +210,7 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Around points (n, 3) of bodies, and tools."""
+        """Lines around the points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
         self.title.set_text(text)

@@ -1,4 +1,4 @@
-"""Tables of points: a whole scene, a piece by id, or some of a block."""
+"""Tables of points: of a whole scene, of a range of ids, or of part of a block."""
 
 from collections.abc import Callable, Iterator, Set
 from functools import partial

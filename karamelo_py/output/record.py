@@ -39,7 +39,7 @@ def _machine() -> Json:
 
 
 def surroundings() -> dict[str, Any]:
-    """Return what a result may depend on, and the date."""
+    """Return versions, machine and date."""
     return {"date": datetime.now().astimezone().isoformat(timespec="seconds"), **_machine()}
 
 

@@ -20,7 +20,7 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    Due are the first and last state of every run and multiples of `every`, in absolute steps or
+    The first and last state of every run are due, and multiples of `every` in absolute steps or
     time: further runs continue the sequence. No state is written twice to a file, and nothing in a
     rehearsal.
     """
@@ -48,7 +48,7 @@ class Output:
         elif any(_may_be(path, script) for script in scripts):
             error = f"{file} is the script itself"
         elif path.exists() and not os.access(path, os.W_OK):
-            error = f"{file} is there and cannot be overwritten"
+            error = f"{file} exists and cannot be overwritten"
         elif not path.exists() and path.parent.is_dir() and not os.access(path.parent, os.W_OK):
             error = f"nothing can be written to the folder {path.parent}"
         else:
@@ -86,7 +86,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due; with `last`, everything not yet written."""
+        """Write all output that is due; with `last`, everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time

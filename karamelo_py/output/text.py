@@ -1,9 +1,9 @@
 """Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
 The nine digits of x are the rounded digits of x 10^k. The product has twice the digits of a double:
-exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Python formats such
-numbers, those near the ends of the range of doubles, and all without compilation or on big-endian
-machines.
+exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Python formats
+undecided numbers, numbers near the ends of the range of doubles, and all numbers without
+compilation or on big-endian machines.
 
 Digits are written eight at a time; surplus ones are overwritten, because mispredicted branches cost
 more than bytes.
@@ -28,7 +28,7 @@ DOUBT = 1e-12
 EXACT = 22  # the largest power of ten that a double holds
 SMALLEST, LARGEST = 1e-280, 1e280
 LARGEST_INTEGER = 2**62
-FIRST = -280  # of the powers in POWERS
+FIRST = -280  # number of powers in POWERS
 
 
 def _power(k: int) -> tuple[float, float]:
@@ -71,7 +71,9 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 
 @kernel
 def write_rows(table, start, text, at):
-    """Write rows up to a number left to Python: return its index, or the count, and the text's end.
+    """Write rows up to the first number that Python must format.
+
+    Returns the index of that number, or the count, and the end of the text.
 
     `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
     `start`: index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and
@@ -111,7 +113,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write nine significant digits and return their end, or `at` if in doubt."""
+    """Write nine significant digits and return their end, or `at` if undecided."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)
@@ -155,7 +157,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Nine digits of x > 0 as an integer (0 if in doubt), and the first one's power of ten.
+    """Nine digits of x > 0 as an integer (0 if undecided), and the power of ten of the first.
 
     `binary`: the power of two.
     """

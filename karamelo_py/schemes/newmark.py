@@ -99,7 +99,7 @@ class Newmark(NamedTuple):
         if rho is not None:
             if beta is not None or gamma is not None or rule != "newmark":
                 raise ScriptError(
-                    f"rho {rho:g} says beta, gamma and the rule already",
+                    f"rho {rho:g} already determines beta, gamma and the rule",
                     argument="rho",
                     expected="rho alone, or none",
                 )

@@ -21,8 +21,8 @@ class USL(NamedTuple):
     The fastest scheme: one pass over the points per step. Slightly dissipative.
 
     The stable step is 0.65 h/c, 0.4 h/c with one point per cell, and 0.7 times that with
-    bernstein-quadratic. Points average some nodal modes away. Only the strain of such a mode
-    responds to forces: e <- (1 - (w dt)^2) e, stable for w dt < sqrt(2) instead of 2.
+    bernstein-quadratic. Some nodal modes do not appear in point velocities. Their strain follows e
+    <- (1 - (w dt)^2) e, which is stable for w dt < sqrt(2) instead of 2.
 
     A node with almost no mass gets a large velocity. If its mass is below the mean mass of the
     points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
@@ -58,8 +58,8 @@ known_failure(
     USL,
     "affine noise",
     when=_thin_edges,
-    reason="{scene.transfer_name} with the basis {scene.basis_name} and usl: in some places of the "
-    "grid the moments of points at an edge act on nodes with almost no mass, and a body breaks "
+    reason="{scene.transfer_name} with the basis {scene.basis_name} and usl: at some positions "
+    "the moments of points at an edge act on nodes with almost no mass, and a body breaks "
     "within two periods",
     cure="scheme(musl), or a spline basis",
 )
@@ -69,7 +69,7 @@ known_failure(
     "light next to heavy",
     when=lambda scheme, scene: scene.uneven.courant > 0,
     reason="solid '{scene.uneven.heavy}' is {scene.uneven.ratio:.3g} times as dense as solid "
-    "'{scene.uneven.light}' next to it. At nodes that both reach, with little mass, usl needs a "
+    "'{scene.uneven.light}' next to it. At nodes of little mass that both reach, usl needs a "
     "shorter step: bodies gain energy and break within some thousand steps",
     cure="dt_factor({scene.fraction_of_uneven:.2g}), cpgimp or quadratic-spline",
 )

@@ -34,7 +34,7 @@ class Quit(Exception):
     """The script ends normally."""
 
 
-# Also of exit(), which would end the program silently.
+# Also raised by exit(), which would end the program silently.
 FAILURES = (Exception, SystemExit)
 
 
@@ -69,14 +69,14 @@ class ScriptError(Exception):
     command: str | None = None
     included: list[Mark] = field(default_factory=list)
     others: "list[ScriptError]" = field(default_factory=list)
-    # Of syntax errors: the correct statements.
+    # The correct statements, for syntax errors.
     statements: list = field(default_factory=list)
     # Kind of message (codes.toml), wrong word, kind of its target, similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""
     alike: str | None = None
-    # Of failed runs: likely cause, and the command that resumes.
+    # Likely cause and the command that resumes, for failed runs.
     cause: str = ""
     resume: str = ""
     # True once the statement is known: callers further out add nothing.
@@ -166,7 +166,7 @@ def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") ->
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
-        return "one of " + ", ".join(names) if names else "one that there is (none so far)"
+        return "one of " + ", ".join(names) if names else "an existing one (none so far)"
     listed = f"{len(names)} in all{page and f': see {page}'}"
     listed = f"karamelo-py styles {family} lists all {len(names)}" if family else listed
     return f"one of {close}, ... ({listed})" if close else listed

@@ -44,7 +44,7 @@ class Expression:
         self.value: Any = float(value) if operation == "number" else value
         own = {value} if operation == "name" else ()
         self.names: frozenset[str] = frozenset(own).union(*(one.names for one in operands))
-        # Counts shared operations repeatedly; exact only where needed.
+        # Counts common operations repeatedly; exact only where needed.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:
             self.size = len(terms.in_order(self))

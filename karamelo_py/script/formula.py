@@ -2,7 +2,7 @@
 
 No formula is compiled: for each operation the evaluator loops over a block. Values common to all
 points are computed once per block, by instructions with the flag `UNIFORM`; `SPREAD` expands the
-result to a row. Shared subexpressions are stored in rows after the stack.
+result to a row. Common subexpressions are stored in rows after the stack.
 """
 
 from typing import NamedTuple

@@ -46,7 +46,7 @@ def check_characters(text: str) -> None:
             expected, hint = "a text file", "delete it; is this really a script?"
         else:
             message, expected = f"typographic quote {word}", 'the plain quote "'
-            hint = "such quotes come from word processors and web pages; type them anew"
+            hint = "such quotes come from word processors and web pages; type them again"
         raise Mistake(message, *match.span(), expected, hint)
 
 
@@ -234,7 +234,7 @@ def _closing(at: _Stop) -> Mistake:
     if not at.opened:
         return at.mistake(*CLOSES_NOTHING)
     if at.last == "(":
-        message = "there is nothing in these parentheses"
+        message = "these parentheses are empty"
         return Mistake(message, at.last.start_pos, at.end, expected=_VALUE)
     return at.mistake(f"something is missing after '{at.last}'")
 

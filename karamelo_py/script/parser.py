@@ -115,7 +115,7 @@ def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw
                 code="syntax",
                 mark=source.mark(*span(comma)),
                 expected=f"something {'after' if after else 'before'} this comma",
-                hint="leave the comma out, or write NULL where a component is not to be set",
+                hint="leave the comma out, or write NULL for a component that is not set",
             )
         if single := _SINGLE_QUOTED.match(source.text, item[0]):
             bare = ", or the word without quotes" if single[1].isidentifier() else ""
@@ -192,7 +192,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
             start,
             end,
             expected=f"at most {MAX_DEPTH} levels",
-            hint="give parts of it names: a = ..., b = ..., then a + b",
+            hint="name its parts: a = ..., b = ..., then a + b",
         )
     return start, end, depth
 

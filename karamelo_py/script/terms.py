@@ -130,8 +130,8 @@ def _bracketed(term: Term, level: int) -> str:
     return text_of(term) if precedence >= level else f"({text_of(term)})"
 
 
-# Terms with several users are computed once, each into a row, and so are operands that would not
-# fit on the stack. The rest are trees.
+# Terms that are used several times are computed once, each into a row, and so are operands that
+# would not fit on the stack.
 
 # Stack depth without rows; limits Python's recursion, too.
 _MOST_LEVELS = 60

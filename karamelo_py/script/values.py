@@ -70,7 +70,7 @@ class Values:
     def publish_torque(self, ID: str) -> None:
         """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin of ``ID_x``, ...
 
-        Of contact between two solids, ``ID_t2x``, ... acts on the second one.
+        For contact between two solids, ``ID_t2x``, ... is the torque on the second one.
         """
         first = self._first[ID]
         if not self.torques[first]:
@@ -103,7 +103,7 @@ class Values:
         if first + count > CAPACITY:
             raise ScriptError(
                 f"there are more than {CAPACITY} values of fixes and computes",
-                hint="use the IDs of deleted fixes and computes again: they remain in memory",
+                hint="reuse the IDs of deleted fixes and computes, whose values remain in memory",
             )
         self._used += count
         return first

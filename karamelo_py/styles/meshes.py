@@ -30,7 +30,7 @@ UNITS = {
     1 / 0.0254: "a file in metres, a script in inches",
     1 / 25.4: "a file in millimetres, a script in inches",
 }
-CURVED = 0.01  # of an edge's length: a circle of 80 elements
+CURVED = 0.01  # relative to an edge's length, as in a circle of 80 elements
 
 
 def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
@@ -52,8 +52,8 @@ def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> 
         fits = domain.contains(np.array([lo, hi]) * factor).all()
         if fits and size * factor > max(room / OUT, CELLS * (domain.h or 0.0)):
             hub.warn(
-                f"{file.name} is {size:.4g} long, the domain {room:.4g}: with lengths times "
-                f"{factor:.4g} it would fit ({units})",
+                f"{file.name} is {size:.4g} long, the domain {room:.4g}: "
+                f"scaled by {factor:.4g} it would fit ({units})",
                 hint="one unit of length: scale the file, or write the script in its units",
             )
             return
@@ -93,8 +93,8 @@ class MeshRegion(Enclosed):
         Exodus (.e), MED, CGNS, MFEM, VTK and any other format that meshio reads; or of a geometry
         (.geo, .step, .brep), which Gmsh meshes.
     group
-        Name or number of a physical group; in other formats a set, an instance, a block, a property
-        or a surface, and ``name:number`` for numbers of cells in VTK. Default: the whole mesh. A
+        Name or number of a physical group; in other formats, of a set, an instance, a block, a
+        property or a surface; in VTK, ``name:number`` of cell data. Default: the whole mesh. A
         group of lower dimension, such as a boundary, serves to select nodes and to load its faces.
     exterior
         The word ``exterior`` selects everything outside.
@@ -153,7 +153,7 @@ class MeshRegion(Enclosed):
 
 
 class Near(Region):
-    """All positions whose cell has a part of a set of faces, edges or nodes."""
+    """All positions whose cell contains part of a set of faces, edges or nodes."""
 
     def __init__(self, region: MeshRegion):
         d = region.dimension
@@ -167,7 +167,7 @@ class Near(Region):
 
 
 def near_set(hub: Hub, name: str, file: Path, group: str | int) -> Region:
-    """A set of elements as a region; of faces, edges or nodes, what is within half a cell."""
+    """Return a set of elements, or the positions within half a cell of faces, edges or nodes."""
     region = MeshRegion(hub, file, group)
     chosen = Near(region) if region.flat else region
     chosen.id = f"{name} ({file.name})"
@@ -195,7 +195,7 @@ class STL(Enclosed):
 
     Notes
     -----
-    The surface must be closed: every edge belongs to two triangles. Shells inside others are
+    The surface must be closed: every edge belongs to two triangles. Shells inside other shells are
     cavities, whatever their orientation; overlapping shells are one body.
 
     See Also
@@ -316,7 +316,7 @@ class MeshSolid(Solid):
                 left_out[cells.label] += len(cells.nodes)
         counts = ", ".join(f"{n} {kind}" for kind, n in left_out.items())
         if counts:
-            hub.warn(f"elements of {self.file.name} that no solid has are left out: {counts}")
+            hub.warn(f"elements of {self.file.name} that belong to no solid are left out: {counts}")
 
     def described(self) -> str:
         return f"mesh '{self.file.name}'"
@@ -325,4 +325,4 @@ class MeshSolid(Solid):
         return f"{self.described()} has no elements"
 
     def wanted(self) -> str:
-        return "a mesh with elements inside the domain, in the lengths of the script"
+        return "a mesh with elements inside the domain, in the length unit of the script"

@@ -16,7 +16,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of shapes with an exact depth: slabs across some axes, round across others."""
+    """Base of shapes with an exact depth: planes across some axes, round across the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
     across: Sequence[int] = ()  # axes across which it is round, with a centre and a radius
@@ -224,7 +224,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """Return None: the domain cuts a half-space anywhere."""
+        """Return None: the domain cuts off part of a half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
@@ -259,7 +259,7 @@ class Union(region.Region):
     Parameters
     ----------
     first, second, more
-        IDs of regions. A region made with ``exterior`` is everything outside its shape.
+        IDs of regions. A region defined with ``exterior`` is everything outside its shape.
 
     Example
     -------
@@ -315,7 +315,7 @@ class Intersection(Union):
 
 
 class Difference(region.Region):
-    """All positions in the first region and in none of the others.
+    """All positions in the first region that are not in the other regions.
 
     Parameters
     ----------

@@ -52,15 +52,15 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells start at the lower corner of the domain; in methods with a grid for each solid, of the box
-    around the region, whose open sides end at the domain.
+    Cells start at the lower corner of the domain; in methods with a grid for each solid, at the
+    lower corner of the region's bounding box, cut at the domain.
 
-    A cut point has the volume and centroid of the rest of its box; a rest of less than 10 % is
-    merged with the nearest point. Round bodies have their volume to 0.01 %, and no stair-stepped
-    surface for contacting bodies to lock on. Fins and slots as thin as 10 % of h/ppc have their
-    mass to 3 %; a message warns if thinner parts may be missing. The region of a plug-in without
-    `distance` is sampled along the axes and may miss thin parts. With ugimp and cpgimp, cut points
-    have square domains, which do not tile the edge; cpdi refuses them.
+    A cut point has the volume and centroid of the remaining part of its box; a part of less than 10
+    % is merged with the nearest point. Round bodies have their volume to 0.01 %, and no
+    stair-stepped surface for contacting bodies to lock on. Fins and slots as thin as 10 % of h/ppc
+    have their mass to 3 %; a message warns if thinner parts may be missing. The region of a plug-in
+    without `distance` is sampled along the axes and may miss thin parts. With ugimp and cpgimp, cut
+    points have square domains, which do not tile the edge; cpdi refuses them.
 
     See Also
     --------
@@ -104,7 +104,7 @@ class RegionSolid(Solid):
         if ppc > MANY:
             hub.warn(
                 f"{ppc} points per cell and direction are {ppc**domain.dimension:.3g} in each cell",
-                hint="2 or 3, as a rule; smaller cells make more points, too",
+                hint="usually 2 or 3; smaller cells also give more points",
             )
         kin = KINEMATICS[domain.dimension]()
         state = count_in(initial_state(law_on(material.law, self.h, T0 or 0.0), kin, 1.0))
@@ -116,7 +116,7 @@ class RegionSolid(Solid):
         missed = MISSED if region.from_file else COARSE
         if placement.missed:
             hub.warn(
-                f"parts of {self.described()} are thinner than points=cut sees, "
+                f"parts of {self.described()} are too thin for points=cut, "
                 f"{placement.missed:.3g}: their mass may be wrong or missing",
                 hint="smaller cells, or more points per cell",
             )
@@ -235,12 +235,13 @@ class PointsSolid(Solid):
         wrong = ~(np.isfinite(x).all(axis=1) & (volumes > 0) & np.isfinite(volumes))
         if wrong.any():
             raise ScriptError(
-                f"point {np.argmax(wrong) + 1} of {self.table} has no place, or no volume above 0",
+                f"point {np.argmax(wrong) + 1} of {self.table} has no position, or no volume "
+                "above 0",
                 argument="table",
             )
         half = volumes[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        # Stress belongs to the temperature of the point.
+        # The stress is at the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
         self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)
@@ -264,4 +265,4 @@ class PointsSolid(Solid):
         return f"{self.described()} has no rows"
 
     def wanted(self) -> str:
-        return "points inside the domain, in the lengths of the script"
+        return "points inside the domain, in the length unit of the script"

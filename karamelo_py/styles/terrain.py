@@ -22,8 +22,8 @@ class Heights(Enclosed):
         In 3D a raster of z over x and y: an ESRI ASCII grid (.asc), or GeoTIFF (.tif, with the
         package rasterio). In 2D a profile: a file with two columns, x and height y.
     x, y
-        Place of the raster's lower corner in the scene; default: its coordinates in the file. In 2D
-        x alone, of the first row.
+        Position of the raster's lower corner in the scene; default: its coordinates in the file. In
+        2D x alone, of the first row.
     exterior
         The word ``exterior`` selects everything above.
 
@@ -34,10 +34,10 @@ class Heights(Enclosed):
 
     Notes
     -----
-    Heights belong to the centres of cells; between them the surface has two triangles for each four
-    centres. Beyond the outer centres it is level. The raster must cover the domain. A
-    landslide is the difference of two such regions: surface before and slip surface. As a wall with
-    friction: fix contact/surface.
+    Heights are given at the centres of cells; between four centres the surface has two triangles.
+    Beyond the outer centres it is level. The raster must cover the domain. A landslide is the
+    difference of two such regions, the initial surface and the slip surface. fix contact/surface
+    makes the ground a wall with friction.
 
     See Also
     --------
@@ -55,7 +55,9 @@ class Heights(Enclosed):
     ):
         domain, shift = hub.require_domain(), (x, y)
         if domain.dimension == 1:
-            raise ScriptError("heights need a direction across", expected="dimension(2 or 3, ...)")
+            raise ScriptError(
+                "heights need a horizontal direction", expected="dimension(2 or 3, ...)"
+            )
         lo, hi = domain.lo, domain.hi
         if domain.dimension == 2:
             profile = read_profile(file)

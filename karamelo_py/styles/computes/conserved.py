@@ -31,7 +31,7 @@ class KineticEnergy(Energy):
 
     Notes
     -----
-    It belongs to half a step before the logged time (see `scheme`).
+    The value is half a step earlier than the logged time (see `scheme`).
 
     See Also
     --------
@@ -114,7 +114,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """`scale` > 0 is a possible magnitude of the value."""
+        """`scale` > 0 is an upper bound of the value's magnitude."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value

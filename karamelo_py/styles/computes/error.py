@@ -19,7 +19,7 @@ from karamelo_py.script.expressions import Expression
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
-VANISHED = 1e-9  # of the largest norm of the exact values so far: below is round-off
+VANISHED = 1e-9  # fraction of the largest exact norm so far, below which values are round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
@@ -94,7 +94,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first state has no duration: it counts alone until the second.
+            # The first state has no duration: it counts until the second.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -157,10 +157,10 @@ class Error(Compared, Compute):
 
     Notes
     -----
-    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and its initial
-    volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e. ``relative``
-    divides by the same norm of the exact values; while they vanish, by the largest norm so far;
-    before the first it gives inf.
+    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and
+    its initial volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e.
+    ``relative`` divides by the same norm of the exact values. While they vanish it divides by the
+    largest norm so far, and gives inf if there is none.
 
     Publishes ID, the present error; ID_max, the largest so far; and ID_history, the norm over
     points and all outputs so far, weighted by the time since the previous one. With ``relative``

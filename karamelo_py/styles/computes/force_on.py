@@ -1,4 +1,4 @@
-"""The force, its torque and its point of action, on a solid or of fixes."""
+"""Compute force_on: force, torque and point of action, on a solid or of fixes."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -46,7 +46,7 @@ class Acting(NamedTuple):
 
 
 class Summand(NamedTuple):
-    """A published force, and where its torque about the origin is."""
+    """A published force, and the names of its torque about the origin."""
 
     force: str  # ID of ID_x, ID_y, ID_z
     sign: float = 1.0
@@ -60,7 +60,7 @@ class ForceOn(Compute):
     Parameters
     ----------
     part, more
-        A solid: the force of contact on it, by other solids, rigid bodies, tools and surfaces. A
+        A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A
         fix: its force on the points or nodes of its group. Several: their sum.
     x, y, z
         Position that the torque is about; default: the origin.
@@ -78,18 +78,18 @@ class ForceOn(Compute):
     ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, a tool or a surface takes the
     opposite force.
 
-    The force acts along a line; ID_px, ... is its point nearest to x, y, z. In 3D it is the central
-    axis, about which a torque along the force may remain. A line meets the height y = 0 at x =
-    ID_tz/ID_y, if the torque is about the origin.
+    The force acts along a line; ID_px, ... is its point nearest to x, y, z. In 3D this line is the
+    central axis, along which a torque may remain. If the torque is about the origin, the line meets
+    y = 0 at x = ID_tz/ID_y.
 
-    A solid's walls (fix velocity_nodes), loads and weight count only if their fixes are named.
+    Walls (fix velocity_nodes), loads and the weight of a solid count only if their fixes are named.
     Forces of points act at their positions, forces of nodes at the nodes, both at the beginning of
     the step: in load steps torques err by the displacement in a step. In tlmpm nodes stay at their
     initial positions.
 
     Fixes: velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
-    other tools. They come before this compute. Each sums its torque only if a compute asks for it.
+    other tools. They must precede this compute.
     Friction of contact/minimize_penetration acts between the centres of points, so the torques on
     the two solids are not quite opposite. The torque of velocity_particles lacks the angular
     momentum that affine transfers store within points.
@@ -179,7 +179,7 @@ class ForceOn(Compute):
         if others and not self.hub.update.method.own_grids:
             reason = f"{', '.join([solid.id, *others])} have the same nodes"
         raise ScriptError(
-            f"the force of contact on solid '{solid.id}' is not known: {reason}",
+            f"the contact force on solid '{solid.id}' is unknown: {reason}",
             mark=mark,
             expected="method(ulmpm/contacts, ...), a fix of contact in a line before, or the fixes "
             "that act on it instead",

@@ -91,8 +91,8 @@ class AverageTemperature(Mean):
         if hub.materials and "T" in hub.fields.absent_at_points():
             raise ScriptError(
                 "no material of the scene has a temperature",
-                expected="a temperature in material(ID, eos-strength, ...), or a method that is "
-                "thermal",
+                expected="a temperature in material(ID, eos-strength, ...), or a "
+                "thermo-mechanical method",
             )
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
@@ -283,7 +283,7 @@ class Probe(Mean):
     point
         The id of a point, as in dumps: its values instead of the mean.
     x, y, z
-        A position: the values of the point of the group that is nearest to it now.
+        A position: the values of the point of the group that is nearest to it at that time.
 
     Example
     -------
@@ -312,7 +312,7 @@ class Probe(Mean):
         self.point = point
         self.at = {axis: c for axis, c in zip("xyz", (x, y, z), strict=True) if c is not None}
         if point is not None and self.at:
-            raise ScriptError("a probe is at a point or at a place, not both", argument="point")
+            raise ScriptError("a probe is at a point or at a position, not both", argument="point")
         self.published = ("",) if len(self.columns) == 1 else self.columns
         count = sum(solid.count for solid in hub.solids.values())
         if point is not None and all(s.count for s in hub.solids.values()) and 0 < count < point:

@@ -48,7 +48,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Write nothing, but take part in the exchange: only rank 0 writes."""
+        """Take part in the exchange without writing: only rank 0 writes."""
         with discarded():
             self.write()
 

@@ -15,7 +15,7 @@ from karamelo_py.output.vtkhdf import VERSION, describe
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
-# With shuffled bytes, higher levels take twice the time for a few per cent.
+# With shuffled bytes, higher levels take twice as long and save a few per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
@@ -73,13 +73,13 @@ class Hdf5Dump(TableDump):
                     for name in ("time", "step", *self.columns):
                         root[name].resize(k, axis=0)
                     raise
-        except (OSError, RuntimeError) as error:  # h5py raises both; the text is the system's
+        except (OSError, RuntimeError) as error:  # h5py raises both, with the system's text
             reason = re.search("error message = '([^']*)'", str(error))
             message = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {message}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
-        """Refuse a disk without room for a snapshot of any content.
+        """Refuse a disk without space for an uncompressed snapshot.
 
         HDF5 may write at any time, and neither report nor survive a failure.
         """

@@ -19,11 +19,11 @@ class HeightsDump(Dump):
     Parameters
     ----------
     cell
-        Side of a cell of the raster: at least two distances of points, or cells inside the deposit
+        Side of a cell of the raster: at least twice the point spacing, or cells inside the deposit
         remain empty.
     of
-        ``depth``: volume of the points in a cell over its area. ``top``: height of their highest
-        upper face, -9999 (NODATA) in empty cells.
+        ``depth``: volume of the points in a cell over its area. ``top``: height of the highest
+        upper face of these points, -9999 (NODATA) in empty cells.
 
     Example
     -------
@@ -54,7 +54,9 @@ class HeightsDump(Dump):
             message, expected = "a raster has one snapshot", f"a name with *, such as d.*.{file}"
             raise ScriptError(message, argument="file", expected=expected)
         if hub.require_domain().dimension == 1:
-            raise ScriptError("heights need a direction across", expected="dimension(2 or 3, ...)")
+            raise ScriptError(
+                "heights need a horizontal direction", expected="dimension(2 or 3, ...)"
+            )
         self.cell, self.of = cell, of
 
     def write(self) -> None:

@@ -118,7 +118,7 @@ class LammpsDump(TableDump):
 def box(hub: Hub) -> list[tuple[float, float]]:
     """Return the ends of the domain along the three axes.
 
-    OVITO takes a box of zero thickness for degenerate; one cell about zero suits unit width.
+    OVITO treats a box of zero thickness as degenerate; one cell about zero suits unit width.
     """
     domain = hub.domain
     used = slice(domain.dimension)
@@ -195,7 +195,7 @@ class GridDump(OfNodes, LammpsDump):
     number of its grid (``type``, from 1). Positions are always written.
 
     Grids have consecutive ids: one in ulmpm and ulcpdi; in tlmpm and tlcpdi one for each solid,
-    over its reference shape; in ulmpm/contacts the domain's once for each velocity field, so
+    over its reference shape; in ulmpm/contacts one grid of the domain for each velocity field, so
     several rows have the same position.
 
     Example

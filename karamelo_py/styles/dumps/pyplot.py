@@ -31,7 +31,7 @@ PNG_COMPRESSION = 1
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # number of points that give the typical size
+SAMPLE = 1 << 16  # number of points for the typical size
 
 
 class PyPlot(Dump):
@@ -54,7 +54,7 @@ class PyPlot(Dump):
         Column of dump particle that sets the colour, or a formula of columns, groups and solids (1
         for their points, else 0), time and published values. Default: the solid (in 1D: vx).
     vmin, vmax
-        Limits of the colours. With values beyond, the colour bar ends in an arrow.
+        Limits of the colours. If values exceed them, the colour bar ends in an arrow.
     cmap
         A Matplotlib colour map; default viridis, or coolwarm for components with either sign.
     azimuth, elevation
@@ -136,7 +136,7 @@ class PyPlot(Dump):
         self.format_of(self.file)
         if mirror and not (hub.domain and hub.domain.kin.hoops):
             raise ScriptError(
-                "only an axisymmetric scene has another side of its axis",
+                "only an axisymmetric scene can be mirrored at its axis",
                 argument="mirror",
                 expected="axisymmetric(true), or no mirror",
             )
@@ -296,7 +296,7 @@ def look_of(
         raise ScriptError(message, argument="outlines", expected="false")
     log = scale == "log"
     if log and min((end for end in (vmin, vmax) if end is not None), default=1.0) <= 0:
-        message = "a logarithm has no colours for 0 and less"
+        message = "a logarithmic scale needs colour limits above 0"
         raise ScriptError(message, argument="vmin", expected="ends of the colours above 0")
     signed = SIGNED.fullmatch(column) is not None and not log
     if cmap is not None:

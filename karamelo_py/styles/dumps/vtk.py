@@ -37,7 +37,7 @@ class VtkDump(TableDump):
             raise ScriptError(message, argument="file", expected=expected, hint=hint)
         if self.index.is_file() and b"VTKFile" not in self.index.read_bytes()[:200]:
             raise ScriptError(
-                f"{self.index.name}, which would list the snapshots, is there and no such list",
+                f"{self.index.name}, which would list the snapshots, exists and is not such a list",
                 argument="file",
                 expected="another name",
             )
@@ -74,7 +74,7 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add the cells of the last points, or store what they need in `kept`."""
+        """Add the cells of the last points, or store their data in `kept`."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add the cells between all points."""

@@ -71,8 +71,8 @@ class Absorbing(Fix):
     with a layer of fix mass_damping before the edge. In saturated ground, soil and water move as
     one at the edge.
 
-    The fix balances the force that it measures on each node in its first step. Ground that begins
-    with its stress (fix initial_stress) therefore stays at rest; a later load, such as weight,
+    The fix balances the force that it measures on each node in its first step. Ground with an
+    initial stress (fix initial_stress) therefore stays at rest; a later load, such as weight,
     slowly pushes the edge outwards.
 
     Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
@@ -134,7 +134,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return the P and S wave speeds; in saturated soil, times its density they give rho c."""
+    """Return P and S wave speeds; in saturated soil, rho c of soil and water over its density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)
@@ -142,5 +142,4 @@ def speeds(material: Material) -> tuple[float, float]:
         return sqrt(fast), sqrt(slow)
     heavier = material.fluid.heavier(1 / specific_volume(law))
     stiffer = material.fluid.stiffness * specific_volume(law)
-    # rho c of soil and water together, over the density of the soil alone.
     return sqrt((fast + stiffer) * heavier), sqrt(slow * heavier)

@@ -1,4 +1,4 @@
-"""Fix displacement: displacements from a stage of a job on."""
+"""Fix displacement: displacements since a construction stage."""
 
 import numpy as np
 
@@ -29,9 +29,10 @@ class Displacement(Fix):
 
     Notes
     -----
-    Points have the columns ux, uy, uz then, in dumps, probes, pictures and formulas of columns.
-    delete_fix and a further fix displacement measure from a later stage. For points outside the
-    group, and points that come in later, they are measured from the first position.
+    Points then have the columns ux, uy, uz in dumps, probes, pictures and formulas of
+    columns. To measure from a later stage, use delete_fix and define the fix again. For points
+    outside the group, and points that enter later, displacements are measured from the initial
+    position.
 
     See Also
     --------

@@ -23,8 +23,7 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the region's surface; for meshes None, which means the boxes of
-        points."""
+        """Return faces on the region's surface; None for meshes, which use the boxes of points."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
@@ -100,9 +99,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    Areas are as in edge_heat_flux. T is the temperature at the surface after the step, so that even
-    a large h cools no point below the fluid. Publishes the heat per time into all points as ID_s,
-    and the area as ID_area.
+    Areas are as in edge_heat_flux. T is the temperature at the surface after the step,
+    so even a large h cools no point below the fluid temperature. Publishes the heat per time into
+    all points as ID_s, and the area as ID_area.
 
     See Also
     --------

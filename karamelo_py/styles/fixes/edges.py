@@ -104,7 +104,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # two points may lie in one box: one absorbed a small neighbour
+            for k in (0, 1):  # two points may be in one box: one has absorbed a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -202,7 +202,7 @@ class OnEdge(Fix):
     Parameters
     ----------
     region
-        ID of a solid's region, or of one that ends where the solid ends.
+        ID of a solid's region, or of a region with the same edge as the solid.
     """
 
     group: ParticleGroup
@@ -227,7 +227,8 @@ class OnEdge(Fix):
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Sums over the faces of a point have this order, whenever its faces were found.
+            # A fixed order of sums over the faces of a point, regardless of when its faces were
+            # found.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -383,7 +384,7 @@ class EdgePressure(EdgeFix):
         super().__init__(hub, group, region)
         if region.sheet is not None:
             raise ScriptError(
-                f"region '{region.id}' is a set of faces, whose outer side is not known",
+                f"region '{region.id}' is a set of faces, whose outer side is unknown",
                 argument="region",
                 expected="the region of the solid",
                 hint="fix edge_traction, ..., all, tx, ty loads a set of faces",

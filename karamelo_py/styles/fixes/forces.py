@@ -29,7 +29,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import vector
 
 ACCELERATION = Powers(1, 0, -2)
-TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to beyond osmium; no other system has them
+TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to above osmium; rare in other systems
 
 
 def accelerate(mass, v, v_star, force, value, before, kick, share):
@@ -163,7 +163,7 @@ class PointForces(Fix):
         raise NotImplementedError
 
     def publish_load(self, points: PointsView, force: np.ndarray) -> None:
-        """Publish the sum of forces (n, d) on points, and their torque if asked for."""
+        """Publish the sum of forces (n, d) on points, and their torque if requested."""
         self.publish_components(points.total(force))
         torque = self.hub.values.torque_of(self.id)
         if len(torque):
@@ -217,7 +217,7 @@ class ForceParticles(PointForces):
 
 
 def brake(mass, v, v_star, force, value, before, kick, share):
-    """Remove a fraction of the change of v* by forces, against v; the total is its force.
+    """Reduce the change of v* by forces, opposite to v, by a fraction; the total is the force.
 
     No effect if the step reverses the node's motion, or a wall has stopped it.
     """
@@ -326,12 +326,12 @@ def refuse_following(hub: Hub, group: ParticleGroup) -> None:
 
 
 class Detonation(Fix):
-    """Light the points of explosives, each at its time.
+    """Ignite the points of explosives, each at a given time.
 
     Parameters
     ----------
     t
-        Time at which a point is lit (distance from the detonator over the detonation speed): a
+        Time at which a point ignites (distance from the detonator over the detonation speed): a
         number or a formula of x, y, z, x0, y0, z0.
 
     Example

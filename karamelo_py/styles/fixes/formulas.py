@@ -9,7 +9,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST
 
 AXES = "xyz"
-USUAL_FRICTION = 2.0  # rubber on dry concrete has 1, clean metals that weld 1.5
+USUAL_FRICTION = 2.0  # 1 for rubber on dry concrete, 1.5 for clean metals that weld
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:

@@ -132,7 +132,7 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     inner = fraction > 1e-9  # no second column for round-off
     boxes, fraction, columns = boxes[inner], fraction[inner], columns[inner]
     column = np.tile(columns @ np.cumprod([1, *count])[:-1], 3)
-    # The load in a column changes its slope at the tops and bottoms of boxes.
+    # The load in a column is linear between the tops and bottoms of boxes.
     slope = (fraction * across.prod(axis=1)[boxes])[:, None] * weights[boxes]
     slope = np.concatenate([slope, 0 * slope, -slope])
     z = np.concatenate([(x[:, -1] + k * size[:, -1])[boxes] for k in (0.5, 0, -0.5)])

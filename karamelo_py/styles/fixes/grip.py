@@ -20,7 +20,7 @@ class GripOfTool(Grip):
 
 
 def memory_for(hub: Hub, kind: type) -> type:
-    """Return a class of `kind` that no other fix of the scene uses: a point may touch several."""
+    """Return a class of `kind` that no other fix of the scene uses."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:

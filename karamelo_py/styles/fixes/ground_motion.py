@@ -96,7 +96,7 @@ class RecordedAcceleration(BaseAcceleration):
             raise ScriptError(
                 f"{table.name} is no record: its columns are {', '.join(table.columns)}",
                 mark=argument.mark,
-                expected="rows of time and acceleration, of which the times increase",
+                expected="rows of increasing time, and acceleration",
             )
         self.times = first
 
@@ -128,8 +128,8 @@ class GroundMotion(VelocityNodes):
         ax, ay, az, one per dimension of the domain: a formula of time, or the name of a file with
         the columns time and acceleration (of several, those named ax, ay, az). NULL: none.
     through
-        A fix absorbing of the same nodes: the base gives way. Default: the base is rigid, and its
-        nodes have the velocity of the record.
+        A fix absorbing of the same nodes: the base is compliant. Default: the base is rigid, and
+        its nodes have the velocity of the record.
 
     Example
     -------
@@ -141,9 +141,9 @@ class GroundMotion(VelocityNodes):
     rest; a record whose velocity does not return to 0 leaves the base in motion. A rigid base
     reflects all waves that return to it; NULL directions are free.
 
-    With `through`, waves enter by the edge and leave by it. The record is the motion of rock that
-    crops out, twice the incoming wave (Joyner & Chen 1975): its velocity v gives the traction
-    rho c v of the material of that fix. Waves at normal incidence are exact.
+    With `through`, waves enter and leave through the edge. The record is the outcrop motion of
+    rock, twice the incoming wave (Joyner & Chen 1975): its velocity v gives the traction rho c v of
+    the material of that fix. Waves at normal incidence are exact.
 
     Publishes the force on the nodes as ID_x, ID_y, ID_z, and velocity and acceleration of the
     record as ID_vx, ID_ax and so on.
@@ -168,7 +168,7 @@ class GroundMotion(VelocityNodes):
         through: str | None = None,
     ):
         self.records = per_direction(hub, "a", acceleration)
-        # The formulas follow when the fix has its ID.
+        # Formulas are made once the fix has its ID.
         unknown = [record and Velocity(Expression.seed("time")) for record in self.records]
         if through is None:
             super().__init__(hub, group, *unknown)

@@ -43,7 +43,7 @@ class HeatFix(Fix):
             deep = np.ptp(solid.x0_of(numbers), axis=0) > 5 * solid.half_size.max(axis=0)
             if deep.all() and self.group.has(numbers + solid.first_id).all():
                 self.hub.warn(
-                    f"all points of solid '{solid.id}' get heat as if each had a face outside",
+                    f"all points of solid '{solid.id}' get heat as if each had an outer face",
                     hint="a group of one layer of points along the surface",
                 )
 
@@ -233,7 +233,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    order = LAST  # the other fixes' supply bounds the temperatures for the watch
+    order = LAST  # the temperature monitor bounds the heat of other fixes
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

@@ -41,7 +41,8 @@ class Inflow(VelocityNodes):
     Parameters
     ----------
     solid
-        The solid that fills the inlet, at least a cell long: its points go ahead, layer by layer.
+        The solid that fills the inlet, at least one cell long: its points enter first, layer by
+        layer.
     velocity
         vx, vy, vz, one per dimension of the domain: numbers, of which one is not 0.
     until
@@ -53,11 +54,11 @@ class Inflow(VelocityNodes):
 
     Notes
     -----
-    Nodes of the inlet have the velocity. A layer of points enters at its upstream end whenever the
-    last one has moved by the distance of the layers. Whole layers enter, so the mass is exact to
-    the last digit. The layers repeat the solid, and ids follow the order of entry. The points are
-    made with the fix, before the first run, and wait; `until` says how many. The energy balance
-    counts the energy of entering points as work.
+    Nodes of the inlet have the velocity. A layer of points enters at its upstream end
+    whenever the previous layer has moved by the spacing of the layers. Only whole layers enter, so
+    the mass is exact. The layers repeat the solid, and ids follow the order of entry. The fix
+    creates all points up to the time `until` before the first run. The energy balance counts the
+    energy of entering points as work.
 
     Publishes the force on the nodes of the inlet as ID_x, ID_y, ID_z, and the number and mass of
     the points that have entered as ID_points and ID_mass.
@@ -107,7 +108,7 @@ class Inflow(VelocityNodes):
         self.held_directions = ()  # no wall: splines reach past it
 
     def _inlet(self, hub: Hub) -> Inlet:
-        """Return the cells of the solid, and cells whose nodes its points see, upstream."""
+        """Return the cells of the solid, and upstream cells whose nodes its points reach."""
         solid, lattice = self.solid, hub.lattices[0]
         d, h, far = hub.domain.dimension, lattice.h, hub.update.method.basis.traits.cells // 2
         corner = lattice.lo[:d]
@@ -139,10 +140,12 @@ class Inflow(VelocityNodes):
         count = sum(len(rows[k % len(rows)]) for k in range(self.layers))
         if count > MOST:
             raise ScriptError(
-                f"{count} points would wait to enter", argument="until", expected=f"at most {MOST}"
+                f"{count} points would be needed", argument="until", expected=f"at most {MOST}"
             )
         if not self.layers:
-            message = f"no layer enters until then: the first one at {self.distance / self.speed:g}"
+            message = (
+                f"no layer enters by then: the first one enters at {self.distance / self.speed:g}"
+            )
             raise ScriptError(message, argument="until", expected="a later time")
         own = solid.count
         entering = [rows[k % len(rows)] for k in range(self.layers)]
@@ -171,7 +174,7 @@ class Inflow(VelocityNodes):
     def _refuse(self, numbers: np.ndarray) -> None:
         if len(numbers):
             raise ScriptError(
-                f"fix '{self.id}' would put points into matter: "
+                f"fix '{self.id}' would put points into other material: "
                 f"{named(self.hub, int(numbers[0]))} is in the inlet",
                 mark=self.mark,
                 expected=f"an inlet with points of solid '{self.solid.id}' alone",
@@ -209,7 +212,7 @@ class Inflow(VelocityNodes):
 
 
 class Outflow(Erosion):
-    """Take the points out of a scene that have come into a region.
+    """Remove points that have entered a region.
 
     Parameters
     ----------
@@ -224,7 +227,7 @@ class Outflow(Erosion):
 
     Notes
     -----
-    Publishes sums since the start: ID_points, ID_mass and ID_energy, as fix erosion.
+    Publishes sums since the start: ID_points, ID_mass and ID_energy, as in fix erosion.
 
     See Also
     --------

@@ -185,8 +185,8 @@ class ContactMinimizePenetration(PairContact):
     their present volume. Two points with the penetration p = R1 + R2 - |x2 - x1| > 0 get the force
     m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction, at most
     mu times this force, stops and reverses the slip (de Vaucorbeil & Nguyen 2021, "Modelling
-    contacts with a total Lagrangian material point method"): a load that it can hold stays at rest,
-    and yields by mu p before it slides.
+    contacts with a total Lagrangian material point method"): a point whose load it can hold is at
+    rest, after a displacement of at most mu p.
 
     dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, as
     by set_dt, it decreases by 1 % of the elapsed time.
@@ -194,7 +194,7 @@ class ContactMinimizePenetration(PairContact):
     A surface of spheres is rough. The force on a block (two points per cell and direction) is 0.19,
     0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces inclined to the grid lock:
     on a slope of 20 degrees with mu = 0 a block sticks, and with points=cut it accelerates by 2.8
-    instead of 3.4. So a coefficient gives a warning; for correct friction use method
+    instead of 3.4. A coefficient therefore gives a warning. For correct friction use method
     ulmpm/contacts.
 
     The cost is proportional to the number of points. With several processes, the first one searches
@@ -255,10 +255,10 @@ class ContactHertz(PairContact):
 
     Notes
     -----
-    Points are spheres as in contact/minimize_penetration. Two points that overlap by p repel each
-    other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 +
-    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. For single points: bodies overlap noticeably
-    before it is large, and a fast body may pass through.
+    Points are spheres as in contact/minimize_penetration. Two points that overlap by p
+    repel each other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1
+    R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. It is meant for single points: bodies
+    overlap noticeably before the force is large, and a fast body may pass through.
 
     Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. With
     several processes, the first one searches among all points that may touch.

@@ -15,7 +15,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Return the pressure; publish the mass of water that left per time in the last step."""
+    """Return the pressure; publish the mass of water per time that left in the last step."""
     return (values[0], 0 * values[0]), flux[-3]
 
 

@@ -177,7 +177,7 @@ class Python(Fix):
             failure = ScriptError(
                 f"fix python: {called_as(self.function)}: {message}",
                 mark=self.mark,
-                hint="\n  ".join(["mend the function there:", *steps_to(error)]),
+                hint="\n  ".join(["correct the function there:", *steps_to(error)]),
             )
             failure.complete = True
             raise failure from error
@@ -200,8 +200,8 @@ class Python(Fix):
                 f"fix python: {called_as(self.function)} returns {first} on one process and "
                 f"{other} on another",
                 mark=self.mark,
-                hint="each has a part of the points: sum by points.total(values) or "
-                "nodes.total(values), the same on all, or leave point_by_point out",
+                hint="each process has a part of the points: sum with points.total(values) or "
+                "nodes.total(values), or leave out point_by_point",
             )
 
 
@@ -223,8 +223,8 @@ class Keeper:
         self.owner, self.function = owner, function
         for name in self.names:
             if not hasattr(owner, name):
-                message = f"{self.title} remembers '{name}', which it does not have"
-                expected = "a name that has its first value when the fix is made"
+                message = f"{self.title} lists '{name}' in remembers, but does not have it"
+                expected = "a name with an initial value when the fix is defined"
                 raise ScriptError(message, argument="function", expected=expected)
         self.seen = self._look()
 

@@ -70,9 +70,9 @@ class RigidBody(Fix):
         Prescribed velocity of its centre and angular velocity: formulas; NULL leaves a component of
         the velocity free.
     fixed
-        Directions in which it does not move: of x, y, z, and rx, ry, rz for rotation.
+        Directions in which it does not move: some of x, y, z, and rx, ry, rz for rotation.
     pivot
-        A position that the body rotates about, as on a hinge or a ball joint; then its x, y, z.
+        Coordinates of a position that the body rotates about, as on a hinge or a ball joint.
     mass
         Default: the mass of its points. In axisymmetry, masses and forces are per radian.
     inertia
@@ -93,9 +93,9 @@ class RigidBody(Fix):
 
     In ulmpm/contacts the body and other solids push each other on the grid (with the friction of
     fix contact/friction); in other methods use fix contact/rigid_body. Its velocity at the end of
-    the step is solved together with all impulses, so it may be far lighter than what it touches.
-    Momentum is conserved to round-off. As for points, velocities belong to the middle of a step,
-    unless scheme(..., start=half).
+    the step is solved together with all impulses, so it may be far lighter than the bodies that it
+    touches. Momentum is conserved to round-off. As for points, velocities are at the middle of a
+    step, unless scheme(..., start=half).
 
     Formulas may contain its published values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the
     same ID replaces this one, and the body retains its velocity: to release it, repeat the line
@@ -196,7 +196,7 @@ class RigidBody(Fix):
     def _refuse_another_start(
         self, given: tuple[Components | None, Components | None], start: list, fixed: Any
     ) -> None:
-        """Refuse initial velocities in directions in which the body moves as prescribed."""
+        """Refuse initial velocities in directions with prescribed motion."""
         for k, (item, formula) in enumerate(zip(start, self.led, strict=True)):
             components = given[k // 3]
             if item is None or formula is None or components is None or self.hub.rehearsing:
@@ -274,7 +274,7 @@ class RigidBody(Fix):
         if failed > self.reported:
             self.reported = 2 * failed
             self.hub.warn(
-                f"impulses on '{self.body.id}' were not found exactly in {failed} steps",
+                f"impulses on '{self.body.id}' did not converge in {failed} steps",
                 mark=self.mark,
                 hint="smaller steps (dt_factor), less friction, or a heavier body",
             )
@@ -469,7 +469,7 @@ class ContactRigidBody(Fix):
         self.region = surface
         if self.region.flat or self.region.outline() is None:
             raise ScriptError(
-                f"region '{self.region.id}' has no surface that the program can follow",
+                f"region '{self.region.id}' has no surface that the program can compute",
                 argument="region" if region else "solid",
                 expected="a block, cylinder, sphere, closed STL surface or mesh, or some of these",
             )
@@ -497,11 +497,11 @@ class ContactRigidBody(Fix):
 
     def refuse(self, number: int) -> int:
         raise ScriptError(
-            f"{named(self.hub, number)} is so deep in the body '{self.touches.id}' that no way out "
-            "of it is the shortest",
+            f"{named(self.hub, number)} is so deep in the body '{self.touches.id}' that the "
+            "direction to its surface is ambiguous",
             mark=self.mark,
             expected="points that come less than a cell below its surface",
-            hint="another place of the body at the start, smaller steps (dt_factor), or a stiffer "
+            hint="another initial position of the body, smaller steps (dt_factor), or a stiffer "
             "solid",
         )
 
@@ -536,5 +536,5 @@ known_failure(
     "points in the body '{part.touches.id}'",
     when=begin_behind,
     reason="{which} points of the group begin there, up to {depth:.3g} deep, and are thrown out",
-    cure="another place of the body or of the other solid",
+    cure="another position of the body or of the other solid",
 )

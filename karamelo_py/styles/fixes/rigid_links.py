@@ -25,7 +25,7 @@ def _require_rigid(solid: Solid, mark: Mark | None) -> None:
             f"solid '{solid.id}' deforms: its material '{solid.material.id}' is not rigid",
             mark=mark,
             expected="a solid of material rigid with a fix rigid_body, or a region",
-            hint="fix contact/rigid_body is the contact of a rigid body with what deforms",
+            hint="fix contact/rigid_body is the contact of a rigid body with deformable solids",
         )
 
 
@@ -52,7 +52,7 @@ class Party(NamedTuple):
             _require_rigid(solid, mark)
         if region is None or region.flat or region.outline() is None:
             raise ScriptError(
-                f"'{ID}' has no surface that the program can follow",
+                f"'{ID}' has no surface that the program can compute",
                 mark=mark,
                 expected="a block, cylinder, sphere, plane, closed STL surface or mesh, or some of "
                 "these",
@@ -66,7 +66,7 @@ class ContactBodies(Fix):
     Parameters
     ----------
     first, second, more
-        Rigid solids, each with a fix rigid_body, and regions that do not move. Each may touch each.
+        Rigid solids, each with a fix rigid_body, and regions that do not move. Any two may touch.
     mu
         Coefficient of friction (Coulomb); default 0.
     restitution
@@ -80,15 +80,14 @@ class ContactBodies(Fix):
     -----
     Publishes the force on the first part as ID_x, ID_y, ID_z.
 
-    Works in every method, with the motion of bodies and their contact with what deforms. A stack
-    rests, also with a heavy body on light ones. Momentum and angular momentum are conserved to
-    round-off, and no collision adds energy. Collisions within a step are taken one by one, fastest
-    first, so an impulse travels through a row of balls that touch.
+    Works in every method, and together with contact with deformable solids. Stacks come to rest,
+    even a heavy body on light ones. Momentum and angular momentum are conserved to round-off, and
+    no collision adds energy. Collisions within a step are taken one by one, fastest first, so an
+    impulse travels through a row of balls that touch.
 
-    The surface of each part meets disks and spheres as a whole, and corners and edges of the others
-    as small balls: they are rounded by 0.05 cells, and edges in 3D have a ball per cell. A fixed
-    region is a wall or a container; a body with motion=... or fixed=... is one that moves. Bodies
-    that a joint connects do not touch.
+    Disks and spheres touch as a whole. Corners and edges of other shapes touch as small balls: they
+    are rounded by 0.05 cells, and edges in 3D have one ball per cell. A fixed region is a wall or a
+    container; a body with motion=... is a moving one. Bodies that a joint connects do not touch.
 
     The cost of a step grows with the number of pairs, and with the cube of the number of bodies
     that move: use it for up to some tens.
@@ -133,7 +132,7 @@ class ContactBodies(Fix):
                 error = ScriptError(
                     f"fix '{other.id}' (line {other.mark.line}) is the contact of '{a}' with "
                     f"'{b}' already",
-                    expected="each pair in one fix",
+                    expected="each pair in only one fix",
                 )
                 error.mark, error.command = self.mark, "fix contact/bodies"
                 raise error
@@ -174,9 +173,9 @@ class Joint(Fix):
     -----
     Publishes the force on the first body as ID_x, ID_y, ID_z.
 
-    Joints hold from the first step on, and release after delete_fix. They are found together with
-    all contacts of the bodies, so masses may differ by any ratio. The displacement in a step that a
-    rotation adds, of second order in the step, is removed in the next one.
+    Joints hold from the first step on, until delete_fix. They are solved together with all contacts
+    of the bodies, so masses may differ by any ratio. A rotation displaces a joint by second order
+    in the step; the next step removes this.
 
     A spring with up to 1/dt^2 of stiffness per mass is explicit and dissipates nothing; a stiffer
     one is implicit, and the step damps it. Damping is implicit.

@@ -144,15 +144,15 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all directions drags material along; others are clamps, rollers or
-        # symmetry planes.
+        # A wall that moves in all directions drags material along; all others are clamps, rollers
+        # or symmetry planes.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
         drags = drags and len(group.nodes) < hub.fields.node_count
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
-        # Contact may move held nodes only as far as they give way.
+        # Contact may move nodes only in directions in which they are free.
         self.prescribes_velocity = not self.bound
         self.held_directions = tuple(k for k, v in enumerate(self.formulas) if v is not None)
 
@@ -191,8 +191,8 @@ class VelocityNodes(Fix):
                 names = " and ".join(f"v{AXES[k]}" for k in axes)
                 count = plural(len(shared), "node")
                 self.hub.warn(
-                    f"fix '{other.id}' (line {other.mark.line}) gives {count} of this group "
-                    f"another {names}: this fix decides there",
+                    f"fix '{other.id}' (line {other.mark.line}) gives {count} of this group a "
+                    f"different {names}: this fix decides there",
                     hint="groups that have no nodes in common, or NULL for one of the components",
                 )
 
@@ -243,8 +243,8 @@ class Reaction(Compute):
     Parameters
     ----------
     group
-        Group of nodes, or ``all``. Every fix velocity_nodes acts either on nodes of the group only,
-        or on none of them.
+        Group of nodes, or ``all``. Each fix velocity_nodes must act on nodes of the group only, or
+        on none of them.
 
     Example
     -------
@@ -278,8 +278,8 @@ class Reaction(Compute):
         inside = np.isin(fix.group.members, self.group.members)
         if inside.any() and not inside.all():
             raise ScriptError(
-                f"fix '{fix.id}' holds nodes of group '{self.group.id}' and further ones: "
-                "its reaction contains both",
+                f"fix '{fix.id}' holds nodes inside and outside of group '{self.group.id}': its "
+                "reaction contains both",
                 mark=self.mark,
                 expected="a group that has all nodes of a fix or none",
                 hint=f"two fixes, one for the nodes of {self.group.id}, instead of '{fix.id}'",

@@ -19,7 +19,7 @@ from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
 ALIKE = 1e-6  # of a velocity, or of the wave speed; smaller differences are ignored
-DIFFERENT = " how they move, that one how they deform"
+DIFFERENT = " how they move, the other how they deform"
 
 
 def start(mass, v, x_old, x, value, before, dt, kick):
@@ -59,7 +59,7 @@ class VelocityParticles(VelocityOfPoints):
     -----
     Publishes the force that holds the points as ID_x, ID_y, ID_z. Of several such fixes on a point
     in one direction, the last decides. It also overrides initial velocities and held nodes, with a
-    warning before the first step.
+    warning before the run.
 
     Use two cells of points or more: nodes that other points reach move less, so the outer cell of a
     grip deforms with the body. In ulmpm (linear, quadratic-spline, cubic-spline), the rest of a
@@ -94,8 +94,8 @@ class InitialVelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    With transfers that store a velocity gradient or affine velocity (APIC, TPIC and others), points
-    also get the gradient of the formulas, so the first step preserves an affine motion.
+    With transfers that store a velocity gradient or affine velocity (APIC, TPIC and similar ones),
+    points also get the gradient of the formulas, so the first step preserves an affine motion.
 
     See Also
     --------
@@ -174,7 +174,7 @@ def _said(other: Any, axes: list[int], ids: np.ndarray) -> dict[str, Any]:
         "points": "all nodes around " * by_nodes + plural(len(ids), "point"),
         "axes": " and ".join(f"v{AXES[k]}" for k in axes),
         "more": DIFFERENT * by_nodes,
-        "apart": ("groups without common points", "nodes that these points do not see")[by_nodes],
+        "apart": ("groups without common points", "nodes that these points do not reach")[by_nodes],
     }
 
 
@@ -210,7 +210,7 @@ known_failure(
     VelocityOfPoints,
     "velocities of '{other.id}' and '{part.id}'",
     when=lambda fix, scene: list(_conflicts(fix, scene.simulation)),
-    reason="fix '{other.id}' (line {other.mark.line}) gives {points} of this group another "
+    reason="fix '{other.id}' (line {other.mark.line}) gives {points} of this group a different "
     "{axes}: this fix decides{more}",
     cure="{apart}, or NULL for one of the components",
 )

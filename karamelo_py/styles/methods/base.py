@@ -21,9 +21,9 @@ from karamelo_py.script.errors import Mark, ScriptError
 LOADS = ("ContactForce", "ContactTorque")
 CORRECTED = Restrictions(
     "mass=corrected", "mass=lumped",
-    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell. The
-    # forces of contact are not known yet: the lowest cells of a block at rest have 5 % less stress,
-    # on a wall with a bound 23 %.
+    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell.
+    # Contact forces come later in a step: the lowest cells of a block at rest would have 5 % less
+    # stress, and 23 % less on a wall with a bound.
     only={"transfer": ("APIC", "AFLIP", "ASFLIP", "MLS", "TPIC", "TFLIP"),
           "basis": ("quadratic-spline", "cubic-spline"), "method": ("ulmpm", "tlmpm")},
     without=("periodic", "pore_water", "implicit", "yielding walls"),
@@ -73,7 +73,7 @@ class Method:
     corrected
         Whether accelerations are corrected for the lumped masses.
     frame
-        Whether weights belong to present or reference positions.
+        Whether weights are computed at present or reference positions.
     own_grids
         Whether each solid has a separate grid over its bounding box, with its cell size.
     fields_per_solid
@@ -113,7 +113,7 @@ class Method:
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Copy the state of the contact `before` the scene was lowered again."""
+        """Copy the state of the contact `before` this lowering of the scene."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Register a new solid."""
@@ -184,9 +184,8 @@ class Method:
         if unsteady and not scheme.traits.maps_velocity_again:
             raise ScriptError(
                 f"{registry.name_of('transfer', type(transfer))} with the basis {self.basis_name} "
-                f"and {registry.name_of('scheme', type(scheme))} is unstable: D of the affine "
-                "transfers vanishes at nodes, where moments then act on almost no "
-                "mass",
+                f"and {registry.name_of('scheme', type(scheme))} is unstable: the matrix D of "
+                "affine transfers vanishes at nodes, where moments then act on almost no mass",
                 hint="scheme(musl), or quadratic-spline, or method tlmpm",
             )
 

@@ -56,8 +56,8 @@ class Convected(Method):
             raise ScriptError(
                 f"domains of the shape {name} are for {basis.dimension} dimensions, and "
                 f"this scene has {d}",
-                hint=f"one of {', '.join(fit)} in its place" if fit
-                else "method ulmpm with the basis cpgimp: in one dimension that is the same thing",
+                hint=f"one of {', '.join(fit)} instead" if fit
+                else "method ulmpm with the basis cpgimp, which is the same in 1D",
             )  # fmt: skip
         elements = {n: v.element for n, v in VARIANTS.items() if v.dimension == d}
         boxes = [n for n, other in elements.items() if other is None or other.box]
@@ -72,15 +72,15 @@ class Convected(Method):
                 hint = f"{fit[0]} instead of {name}" if fit else "a mesh of linear elements"
             if not fits:
                 raise ScriptError(
-                    f"points of solid '{solid.id}' have {has} around them, and {name} domains "
-                    f"cannot be made of those",
+                    f"points of solid '{solid.id}' have {has} around them, which cannot be "
+                    f"converted to {name} domains",
                     mark=solid.mark,
                     hint=hint,
                 )
 
 
 class ULCPDI(Convected, ULMPM):
-    """CPDI: each point has a deforming domain, and sees the nodes around its corners.
+    """CPDI: each point has a deforming domain, and interacts with the nodes around its corners.
 
     All solids have one grid. No numerical fracture at any stretch, and no jump of forces when a
     point crosses a cell face (Sadeghirad et al. 2011, 2013).

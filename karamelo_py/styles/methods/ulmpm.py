@@ -52,18 +52,19 @@ known_failure(
     ULMPM,
     "bodies that part",
     when=lambda method, scene: scene.parting,
-    reason="solids '{one}' and '{two}' begin {cells:.2g} cells apart and part at {speed:.3g}, and "
-    "on one grid bodies within a cell of each other stick together: they pull each other back",
+    reason="solids '{one}' and '{two}' start {cells:.2g} cells apart and separate at "
+    "{speed:.3g}; on one grid, bodies within a cell of each other stick together and pull "
+    "each other back",
     cure="method(ulmpm/contacts, ...), or a gap of two cells",
 )
 
 
 class TLMPM(Method):
-    """Total Lagrangian MPM: weights belong to reference positions, each solid has its own grid.
+    """Total Lagrangian MPM: weights follow reference positions; each solid has its own grid.
 
     No point crosses a cell face, and a body breaks only if its law says so. Solids do not interact
-    on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration). For bodies
-    that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A Total-Lagrangian
+    on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration). Use it for
+    bodies that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A Total-Lagrangian
     material point method for solid mechanics problems involving large deformations").
 
     Example

@@ -87,15 +87,15 @@ class ULMPMContacts(Method):
     all corners of the cells of the base. With splines it should be three cells thick: the surface
     of a thinner base appears higher by up to a quarter of a cell.
 
-    Walls one cell thick hold liquids and granular materials, also in corners, inclined and moving:
-    in 1e5 steps points of water and sand penetrated walls at rest by at most 10 % of a cell, gel by
-    15 %, and moving walls by 26 %. For 100 steps after a contact at a node, points may leave the
-    wall there but not approach it.
+    Walls one cell thick contain liquids and granular materials, even with corners, inclined or
+    moving: in 1e5 steps points of water and sand penetrated walls at rest by at most 10 % of a
+    cell, gel by 15 %, and moving walls by 26 %. For 100 steps after contact at a node, points may
+    move away from the wall there but not approach it.
 
     Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
     grad N of both, averaged over the neighbouring nodes with the weights 1/4, 1/2, 1/4 along each
-    axis. The solid whose sums scatter less has more weight, so a face outweighs a corner. Of a
-    solid with a prescribed velocity only its own normal counts, except at the end of its face.
+    axis. The solid whose sums scatter less has more weight, so a face outweighs a corner. If the
+    velocity of a solid is prescribed, its normal alone is used, except at the end of its face.
     Solids separated along a grid axis are not in contact.
 
     At a node of more than two solids, the impulses of all approaching pairs follow from the same
@@ -132,7 +132,7 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """`nodes`, and those around points of a body in cells with all corners in `nodes`.
+        """`nodes`, and nodes around points of a body in cells with all corners in `nodes`.
 
         Otherwise the contact normal would rotate: splines and domains reach further nodes.
         """

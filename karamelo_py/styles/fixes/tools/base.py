@@ -29,8 +29,8 @@ class ToolFix(PointForces):
         soft = (s for s in hub.solids.values() if not _shear_modulus(s) and group.touches(s))
         if self.needs_stiffness and (solid := next(soft, None)):
             raise ScriptError(
-                f"material '{solid.material.id}' of solid '{solid.id}' has no shear modulus, "
-                "with which the force would go",
+                f"material '{solid.material.id}' of solid '{solid.id}' has no shear modulus, to "
+                "which the force is proportional",
                 argument="group",
                 expected="a group of points of elastic materials",
             )
@@ -98,7 +98,7 @@ class PlaneTool(ToolFix):
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Present depth (n,) of points past the plane, and its normal (d,)."""
+        """Depth (n,) of points past the plane, and its normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_origin(points, self.origin) @ normal), normal
 
@@ -111,7 +111,7 @@ known_failure(
     "points behind the plane of fix '{part.id}'",
     when=begin_behind,
     reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
-    cure="the other direction of the normal, which shows where points may be, or another place of "
+    cure="the opposite normal, which points to the side of the points, or another position of "
     "the plane or the body",
 )
 
@@ -142,5 +142,5 @@ known_failure(
     "points in the ball of fix '{part.id}'",
     when=begin_behind,
     reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
-    cure="another place of the ball or the body",
+    cure="another position of the ball or the body",
 )

@@ -32,7 +32,7 @@ from karamelo_py.styles.fixes.grip import memory_for
 from karamelo_py.styles.fixes.tools.base import begin_behind
 from karamelo_py.styles.fixes.tools.stiff import StiffTool
 
-# Core seconds per point near some thousand faces, and near a simple shape.
+# Core seconds per point near a surface of some thousand faces, and near a simple shape.
 OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
@@ -61,28 +61,28 @@ class ContactSurface(StiffTool):
 
     Points are spheres (in 2D disks) with a radius of half the side of a cube of their volume,
     stretched along the normal while they touch. The force acts at their surface. At the depth p it
-    is k p + 0.2 m p'/dt out of the region, never a pull, with k = 0.5 m/dt^2 of the first touch and
-    dt as in contact/minimize_penetration. Friction, at most mu times this force, stops the slip on
-    the moving region and reverses it with the same stiffness: a load that it can hold stays at
-    rest, and yields by mu p before it slides.
+    is k p + 0.2 m p'/dt out of the region, and never a pull. k is 0.5 m/dt^2 at the first touch,
+    with dt as in contact/minimize_penetration. Friction, at most mu times this force, stops the
+    slip on the moving region and reverses it with the same stiffness: a point whose load it can
+    hold is at rest, after a displacement of at most mu p.
 
-    The spring gives back what it takes. Damping and friction do not: the closing table has the line
-    ``lost by contact``, energy that the balance counts as work of the fix. A disk that hits at 5 %
-    of its wave speed loses 3.0, 1.4 and 0.4 % with 4, 8 and 16 cells in the radius, and 4.7, 2.6
-    and 1.5 % at 25 %. A rod of 16 x 4 cells returns with 0.96 of its speed (exact 1).
+    The spring conserves energy. Damping and friction dissipate it: the summary of the run has the
+    line ``lost by contact``, energy that the balance counts as work of the fix. A disk that hits at
+    5 % of its wave speed loses 3.0, 1.4 and 0.4 % with 4, 8 and 16 cells in the radius, and 4.7,
+    2.6 and 1.5 % at 25 %. A rod of 16 x 4 cells returns with 0.96 of its speed (exact 1).
 
     Under its weight, a block has the right stress in its lowest row within 6 % with a linear
     basis, and 22 % too little (29 % too much in the next row) with quadratic-spline.
 
-    The force acts in the direction of the steepest decrease of the depth. A point deeper than a
-    cell, or in the middle of a thin region, ends the run; past the middle it leaves on the other
-    side. A wall of one cell stops bodies up to a third of their wave speed.
+    The force acts in the direction in which the depth decreases fastest. A point deeper than a
+    cell, or in the middle of a thin region, ends the run. A point past the middle of a thin region
+    is pushed out on the other side: a wall of one cell stops bodies up to 1/3 of their wave speed.
 
     A block on a slope of 20 degrees with mu = 0.2 has the acceleration 1.54 in tlmpm and 1.55 in
-    ulmpm (exact 1.541; points=cut), with an energy balance to 0.2 %. It sinks in by twice the force
-    on a point divided by m / dt^2, here 1 % of a cell. A belt over half a bollard with mu = 0.3 is
-    drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for this one, as thick
-    as 10 % of the radius).
+    ulmpm (exact 1.541; points=cut), with an energy balance to 0.2 %. The block sinks in by twice
+    the force on a point divided by m / dt^2, here 1 % of a cell. A belt over half a bollard with mu
+    = 0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for this one,
+    as thick as 10 % of the radius).
 
     See Also
     --------
@@ -102,7 +102,7 @@ class ContactSurface(StiffTool):
         super().__init__(hub, group)
         if region.flat:
             raise ScriptError(
-                f"region '{region.id}' has lines or surfaces, which nothing can be in",
+                f"region '{region.id}' has lines or surfaces and no inside",
                 argument="region",
                 expected="a region with an inside: a mesh of elements of volume (in 2D of area), "
                 "a closed STL surface, a block, ...",
@@ -157,7 +157,7 @@ class ContactSurface(StiffTool):
     def _refuse(self, number: int) -> int:
         raise ScriptError(
             f"{named(self.hub, number)} is so deep in region '{self.region.id}' of fix "
-            f"'{self.id}' that no way out of it is the shortest",
+            f"'{self.id}' that the direction to its surface is ambiguous",
             mark=self.mark,
             expected="points that come less than a cell below the surface",
             hint="smaller steps (dt_factor), a stiffer body, or a region that moves more "
@@ -214,8 +214,8 @@ known_failure(
     ContactSurface,
     "points pressed against the region of fix '{part.id}'",
     when=_begin_pressed,
-    reason="{count} of {of} points of its group begin with half of their radius in the region, as "
-    "at faces that lean to the grid, and throw the body off",
+    reason="{count} of {of} points of its group start with half of their radius in the region, "
+    "as at faces inclined to the grid, and throw the body off",
     cure="points=cut in the command solid, or a gap of a quarter of a cell",
 )
 
@@ -224,6 +224,6 @@ known_failure(
     "points in the region of fix '{part.id}'",
     when=begin_behind,
     reason="{which} points of its group begin there, up to {depth:.3g} deep, and are thrown out",
-    cure="the word exterior for what is to hold the points, or another place of the region or the "
-    "body",
+    cure="the word exterior for a region that holds the points, or another position of the "
+    "region or the body",
 )

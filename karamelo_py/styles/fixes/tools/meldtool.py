@@ -20,8 +20,8 @@ class MeldTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness in shear moduli of the point, times a length: a number or a formula of time, as
-        are all the following.
+        Stiffness relative to the shear modulus of the point, a length. This and all further numbers
+        may be formulas of time.
     axis
         The word x, y or z: the direction of the axis.
     half_width

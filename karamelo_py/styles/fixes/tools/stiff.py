@@ -11,7 +11,7 @@ from karamelo_py.scene.views import PointsView
 from karamelo_py.styles.fixes.grip import GripOfTool, Gripping
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
-CLOSE = 0.5  # radii off the surface, within which bouncing points retain their grip
+CLOSE = 0.5  # distance from the surface, in radii, within which bouncing points retain their grip
 
 
 class StiffTool(Gripping, ToolFix):
