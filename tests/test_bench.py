@@ -356,4 +356,4 @@ def test_scenes_grow_with_processes():
 
 def test_what_is_no_list_of_ranks(capsys):
     assert main(["bench", "--ranks", "1,x"]) == 1
-    assert "'1,x' is no list of numbers of processes, such as 1,2,4" in capsys.readouterr().err
+    assert "'1,x' is not a list of process counts, such as 1,2,4" in capsys.readouterr().err

@@ -250,7 +250,7 @@ def scene(line):
         ("material(m, motionless, 1)", "material motionless", "advance is not "),
         ("material(m, raising, 1)", "material raising", "name 'unknown' is not"),
         ("material(m, growing, 1)", "material growing",
-         "what a point remembers is 1 numbers at first and 2 after a step"),
+         "the memory of a point has 1 numbers at first and 2 after a step"),
         ("material(m, short, 1)", "material short",
          "cauchy_stress has to return a symmetric tensor of 3, not a tuple of 2"),
         ("strength(s, forgetful, 50)", "strength forgetful",

@@ -117,7 +117,7 @@ def test_searches_that_disagree_give_no_range(folder, capsys):
     (value,) = re.findall(r"^speed +(\S+) +–$", out, re.M)
     # The noise of 0.01 over slopes of up to 3 s.
     assert float(value) == pytest.approx(11.5, abs=0.01)
-    ends = re.findall(r"^  speed = (\S+): what remains is (\S+)$", out, re.M)
+    ends = re.findall(r"^  speed = (\S+): remaining difference (\S+)$", out, re.M)
     assert len(ends) >= 2 and ends[0][0] == value and float(ends[1][1]) > 10 * float(ends[0][1])
     assert "Inertia makes curves rough" in out and "load slowly" in out
 

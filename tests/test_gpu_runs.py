@@ -237,7 +237,7 @@ def test_what_is_refused_is_said_before_the_run(run_interpreted):
     lines = ("fix(F, force_particles, all, 1, 0)", "fix(G, force_particles, all, 1, 0)", "run(1)")
     for command in ("run", "check"):
         said = run_interpreted(squares(*lines), "--gpu", status=1, command=command).err
-        assert said.count("acts from Python in each step (initial_integrate)") == 2
+        assert said.count("calls Python in each step (initial_integrate)") == 2
         assert "in.script:21:1: error: run: fix force_particles 'F'" in said
         assert "hint: a fix whose hooks are compiled, or leave out --gpu" in said
     later = run_interpreted(squares("run(1)", *lines), "--gpu", folder="later", status=1)
@@ -246,7 +246,7 @@ def test_what_is_refused_is_said_before_the_run(run_interpreted):
     assert "scheme quasi-static does not support --gpu" in said
     assert "    7 | scheme(quasi-static)" in said
     said = run_interpreted(squares("run(1)"), "--gpu", "--ranks", "2", status=1).err
-    assert said.startswith("error: --gpu: one GPU has all of a scene, and 2 processes would divide")
+    assert said.startswith("error: --gpu: one GPU computes the whole scene, and 2 processes")
 
 
 def test_check_says_what_a_scene_takes_there(run_interpreted):
@@ -278,7 +278,9 @@ def test_a_scene_that_is_too_large_for_the_gpu(run_script, monkeypatch):
     """By its points alone, before there are arrays; by all that it takes, before it runs."""
     monkeypatch.setattr(gpu.Emulator, "memory", lambda self: (500, 1000))
     said = run_script(squares("run(1)"), "--gpu", status=1).err
-    assert "in.script:9:1: error: solid: the GPU has no room for the scene: 8 points, which" in said
+    assert (
+        ":9:1: error: solid: the scene does not fit into the memory of the GPU: 8 points," in said
+    )
     assert "emulated has 4.66e-07 GiB of 9.31e-07 GiB free" in said
     monkeypatch.undo()
 
@@ -288,7 +290,7 @@ def test_a_scene_that_is_too_large_for_the_gpu(run_script, monkeypatch):
     monkeypatch.setenv("KARAMELO_PY_GPU", "emulated")
     monkeypatch.setattr(gpu.Emulator, "allocate", refuse)
     said = run_script(squares("run(1)"), "--gpu", status=1).err
-    assert "the GPU has no room for the scene: 8 points; emulated has" in said
+    assert "the scene does not fit into the memory of the GPU: 8 points; emulated has" in said
     assert (
         "hint: larger cells, or fewer points per cell; precision(single); leave out --gpu" in said
     )

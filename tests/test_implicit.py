@@ -402,11 +402,11 @@ def test_held_nodes_bear_the_weight(run_script):
 
 
 WRONG = [
-    (HELD.replace("left, 0, NULL", "left, leq 0, NULL"), "changes velocities by what they are",
+    (HELD.replace("left, 0, NULL", "left, leq 0, NULL"), "whose changes depend on the velocities",
      "hold"),
-    (HELD + "\n    fix(calm, local_damping, all, 0.8)", "changes velocities by what they are",
+    (HELD + "\n    fix(calm, local_damping, all, 0.8)", "whose changes depend on the velocities",
      "calm"),
-    (HELD + "\n    fix(v, velocity_particles, all, 0, 0)", "knows no fix velocity_particles", "v"),
+    (HELD + "\n    fix(v, velocity_particles, all, 0, 0)", "support fix velocity_particles", "v"),
     ("fix(pull, body_force, all, 1, 0)", "solid 's' is held by nothing", ""),
     ("region(corner, block, -INF, 1e-6, -INF, 1e-6)\n    "
      "group(corner, nodes, region, corner, all)" "\n    fix(pull, velocity_nodes, corner, 0, 0)",

@@ -554,11 +554,11 @@ def test_without_mpi4py(tmp_path, monkeypatch, capsys):
 
 def test_what_several_processes_cannot_do(monkeypatch, capsys):
     assert main(["sweep", "in.script", "--ranks", "2"]) == 1
-    assert "error: karamelo-py sweep is of one process" in capsys.readouterr().err
+    assert "error: karamelo-py sweep runs in one process" in capsys.readouterr().err
     monkeypatch.setenv("SLURM_STEP_NUM_TASKS", "4")
     monkeypatch.setenv("SLURM_PROCID", "0")
     assert main(["styles"]) == 1
-    assert "karamelo-py styles is of one process, and 4 were started" in capsys.readouterr().err
+    assert "karamelo-py styles runs in one process, but 4 were started" in capsys.readouterr().err
 
 
 def test_a_scene_in_python_is_of_one_process(monkeypatch):
@@ -614,7 +614,7 @@ def test_what_is_passed_on_is_foretold(tmp_path):
         sum(map(int, (tmp_path / "run" / f"passed.{rank}").read_text().split()[-2:]))
         for rank in (0, 1)
     ]
-    low, high = re.search(r"bytes given in a step +(\d+) +(\d+)", out).groups()
+    low, high = re.search(r"bytes sent per step +(\d+) +(\d+)", out).groups()
     assert sorted(found) == [int(low), int(high)] and int(low) > 0
     points = re.search(r"  points +(\d+) +(\d+)", out).groups()
     assert sum(map(int, points)) == 100
@@ -630,4 +630,4 @@ def test_the_page_of_many_processes(tmp_path):
     lines = checked.communicate(timeout=100)[0].partition("shared out among 2 processes")[2]
     names = re.findall(r"^  ([a-z][a-zMB, ]*[a-zB]) +[\d.]", lines, re.M)
     assert len(names) == 8 and all(f"| `{name}` |" in page for name in names)
-    assert "so few points are not shared out" in lines
+    assert "so few points are not distributed" in lines

@@ -457,7 +457,7 @@ def test_a_row_of_a_plug_in_is_taken_on_both_back_ends_or_refused(tmp_path):
         assert read_log(tmp_path)[1] == pytest.approx(0.03125e-6 * np.array([1, 1 / 4, 1 / 16]))
     done = karamelo_py(site, tmp_path, "in.brakes", "--gpu")
     assert done.returncode == 1
-    assert "a GPU does not take the row OnProcessors of scheme half" in done.stderr
+    assert "a GPU does not support the row OnProcessors of scheme half" in done.stderr
     assert "scheme(half)" in done.stderr
 
 

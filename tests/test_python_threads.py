@@ -184,5 +184,5 @@ def test_one_simulation_takes_one_call_at_a_time():
     first, refused = at_once(lambda: sim.run(1), second)
     assert first is None
     assert isinstance(refused, SimulationError)
-    assert "is at work in another thread" in str(refused)
+    assert "is running in another thread" in str(refused)
     assert sim.evaluate("timestep") == 1

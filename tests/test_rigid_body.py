@@ -137,13 +137,13 @@ def test_a_body_under_another_id_is_refused_in_a_restart(run_interpreted):
     run_interpreted(text.replace("run(10)", "restart(5, r.*.h5)\nrun(5)"), folder="a")
     again = text.replace("fix(b,", "fix(other,").replace("run(10)", "read_restart(r.5.h5)\nrun(5)")
     result = run_interpreted(again, folder="a", status=1)
-    assert "are not where its fix has the body" in result.err, result.err
+    assert "are not at the position stored by its fix" in result.err, result.err
 
 
 def test_a_spinning_body_without_its_fix_is_reported(run_interpreted):
     text = alone("spin=1", "step").replace("run(10)", "run(1)\ndelete_fix(b)\nrun(1)")
     result = run_interpreted(text.replace("log_modify(custom, step, time, step)", ""))
-    assert "its points fly straight on" in " ".join(result.err.split())
+    assert "its points move along straight lines" in " ".join(result.err.split())
 
 
 def test_a_body_is_released(run_interpreted):

@@ -224,7 +224,10 @@ def test_conditions(run_interpreted):
 @pytest.mark.parametrize(
     ("run", "says"),
     [
-        ("run_until(Ek)", "the condition holds before the first step of this run: it takes none"),
+        (
+            "run_until(Ek)",
+            "the condition holds before the first step of this run, which has no steps",
+        ),
         ("run_while(Ek < 1e-9)", "the condition does not hold before the first step"),
         ("run_while(Ek > 1 && timestep < 2)\nrun_until(timestep > 3)", ""),
     ],

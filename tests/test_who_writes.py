@@ -55,7 +55,7 @@ def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
         wait_for(tmp_path / "sweep" / "E=1" / "log.mpm")
         if sent == signal.SIGTERM:
             other = started(tmp_path, *words)
-            assert "another study is at work in sweep" in other.communicate(timeout=60)[1]
+            assert "another study runs in sweep" in other.communicate(timeout=60)[1]
             assert other.returncode == 1
         study.send_signal(sent)
         study.communicate(timeout=60)
@@ -117,7 +117,7 @@ def test_a_folder_that_is_gone(tmp_path):
         gone = tmp_path / words[0]
         gone.mkdir()
         run = started(gone, *words, preexec_fn=gone.rmdir)
-        assert "the current folder is not there any more" in run.communicate(timeout=60)[1]
+        assert "the current folder no longer exists" in run.communicate(timeout=60)[1]
         assert run.returncode == 1
 
 

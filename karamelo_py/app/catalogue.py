@@ -84,7 +84,7 @@ def print_help(
         return _explain(homes[0], name)
     if homes:
         raise ScriptError(
-            f"'{name}' is the name of several things: {', '.join(homes)}",
+            f"'{name}' has several meanings: {', '.join(homes)}",
             expected=" or ".join(f"karamelo-py help {family} {name}" for family in homes),
         )
     if _singular(name) in families():

@@ -41,7 +41,7 @@ the stages of a step. Mistakes further down are found, too. Nothing runs, and no
 HELP = """
 karamelo-py help COMMAND         explain a command: karamelo-py help solid
 karamelo-py help STYLE           explain a style: karamelo-py help body_force
-karamelo-py help FAMILY STYLE    where a name means several things:
+karamelo-py help FAMILY STYLE    if a name has several meanings:
                                  karamelo-py help fix kinetic_energy
 karamelo-py help WORD            find a style by a word: karamelo-py help contact
 karamelo-py styles [FAMILY]      list commands and styles"""
@@ -101,7 +101,7 @@ def _dispatch(arguments: list[str]) -> int:
         os.getcwd()
     except FileNotFoundError:
         raise ScriptError(
-            "the current folder is not there any more", hint="cd into a folder that is there"
+            "the current folder no longer exists", hint="cd into a folder that exists"
         ) from None
     arguments = arguments or ["-h"]
     first = arguments[0]
@@ -147,11 +147,11 @@ def _dispatch(arguments: list[str]) -> int:
     if surplus:
         raise _surplus(arguments, surplus, commands.choices.get(arguments[0], parser))
     size, rank = launched()
-    pooled = "on" in options and options.on == "mpi"  # the others work for this one
+    pooled = "on" in options and options.on == "mpi"
     if size > 1 and not pooled and arguments[0] != "run" and (rank or arguments[0] != "check"):
         if rank == 0:
             raise ScriptError(
-                f"karamelo-py {arguments[0]} is of one process, and {size} were started",
+                f"karamelo-py {arguments[0]} runs in one process, but {size} were started",
                 hint=f"without mpiexec: karamelo-py {arguments[0]} ...",
             )
         return launch.ERROR
@@ -208,7 +208,7 @@ def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> Scr
     option = next((word.partition("=")[0] for word in words if word.startswith("-")), None)
     if option == "--ranks":
         return ScriptError(
-            f"karamelo-py {command} is of one process",
+            f"karamelo-py {command} runs in one process",
             expected="--ranks for a script (karamelo-py SCRIPT --ranks N), check or bench",
         )
     close = nearest(option, parser.options()) if option else None
@@ -295,7 +295,7 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
         )  # fmt: skip
         script.add_argument(
             "--gpu", action="store_true",
-            help="let an NVIDIA GPU take the steps (pip install '.[gpu]')",
+            help="compute the steps on an NVIDIA GPU (pip install '.[gpu]')",
         )  # fmt: skip
         script.add_argument(
             "--trust-geometries", action="store_true",
@@ -368,7 +368,7 @@ def _run(options: argparse.Namespace) -> int:
     if (options.ranks or 1) > 1 and not options.checking and not options.gpu:
         if options.live:
             raise ScriptError(
-                f"a live page shows a run of one process, and this one has {options.ranks}",
+                f"a live page shows a run of one process, but this run has {options.ranks}",
                 hint="--threads N instead of --ranks, or karamelo-py view --live FOLDER",
             )
         return launch.launch(options.ranks, options.command_line)

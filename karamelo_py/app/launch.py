@@ -221,7 +221,7 @@ class Launcher:
         if self.over:
             return render_message("error", f"{who} when the runs were over: all files are complete")
         signalled = sent in ENDING
-        hint = None if signalled else "the system does that to who takes too much memory"
+        hint = None if signalled else "the system ends processes that take too much memory"
         who += ", and the run with it: files are complete up to there"
         return render_message("error", who, hint=hint)
 

@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Draw curves of a log.
-The log is log.mpm or log.csv. Without columns, lists those that there are. The command of scripts
+The log is log.mpm or log.csv. Without columns, lists all columns. The command of scripts
 is explained by karamelo-py help command plot."""
 
 

@@ -176,14 +176,13 @@ class Variables(MutableMapping):
     def __setitem__(self, name: str, value: Any) -> None:
         if name in self._sim._interpreter.presets:
             raise SimulationError(
-                f"Simulation(..., {name}=...) has given '{name}', which takes the place of what is "
-                "assigned later",
+                f"Simulation(..., {name}=...) sets '{name}', which overrides later assignments",
                 hint="another simulation with another value",
             )
         self._sim._do(f"{name} = {_as_script_text(value)}", "Simulation.variables")
 
     def __delitem__(self, name: str) -> None:
-        raise SimulationError(f"'{name}' stays: a script forgets no variable")
+        raise SimulationError(f"'{name}' cannot be deleted: variables of a script are permanent")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._held())
@@ -294,7 +293,7 @@ class Simulation:
 
     def _claimed(self, out: str | PathLike) -> Path:
         if not isinstance(out, (str, PathLike)):
-            raise ScriptError(f"out={out!r} is no name of a folder", hint='out="files"')
+            raise ScriptError(f"out={out!r} is not the name of a folder", hint='out="files"')
         folder = Path(out).absolute()
         make_folder(folder, 'out="{}"')
         if folder in _folders:
@@ -360,7 +359,7 @@ class Simulation:
     def _in_one_thread(self) -> Iterator[None]:
         if not self._at_work.acquire(blocking=False):
             raise SimulationError(
-                "this simulation is at work in another thread",
+                "this simulation is running in another thread",
                 hint="wait for that, or one Simulation for each thread",
             )
         try:
@@ -427,7 +426,7 @@ class Simulation:
             return
         if not self._interpreter.waits:
             raise SimulationError(
-                "there is no rest of a script to carry out", hint="run(100), run_time(0.5) ..."
+                "no script is left to execute", hint="run(100), run_time(0.5) ..."
             )
         with self._carried_out():
             self._interpreter.go_on()
@@ -599,6 +598,6 @@ def _as_script_text(value: Any) -> str:
     if isinstance(value, str):
         words = value.split()
         texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
-        # Words separated only by blanks are no formula.
+        # Words separated only by blanks are not a formula.
         return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
     raise TypeError(f"{value!r} is no number, text, True, False, None or function")

@@ -55,8 +55,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--script", metavar="FILE",
-        help="the script of the run, which tells of its walls and tools (--outlines), its groups "
-        "and solids (--only \"not tool\") and its variables; dumps hold none",
+        help="the script of the run, which defines walls and tools (--outlines), groups and "
+        "solids (--only \"not tool\") and variables; dumps do not contain them",
     )  # fmt: skip
     add_variables(parser, "set a variable of the script, as in the run")
     parser.add_argument(
@@ -76,7 +76,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def _pixels(text: str) -> int:
     if not text.isdecimal() or not LEAST_PIXELS <= int(text) <= MOST_PIXELS:
-        message = f"'{text}' is no number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
+        message = f"'{text}' is not a number of pixels from {LEAST_PIXELS} to {MOST_PIXELS}"
         raise argparse.ArgumentTypeError(message)
     return int(text)
 
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
     drawn, scene = 0, _scene(options)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:
         raise ScriptError(
-            f"{options.output} is one picture, and these are dumps of several moments",
+            f"{options.output} is one picture, and these dumps have several times",
             expected="a name with *, which becomes the step, or a movie (.gif, .mp4)",
             hint=f"-o {options.output.stem}.*{options.output.suffix}",
         )

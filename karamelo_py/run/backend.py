@@ -19,7 +19,7 @@ class Backend(SceneState, Protocol):
     steps: StepSize
     energy_watch: EnergyWatch
     rollback: RollbackPoint | None
-    states_every: int  # steps between states to return to
+    states_every: int  # steps between stored states
     repeats_steps: bool  # to return to a state
     remedy: str  # changes that may prevent a failed step
 

@@ -12,10 +12,10 @@ from karamelo_py.run.state import SceneState
 
 
 class BodyMotion(NamedTuple):
-    number: int  # of the solid in the scene
+    number: int  # number of the solid in the scene
     mass: float
-    centre: np.ndarray  # (d,) of mass
-    velocity: np.ndarray  # of the centre
+    centre: np.ndarray  # (d,) centre of mass
+    velocity: np.ndarray  # (d,) velocity of the centre
     spread: np.ndarray  # (d, d) sum m X X, with X from the centre
     shear: np.ndarray  # (d, d) sum m X V, relative to the centre
     low: np.ndarray  # (d,) bounding box of the points

@@ -30,7 +30,7 @@ class RunCondition(NamedTuple):
         """A forgotten or reversed comparison would end the run at once."""
         holds = "holds" if self.until else "does not hold"
         hub.warn(
-            f"the condition {holds} before the first step of this run: it takes none",
-            hint="run_until ends where its condition is anything but 0, run_while where it is "
-            "0; comparisons are 1 or 0",
+            f"the condition {holds} before the first step of this run, which has no steps",
+            hint="run_until ends when its condition is not 0, run_while when it is 0; "
+            "comparisons are 1 or 0",
         )

@@ -36,7 +36,7 @@ class LoadPath(Named):
     strain: Mapping[str, float]  # by component
     stress: Mapping[str, float]
     shear: Sequence[str] = ()  # components in simple instead of pure shear
-    volumetric: float | None = None  # sum of normal strains, shared by those without a target
+    volumetric: float | None = None  # sum of normal strains, divided among those without a target
     turn: float = 0.0  # angle about z
 
     catalogue = "load_paths"

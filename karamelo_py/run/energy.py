@@ -63,8 +63,7 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 class EnergyWatch:
-    """Monitors the energy balance and the range of temperatures, which only it and kernels
-    write."""
+    """Monitors the energy balance and the range of temperatures."""
 
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control

@@ -89,7 +89,7 @@ class StepsOnCard:
         self.images.of((self.fate, self.use, self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
         self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
-        self.visits: dict[int, gpu.Stage] = {}  # of sweeps, by id
+        self.visits: dict[int, gpu.Stage] = {}  # sweeps, by id
         first, rows = (list(self.plain(of(*program))) for of in (first_rows, rows_of))
         self.cells = [self._cells(block) for block in s.blocks]
         self.begin: list[KernelLaunch] = []

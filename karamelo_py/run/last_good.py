@@ -67,7 +67,7 @@ class LastGood(NamedTuple):
             before = watch.energy()
             good.again(simulation.advance, step)
             if path is None and watch.growth_since(before) > WITHIN:
-                # The monitor averages over 100 steps, so it is late.
+                # The monitor averages over 100 steps and reports late.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
         path = path or self._write()

@@ -1,6 +1,6 @@
 """One run: steps in chunks, outputs when due, events for listeners.
 
-`output.schedule` writes log and dumps, `run.rollback` judges steps and stops a run, and
+`output.schedule` writes log and dumps, `run.rollback` checks steps and stops a run, and
 `run.step_size` chooses the step.
 """
 
@@ -45,7 +45,7 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signalled = 0  # number of a signal to this process
+    signalled = 0  # signal to this process
     resumed_from: Path | None = None
     interrupted = 0  # signal that ends all processes
 

@@ -66,7 +66,7 @@ def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
     at = "" if x is None else f" at {where(x[: hub.domain.dimension])}"
     return Trouble(
         f"{message}: fix {fix.id} gets {value_text}{at} from {formula.text}",
-        "a formula that is a number at all times and places of the run, such as by max(a, b) or "
+        "a formula that is a number everywhere in the run, such as with max(a, b) or "
         "if(condition, a, b)",
         "not-a-number",
         mark=fix.mark,
@@ -75,6 +75,6 @@ def no_number(simulation: SceneState, message: str, hint: str) -> Trouble:
 
 def endless_speed(simulation: SceneState) -> ScriptError:
     message = f"points have a velocity that is not a number at time {simulation.time:.6g}"
-    hint = "look for a formula that gives NaN or infinity, such as a division by zero"
+    hint = "look for a formula that returns NaN or infinity, such as a division by zero"
     trouble = no_number(simulation, message, hint)
     return ScriptError(trouble.message, mark=trouble.mark, hint=trouble.fix, code=trouble.code)

@@ -79,7 +79,7 @@ class SimulationOnCard(Simulation):
         if self._ahead:
             self._ahead = False
             self._steps.fetch()
-            self.tiles.unsort(self.control, limit=0.0)  # tiles know nothing of these steps
+            self.tiles.unsort(self.control, limit=0.0)  # tiles lack these steps
 
     def changed(self) -> None:
         self._sent = False

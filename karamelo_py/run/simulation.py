@@ -45,7 +45,7 @@ class Simulation(SceneArrays):
     (`run.implicit.load_steps`).
     """
 
-    states_every = 100  # steps between states to return to
+    states_every = 100  # steps between stored states
     remedy = "a smaller time step (set_dt, dt_factor)"
     repeats_steps = True  # to return to a state; load steps take too long
     implicit = False

@@ -35,8 +35,8 @@ LONE = 0.9  # fraction of an isolated point's stable step: expanded points are s
 # Of the stable step with corrected accelerations in the total frame: blocks with one point per cell
 # gain energy at 0.73.
 CORRECTED_TOTAL = 0.7
-# The same of an isolated point's, instead of LONE: a dam break with two points per cell gained
-# energy where its water splashed at 0.43 h/c, and none at 0.38.
+# Fraction of an isolated point's stable step, instead of LONE: a dam break with two points per cell
+# gained energy where its water splashed at 0.43 h/c, and none at 0.38.
 CORRECTED_LONE = 0.55
 DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 

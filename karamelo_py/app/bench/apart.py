@@ -85,7 +85,7 @@ class Scaled(NamedTuple):
     weak: bool
     points: int
     best: float  # particle-steps per second
-    exchange: float  # fraction of time that the process with the least waits
+    exchange: float  # fraction of time in which the busiest process waits
     imbalance: float  # mean fraction of longer waits
 
 

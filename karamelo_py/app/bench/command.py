@@ -29,7 +29,7 @@ WIDTH = max(map(len, WORKLOADS))
 DESCRIPTION = f"""\
 Measure the speed of this machine on known scenes, all or those that are named: particle-steps per
 second of the fastest of five repetitions, bytes per particle, the time of each stage of a step, and
-what limits it: memory, arithmetic, nodes or overhead. Each of several runs in a separate process.
+its limit: memory, arithmetic, nodes or overhead. Several scenes run in separate processes.
 
 workloads:
 {chr(10).join(f"  {name:<{WIDTH}}  {w.title}" for name, w in WORKLOADS.items())}"""
@@ -56,9 +56,9 @@ def add_options(parser: ArgumentParser) -> None:
         help="measure an NVIDIA GPU, at 1, 4 and 16 million points unless -var says how fine "
         f"(default workloads: {', '.join(on_card.USUAL)})",
     )  # fmt: skip
-    parser.add_argument("-o", type=Path, metavar="FILE", help="write what is measured, as JSON")
+    parser.add_argument("-o", type=Path, metavar="FILE", help="write the measurements as JSON")
     parser.add_argument(
-        "--against", type=Path, metavar="FILE", help="compare with what -o has written before"
+        "--against", type=Path, metavar="FILE", help="compare with an earlier file of -o"
     )
 
 
@@ -140,7 +140,7 @@ def _on_card(
 def _counts(text: str) -> list[int]:
     words = text.split(",")
     if not all(word.isdigit() and int(word) for word in words):
-        raise ArgumentTypeError(f"'{text}' is no list of numbers of processes, such as 1,2,4")
+        raise ArgumentTypeError(f"'{text}' is not a list of process counts, such as 1,2,4")
     return [int(word) for word in words]
 
 

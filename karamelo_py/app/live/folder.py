@@ -18,7 +18,7 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
 PAUSE = 0.5  # seconds between polls
-FILES = 8  # per poll: the first are shown early
+FILES = 8  # read per poll, so that the first appear early
 WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 

@@ -41,14 +41,14 @@ from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Runs the small members of a family, extrapolates error and cost, and says which variant meets a
-target at the least cost, how sure that is, and what to write.
+target at the least cost, with what certainty, and how to set it.
 
   karamelo-py advise in.file -var N=10,20,40,80,160 -var basis=linear,cubic-spline \\
     -accuracy err -target 1e-3
 
 One variable, the number with the most values, makes a scene finer; the others are choices. Where
-all numbers have one value, words are compared at that size. Runs go one at a time, since their
-times count, unless another cost is named. Runs of an earlier call are used. A run that meets the
+all numbers have one value, words are compared at that size. Cases run one at a time, to measure
+their times, unless another cost is named. Runs of an earlier call are used. A run that meets the
 target by chance is not advised: if the sign of its error changes, its order exceeds the order of
 the basis, or a finer run is worse; finer runs are made to check. With -run the variant is run and
 checked against the target."""
@@ -106,7 +106,7 @@ def _cost(x: float, xs: np.ndarray, rows: Sequence[Row], cost: str) -> float:
     values = column(rows, cost)
     if cost == "seconds" and all(usable(a) for a in values):
         steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
-        # Relative errors count alike; both terms of the time are at least 0.
+        # Relative errors have equal weights; both terms of the time are at least 0.
         matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
         parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
         if (parts < 0).any():
@@ -431,7 +431,7 @@ def by_luck(adviser: Adviser, lucky: Candidate) -> str:
 def sureness(adviser: Adviser, best: Candidate) -> str:
     numbers = f"{adviser.accuracy} {best.error:.3g}, {adviser.cost} {best.cost:.3g}"
     if best.forecast is None:
-        alone = ", and whether finer runs are as good is not known" * (len(adviser.values) == 1)
+        alone = ", and it is not known whether finer runs are as good" * (len(adviser.values) == 1)
         return f"sure: it was run ({numbers}){alone}"
     # The orders give no bound: these may end the fall.
     if doubts := adviser.doubts(best):

@@ -25,8 +25,8 @@ from karamelo_py.script.errors import ScriptError, plural, unknown
 
 DESCRIPTION = """\
 Makes the pictures and tables of an atlas again: a file (TOML) that lists them with the commands of
-karamelo-py that make each. What is done is not done again; an interrupted atlas continues where it
-stopped when the same command is given again.
+karamelo-py that make each. Finished entries are not repeated: the same command continues an
+interrupted atlas.
 
   karamelo-py atlas docs/atlas.toml -list
   karamelo-py atlas docs/atlas.toml -only failures
@@ -45,8 +45,8 @@ An entry has a name, a text, and commands that run in a separate folder; {inputs
   whole = {sizes = "0.5,1,2,4"}
   small = {sizes = "0.2,0.4"}
 
-Runs that do not end well are named, and the exit status is 1, unless the entry says ends_early =
-true: that they do is what it shows."""
+Runs that do not end well are named, and the exit status is 1, unless the entry has ends_early =
+true, to show runs that fail."""
 RECORD = "entry.json"
 TRANSCRIPT = "said.txt"
 PICTURES = (".png", ".svg")
@@ -101,7 +101,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("atlas", type=Path, help="the list of entries, such as docs/atlas.toml")
     parser.add_argument("-only", default="", metavar="NAMES", help="entries or groups: NAME,NAME")
     parser.add_argument("-small", action="store_true", help="use the smaller values of the entries")
-    parser.add_argument("-again", action="store_true", help="repeat what is done")
+    parser.add_argument("-again", action="store_true", help="repeat finished entries")
     parser.add_argument("-list", action="store_true", help="list the entries, run nothing")
     parser.add_argument(
         "-o", type=Path, default=Path("atlas"), metavar="FOLDER", help="folder for the runs (atlas)"

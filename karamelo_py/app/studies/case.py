@@ -45,7 +45,7 @@ class CaseOutcome:
     reason: str = ""  # unless done
     facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
-    code: str = ""  # of the error that ended it
+    code: str = ""  # the cause in the error that ended it
 
     @property
     def complaint(self) -> str:

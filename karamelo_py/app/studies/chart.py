@@ -31,7 +31,7 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
   karamelo-py chart sweep.csv -y runout -x a -law "1.2*a" -data seen.csv -o runout.png   a result
   karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
-  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    does an energy stay?
+  karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    is an energy conserved?
   karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
 SUFFIXES = (*pictures.SUFFIXES, ".html")
 
@@ -51,7 +51,8 @@ def add_options(parser: ArgumentParser) -> None:
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
-        help="write a table of what a log column does: keeps, damps, gains, breaks, refused; "
+        help="write a table of the behaviour of a log column: keeps, damps, gains, breaks, "
+            "refused; "
         "rows by -by, columns by the other variables",
     )  # fmt: skip
     wanted.add_argument(

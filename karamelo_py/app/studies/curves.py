@@ -16,7 +16,7 @@ from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
 
-NONE = "mechanical"  # word of a method without a word here
+NONE = "mechanical"  # label of other methods
 
 
 class Order(NamedTuple):
@@ -59,7 +59,7 @@ REACHED = {
 }  # fmt: skip
 CHANCES = {
     "sign": "the sign of the error changes",
-    "falls": "the error falls faster than its functions let it",
+    "falls": "the error falls faster than the order of its basis",
     "coarser": "a coarser run is better",
     "finer": "a finer run is worse",
 }

@@ -21,7 +21,7 @@ from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
 Searches the values of variables that bring the log of a script nearest to measurements, by least
-squares, and says how surely the measurements determine them.
+squares, and prints how accurately the measurements determine them.
 
   karamelo-py fit in.file -var H=5e8,2e9 -var Y=3e8,5e8 -match S_22=test.csv:stress
   karamelo-py fit in.file -var E=1e6,1e8 -match max:depth=3.28 -match when:v:0=0.7
@@ -29,9 +29,9 @@ squares, and says how surely the measurements determine them.
 A variable with several values is searched between the smallest and the largest, from three starts:
 the middle, 20 % and 80 % of each range. A variable with a single value is passed on. A measurement
 is a number, or a column of a file over its first column, the time. Differences are relative to the
-largest measured value. The true value is within +- with a probability of 95 %, where the
-differences that remain are independent. There is no +- where the three searches disagree, nor for a
-value at the end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
+largest measured value. The true value is within +- with a probability of 95 %, if the remaining
+differences are independent. There is no +- if the three searches disagree, nor for a value at the
+end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # of each range
 # Waves and points that cross cells make curves rough: derivatives over 0.01 of a range end in a
@@ -120,7 +120,7 @@ class Search:
                 log = read_log(self.study.folder / folder_name(case))
                 off = np.concatenate([one.differences(log, case) for one in self.measured])
                 if not np.isfinite(off).all():
-                    raise ScriptError(f"the run with {worded(case)} logs what is no number")
+                    raise ScriptError(f"the run with {worded(case)} logs a NaN")
             except ScriptError as error:
                 self.failed[folder_name(case)] = error
                 off = np.full(sum(len(one.wanted) for one in self.measured), np.inf)
@@ -233,7 +233,7 @@ def run(options: Namespace) -> int:
     left = f"{best.left:.3g} of the largest measured value"
     earlier = len(study.rows) - study.ran
     before = f", and {earlier} of an earlier study (-again repeats them)" if earlier else ""
-    print(f"what remains is {left} in the mean, after {plural(study.ran, 'run')}{before}")
+    print(f"remaining difference: {left} on average, after {plural(study.ran, 'run')}{before}")
     print(command_of(options.script, search.case(best.fraction)))
     return 0
 
@@ -263,7 +263,7 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
     for end in ends:
         values = search.case(end.fraction)
         text = ", ".join(f"{name} = {shown(float(values[name]))}" for name in search.names)
-        print(f"  {text}: what remains is {end.left:.3g}")
+        print(f"  {text}: remaining difference {end.left:.3g}")
     print("  Likely cause: a rough curve. Inertia makes curves rough: waves run through the body.")
     print("  Fix: load slowly, or add fix local_damping. If both values match: measure more.")
 

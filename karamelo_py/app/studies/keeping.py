@@ -1,4 +1,4 @@
-"""Runs judged by a log column that should stay constant, such as an energy."""
+"""Classify runs by a log column that should stay constant, such as an energy."""
 
 from collections.abc import Container, Mapping, Sequence
 from pathlib import Path
@@ -48,7 +48,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Judge a run; values of the computes `parts` are no totals."""
+    """Classify a run; values of the computes `parts` are not totals."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))

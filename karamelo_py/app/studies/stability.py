@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 Maps where a script is stable over one or two of its variables. The classes of runs: stable, damped
-(spurious energy loss), growing (spurious energy gain), left (a point left the domain, so the run
-says nothing about the step), short (too few steps to see whether energy grows), and failed, with
-the reason. The energy is kinetic + stored + dissipated energy less the work of loads, or a log
-column with a bound. An error in the script ends the study. Edges between classes are found by
-bisection, from coarse to fine: cells between two of one class are not run, so that "run 7 of at
-most 400" means about 100 runs. Each word (basis, transfer, scheme) has a row that is searched
-separately. The table next to the picture (map.csv) says which cells were run. -var with one value
-is passed on. -accuracy shades the stable cells by an error.
+(spurious energy loss), growing (spurious energy gain), left (a point left the domain, which says
+nothing about the step), short (too few steps to see whether energy grows), and failed, with the
+reason. The energy is kinetic + stored + dissipated energy less the work of loads, or a log column
+with a bound. An error in the script ends the study. Edges between classes are found by bisection,
+from coarse to fine: cells between two of the same class are not run: "run 7 of at most 400" means
+about 100 runs. Each word (basis, transfer, scheme) has a row that is searched separately. The table
+next to the picture (map.csv) says which cells were run. -var with one value is passed on. -accuracy
+shades the stable cells by an error.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var basis=linear,cubic-spline -accuracy err
@@ -179,8 +179,8 @@ class Map:
     """Stability over one or two `axes` of the variables in `values`.
 
     A run grows if the log column `energy` grows by more than the factor `bound`; without a column,
-    the program judges. The column `error` shades stable cells. A variable has the index of its
-    leader in `leaders` (-zip).
+    by the program's energy balance. The column `error` shades stable cells. A variable has the
+    index of its leader in `leaders` (-zip).
     """
 
     def __init__(
@@ -324,7 +324,9 @@ class Map:
 
     def tell(self) -> None:
         count, run = Counter(self.classes.values()), len(self.results)
-        print(f"{run} of {len(self.classes)} cells were run; others lie between cells of one class")
+        print(
+            f"{run} of {len(self.classes)} cells were run; the rest is between cells of one class"
+        )
         for kind in CLASSES:
             if count[kind]:
                 print(f"  {kind:<8} {plural(count[kind], 'cell')}")
@@ -333,7 +335,7 @@ class Map:
         if unwatched := Counter(filter(None, (row["unwatched"] for row in self.results.values()))):
             (why, times), *_ = unwatched.most_common()
             print(f"energy is {why} ({plural(times, 'run')}): runs that reached their end count as")
-            print("stable, whatever energy they gained; -energy COLUMN judges by the log")
+            print("stable, whatever energy they gained; -energy COLUMN checks a log column")
         if count["short"]:
             print(f"runs of fewer than {FEWEST} steps do not show whether energy grows: run longer")
         margins = self.margins()

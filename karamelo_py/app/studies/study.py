@@ -89,8 +89,8 @@ class Study:
         self.claim = claim(self.folder)
         if self.claim is None:
             raise ScriptError(
-                f"another study is at work in {self.folder}",
-                expected="the end of that one, or another name for the table",
+                f"another study runs in {self.folder}",
+                expected="wait for it, or give the table another name",
                 hint=f"-o {self.out.stem}-2{self.out.suffix}",
             )
 

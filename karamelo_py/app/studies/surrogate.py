@@ -1,4 +1,4 @@
-"""Sensitivity where runs are dear: indices of a function fitted to a few runs."""
+"""Sensitivity of expensive runs: indices of a function fitted to a few runs."""
 
 from collections.abc import Callable, Sequence
 from functools import partial

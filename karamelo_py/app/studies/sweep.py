@@ -17,7 +17,7 @@ Runs a script with every combination of values of its variables, and writes one 
   karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
 
 Each run has a separate folder, named after its values, in a folder named after the table. A run
-that fails is recorded with its reason and stops nothing; where none is done, the exit status is 1.
+that fails is recorded with its reason, and the sweep continues; if all fail, the exit status is 1.
 An interrupted sweep continues where it stopped when the same command is given again. Processor,
 threads and versions are written next to the table (sweep.json)."""
 
@@ -66,7 +66,7 @@ def run(options: Namespace) -> int:
     if not any(row["status"] == "done" for row in rows):
         raise ScriptError(
             f"no run is done: {rows[0]['reason']}",
-            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all that it said",
+            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all its messages",
         )
     return 0
 

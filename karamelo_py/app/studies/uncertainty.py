@@ -63,7 +63,7 @@ def samples_in(rows: Sequence[Row], others: Sequence[str]) -> dict[str, list[Row
 def tell(
     rows: Sequence[Row], results: Sequence[str], fails: str | None, others: Sequence[str] = ()
 ) -> None:
-    print("\nin brackets: with a probability of 95 %, by resampling")
+    print("\nin brackets: 95 % confidence intervals, by resampling")
     for words, sample in samples_in(rows, others).items():
         if words:
             print(f"\n{words}")

@@ -51,7 +51,7 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
 
 def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     copies = {}
-    # One by one: no two arrays exist twice if the number of points changes.
+    # One by one: at most one array exists twice if the number of points changes.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:

@@ -1,6 +1,6 @@
-"""States of the parts of a scene: what they remember, to return to and to write.
+"""States of the parts of a scene, for rollback and restart files.
 
-A part names the attributes that store what it has seen or summed::
+A part names the attributes of its state::
 
     class Dose(Compute):
         remembers = ("total",)
@@ -96,7 +96,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-    # Last: it shows what the others remember.
+        # Last, since it shows the state of other parts.
     yield ("log", "", ""), hub.output.log
 
 
@@ -203,7 +203,7 @@ def plain(value: object, arrays: list[np.ndarray]) -> Any:
     if kind is list:
         return [plain(item, arrays) for item in value]
     if kind not in KINDS:
-        raise TypeError(f"a {kind.__name__}, which no file takes")
+        raise TypeError(f"a {kind.__name__}, which cannot be stored")
     return {kind.__name__: plain(KINDS[kind][0](value), arrays)}
 
 
@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
-        self.hub, self.halve = hub, halve  # whether the run may return there
+        self.hub, self.halve = hub, halve  # the run may return to it
         self.halvings = self.returns = 0  # of the step so far; to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1

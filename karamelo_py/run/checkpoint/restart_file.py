@@ -1,8 +1,8 @@
 """Restart files: the whole scene at one time, in HDF5.
 
-They contain arrays as fields declare them, and what parts remember
-(:mod:`karamelo_py.run.checkpoint.parts`). The script repeats the set-up; a file lists the
-statements executed before.
+They contain arrays as fields declare them, the states of parts
+(:mod:`karamelo_py.run.checkpoint.parts`) and the statements executed so far. The script repeats the
+set-up.
 """
 
 import json
@@ -198,8 +198,8 @@ class Restart:
                     age = "an older" if version < VERSION else "a newer"
                     raise ScriptError(
                         f"{path} has format {version}, of {age} karamelo-py "
-                        f"({root.attrs['program']}), and this one ({__version__}) reads format "
-                        f"{VERSION} alone",
+                        f"({root.attrs['program']}), and this one ({__version__}) reads only "
+                        f"format {VERSION}",
                         argument="file",
                         hint="run the script from its beginning, without this file, or with "
                         f"the {age.split()[1]} karamelo-py that wrote it",
@@ -218,9 +218,9 @@ class Restart:
                 was = f"-var {name} {before[name]}" if name in before else f"no -var {name}"
                 raise ScriptError(
                     f"{self.path} was written with {was}; now it is -var {name} {text}",
-                    expected="the same variables; by default they are taken from the file",
-                    hint="leave it out; how long the last run is may be changed in its own line, "
-                    "as a number",
+                    expected="the same variables, which are read from the file by default",
+                    hint="leave it out; to change the length of the last run, write a number in "
+                    "its line",
                 )
         return before
 

@@ -43,8 +43,8 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         averaged = update.anti_locking and takes_average(law)
         if averaged and yields_early_with_fbar(law.strength):
             yield (
-                f"lets '{solid.id}' lose strength: its yield surface takes no averaged pressure "
-                "(F-bar), and the passive pressure of sand was 1.8 instead of 3",
+                f"lets '{solid.id}' lose strength: with averaged pressure (F-bar) in its yield "
+                "surface, the passive pressure of sand was 1.8 instead of 3",
                 "anti_volumetric_locking(false), a dilatancy of a third of the friction, or "
                 f"{_EXPLICIT}",
                 solid.mark,
@@ -80,14 +80,14 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         only_prescribes = prescribes and fix.wall_friction is None
         if "post_update_grid_state" in fix.hooks() and not only_prescribes:
             yield (
-                f"knows no fix {fix.style} that changes velocities by what they are",
+                f"does not support fix {fix.style} whose changes depend on the velocities",
                 f"fix velocity_nodes without leq, geq and friction, or {_EXPLICIT}",
                 fix.mark,
             )
         elif other:
             yield (
-                f"knows no fix {fix.style}, which acts at a moment that only explicit steps have"
-                + ("" if built_in else f": {other[0]}"),
+                f"does not support fix {fix.style}, which acts at a stage that only explicit "
+                "steps have" + ("" if built_in else f": {other[0]}"),
                 "fix velocity_nodes, or loads: force_particles, edge_traction; velocity_particles "
                 "for rigid solids",
                 fix.mark,
@@ -98,20 +98,20 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
             and not fix.of_rigid_points
         ):
             yield (
-                f"has no inertia: the velocities of fix {fix.style} would change nothing",
+                f"has no inertia: the velocities of fix {fix.style} would have no effect",
                 "scheme(newmark)",
                 fix.mark,
             )
         elif len(fix.solids) > 1 and fix.friction is None:
             yield (
-                f"cannot work with fix {fix.style}, which finds its force once per step, before "
-                "the points have moved",
+                f"does not support fix {fix.style}, which computes its force once per step, "
+                "before the points move",
                 f"method ulmpm/contacts, or {_EXPLICIT}",
                 fix.mark,
             )
         elif fix.follows_points and fix.impulsive:
             yield (
-                f"knows no fix {fix.style}, whose force is what stops a point within a step",
+                f"does not support fix {fix.style}, whose force stops points within a step",
                 "fix impenetrablesurface or indent, or a solid of material rigid in method "
                 f"ulmpm/contacts; or {_EXPLICIT}",
                 fix.mark,

@@ -53,7 +53,7 @@ class Contact:
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
         h = float(np.min(s.grids.spacing))
-        self.gap[self.touched()] = 0  # whatever is measured, no gap has opened
+        self.gap[self.touched()] = 0  # no gap has opened, whatever the measured one
         self.close = (self.gap <= CLOSE * h) | self.touched()
         ones, at = np.ones(count), np.arange(count)
         m = len(nodes)

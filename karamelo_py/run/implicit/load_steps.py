@@ -140,9 +140,8 @@ class LoadSteps:
             return
         if self.simulation.hub.update.first_time("a long way in a load step"):
             self.simulation.hub.console.say(
-                f"note: points go through {far:.2g} cells in a load step; where it matters when "
-                "they change cells, the error falls in proportion to the step: compare with more "
-                "load steps"
+                f"note: points cross {far:.2g} cells in a load step; if the time of crossing "
+                "matters, the error is proportional to the step: compare with more load steps"
             )
 
     def _check_at_rest(self) -> None:
@@ -151,7 +150,7 @@ class LoadSteps:
             if len(moving) and not can(block.laws, constrained_velocity):
                 solid = self._solid_of(int(block.points.id[moving[0]]))
                 raise self._error(
-                    f"solid '{solid}' has initial velocities, which load steps know nothing of",
+                    f"solid '{solid}' has initial velocities, which load steps ignore",
                     "scheme(newmark), or none",
                 )
 
@@ -218,7 +217,7 @@ class LoadSteps:
             conduct(Equations(s, mode, self.cached, False), hooks, self.simulation.fixes.acting, dt)
         except Singular:
             raise self._error(
-                "temperatures have no solution: something conducts no finite heat",
+                "temperatures have no solution: some conductivity is not finite",
                 "look at conductivities and heat capacities",
             ) from None
 
@@ -279,8 +278,8 @@ class LoadSteps:
             where = ", ".join(f"{x:.4g}" for x in equations.positions[int(reason.at)])
             solid = self._solid_at(equations, np.arange(len(nodes)) == reason.at)
             raise Failed(
-                f"{reason}: nothing holds solid '{solid}' near ({where}), or it flows "
-                "there without hardening"
+                f"{reason}: solid '{solid}' is not held near ({where}), or flows there without "
+                "hardening"
             ) from None
         except Wrong as reason:
             raise Failed(f"{reason} (solid '{self._solid_of(int(reason.at))}')") from None
@@ -288,9 +287,9 @@ class LoadSteps:
         if not self.dynamic and "unstable" not in update.warned_of and newton.unstable:
             update.first_time("unstable")
             simulation.hub.warn(
-                f"{self._now()}: an equilibrium that is not stable (the determinant of the "
-                "stiffness is negative): the body has a way to buckle, or is beyond a limit load",
-                hint="a small imperfection, or scheme(newmark), shows where it goes",
+                f"{self._now()}: the equilibrium is unstable (the determinant of the stiffness "
+                "is negative): the body can buckle, or is beyond a limit load",
+                hint="a small imperfection, or scheme(newmark), shows its motion",
             )
         release(newton.kept)
         self.cached = equations.cached()
@@ -311,7 +310,7 @@ class LoadSteps:
 
     def _check_numbers(self, numbers: np.ndarray, message: str) -> None:
         if not np.all(np.isfinite(numbers)):
-            hint = "look for a formula that gives NaN, such as a division by zero"
+            hint = "look for a formula that returns NaN, such as a division by zero"
             trouble = no_number(self.simulation, message, hint)
             raise self._error(trouble.message, trouble.fix, trouble.mark)
 

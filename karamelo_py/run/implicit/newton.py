@@ -15,7 +15,7 @@ from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.pore_water import Seepage
 from karamelo_py.run.implicit.tools import PushingTool
 
-ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
+ROUNDING = 50 * float(np.finfo(float).eps)  # rounding error of sums of some dozens of terms
 SINGULAR = "the equations are singular"
 ASTRAY = 1e4  # times as far as points may go: nothing holds them
 
@@ -171,12 +171,12 @@ class Newton:
         except solvers.Singular:
             raise Loose(SINGULAR, self._loosest(A)) from None
         except solvers.Unconverged:
-            raise Failed("multigrid did not converge: take solver=direct") from None
+            raise Failed("multigrid did not converge: use solver=direct") from None
         return np.where(free, x, jump)
 
     def _wrong(self, u: np.ndarray) -> Failed:
         if not np.all(np.isfinite(u)):
-            return Failed("displacements are no finite numbers")
+            return Failed("displacements are not finite")
         places = self.equations.s.kin.Tensor.places
         for block, (_, response) in zip(self.equations.blocks, self.equations.parts, strict=True):
             bad = np.flatnonzero(~np.isfinite(response.stress).all(0))
@@ -186,9 +186,9 @@ class Newton:
                     A[i, j] += h
                 point = int(block.points.id[bad[0]])
                 if np.linalg.det(A) > 0:
-                    return Wrong(f"the law gives no finite stress at point {point}", point)
+                    return Wrong(f"the law returns no finite stress at point {point}", point)
                 return Wrong(f"point {point} turns inside out", point)
-        return Failed("forces of stress are no finite numbers")
+        return Failed("forces of stress are not finite")
 
     def _loosest(self, A: sp.bsr_matrix) -> int:
         size = np.abs(A.diagonal()) + 1e-12 * np.abs(A.data).max(initial=1e-300)
@@ -219,4 +219,4 @@ class Newton:
         if not self.pushing:  # contact only uses the present surfaces
             far = min(far, equations.furthest_into(u, self.fixed()))
         if far > MOST_MOVED:
-            raise TooFar(f"points would go {far:.3g} cells at once", far / MOST_MOVED)
+            raise TooFar(f"points would move {far:.3g} cells at once", far / MOST_MOVED)

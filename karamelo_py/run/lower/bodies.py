@@ -1,4 +1,4 @@
-"""Lowering of rigid bodies that move freely, and what they do not support."""
+"""Lowering of free rigid bodies, and unsupported combinations."""
 
 from collections.abc import Sequence
 
@@ -120,7 +120,7 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
         present = x[body.first_id : body.first_id + body.count]
         away = np.abs(present - fix.rigid_positions()).max()
         if not away <= APART * hub.domain.h:  # NaN: deleted
-            message = f"points of '{body.id}' are not where its fix has the body"
+            message = f"points of '{body.id}' are not at the position stored by its fix"
             if np.isnan(away):
                 message = f"points of '{body.id}' are missing"
             raise _error(fix, message, "the fix that moved it, with the same ID, from the start")
@@ -131,8 +131,8 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
         speeds = speeds[np.isfinite(speeds[:, 0])]
         if not led and len(speeds) and np.ptp(speeds, axis=0).max() > APART * np.abs(speeds).max():
             hub.warn(
-                f"rigid solid '{solid.id}' rotates or deforms: nothing moves it, and its points "
-                "fly straight on",
+                f"rigid solid '{solid.id}' rotates or deforms: no fix moves it, and its points "
+                "move along straight lines",
                 mark=solid.mark,
                 hint=f"fix(ID, rigid_body, {solid.id}, ...), or fix velocity_particles",
             )
@@ -147,7 +147,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
     for fix in moving:
         body, apart = fix.body, method.own_grids or method.fields_per_solid
         if body.places is not fix.weighed:
-            message = f"points of '{body.id}' were moved or deleted after its mass was found"
+            message = f"points of '{body.id}' were moved or deleted after its mass was computed"
             raise _error(fix, message, "fix rigid_body after the commands that change the points")
         other = next((solid for solid in rigid if solid not in bodies and not apart), None)
         if other is not None:
@@ -159,7 +159,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         acts = moves or surfaces_of(fix) or any(other.links for other in hub.fixes.values())
         if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
-            raise _error(fix, f"nothing acts on the body '{body.id}': it stays at rest", hint)
+            raise _error(fix, f"no load acts on the body '{body.id}': it stays at rest", hint)
     for fix in hub.fixes.values() if moving else ():
         leads = fix.leads_points or fix.style == "initial_velocity_particles"
         led = [s for s in bodies if leads and not fix.group.all and fix.group.touches(s)]

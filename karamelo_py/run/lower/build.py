@@ -198,7 +198,7 @@ def thread_count(hub: Hub, points: int) -> int:
     available = int(config.NUMBA_NUM_THREADS)
     if hub.settings.threads is not None:
         if hub.settings.threads > available:
-            said = f"--threads {hub.settings.threads}: only {available} threads can be had here"
+            said = f"--threads {hub.settings.threads}: only {available} threads are available here"
             hub.console.warn(render_message("warning", said))
         return max(1, min(hub.settings.threads, available))
     usable = min(available, os.cpu_count() or 1)
@@ -290,7 +290,7 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 def returns_loss(hub: Hub) -> bool:
     """Return True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 dissipates none that does not vanish with the step, unless it stores moments; XPIC is
+    FLIP 1 dissipates only energy that vanishes with the step, unless it stores moments; XPIC is
     handled in `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer

@@ -25,7 +25,8 @@ def use_card(hub: Hub) -> None:
     settings = hub.settings
     if settings.ranks > 1:
         raise ScriptError(
-            f"--gpu: one GPU has all of a scene, and {settings.ranks} processes would divide it",
+            f"--gpu: one GPU computes the whole scene, and {settings.ranks} processes would "
+            "divide it",
             hint="--gpu by one process, or leave it out",
         )
     settings.engine, settings.card = "gpu", Counted()
@@ -66,7 +67,7 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
     has = f"{hub.settings.card.name} has {free} of {whole} free"
     single = "" if hub.settings.precision == "single" else "; precision(single)"
     error = ScriptError(
-        f"the GPU has no room for the scene: {plural(count, 'point')}{need}; {has}",
+        f"the scene does not fit into the memory of the GPU: {plural(count, 'point')}{need}; {has}",
         mark=largest(hub).mark,
         hint=f"larger cells, or fewer points per cell{single}; {WITHOUT}",
     )
@@ -91,7 +92,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
     for kind in untaken(rows, Card):
         name = registry.name_of("scheme", type(scheme))
         yield ScriptError(
-            f"a GPU does not take the row {kind} of scheme {name}",
+            f"a GPU does not support the row {kind} of scheme {name}",
             mark=hub.update.scheme_mark,
             hint=f"another scheme, take.on({kind}, Card) in its plug-in, or {WITHOUT}",
         )
@@ -100,17 +101,17 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
         for name, hook in hooks:
             from_python = not isinstance(hook, CompiledHook)
             if from_python or hook.internal:
-                why = "acts from Python in each step" if from_python else "is for processors"
+                why = "calls Python in each step" if from_python else "is for processors"
                 yield ScriptError(
-                    f"fix {fix.style} '{fix.id}' {why} ({name}): a GPU would wait for it",
+                    f"fix {fix.style} '{fix.id}' {why} ({name}), which a GPU does not support",
                     mark=fix.mark,
                     hint=f"a fix whose hooks are compiled, or {WITHOUT}",
                 )
                 break
     if setup is not None and not hasattr(type(setup.basis), "line_nodes"):
         yield ScriptError(
-            f"a GPU does not know basis {hub.update.method.basis_name} yet, whose points see nodes "
-            "of several cells",
+            f"a GPU does not know basis {hub.update.method.basis_name} , whose points reach "
+            "nodes of several cells",
             mark=hub.update.method.mark,
             hint=f"linear, a spline or uGIMP, or {WITHOUT}",
         )

@@ -27,7 +27,7 @@ from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts
 from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
-STRAINS = (0, 1e-3, 0.05)  # the last beyond yield of metals
+STRAINS = (0, 1e-3, 0.05)  # the last exceeds the yield strain of metals
 TRIED = 8  # minimum points, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
@@ -135,7 +135,7 @@ def _numbers(plugin: PartInUse, name: str, values: Iterable, one: Number) -> Non
             raise fault(plugin.name, f"{name} is {number} for some point", plugin.mark)
         if isinstance(number, np.float64) and type(one) is not np.float64:
             message = f"{name} is a double (float64) in a run of precision(single): its author "
-            message += "makes numbers of those that it is given, as in real(0.5, x)"
+            message += "converts numbers to the type of an argument, as in real(0.5, x)"
             raise fault(plugin.name, message, plugin.mark)
 
 
@@ -158,11 +158,11 @@ def try_law(
             _try_flow_stress(plugin, law, state, one * strain)
             after = laws.advance(law, kin, state, tensor(kin, dl), one)
             if len(flat(after)) != len(flat(state)):
-                message = f"what a point remembers is {len(flat(state))} numbers at first and "
+                message = f"the memory of a point has {len(flat(state))} numbers at first and "
                 message += f"{len(flat(after))} after a step: their number must not change"
                 raise fault(plugin.name, message, plugin.mark)
             _numbers(
-                plugin, f"what a point remembers after a strain of {strain:g}", flat(after), one
+                plugin, f"the memory of a point after a strain of {strain:g}", flat(after), one
             )
             for function in (*TENSORS, *NUMBERS):
                 result = function(law, kin, after)

@@ -88,7 +88,7 @@ class _Builder:
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
         self.holding: list[Fix] = []
-        self.loaded_nodes = 0  # the number of nodes, if hooks bring forces
+        self.loaded_nodes = 0  # the number of nodes, if hooks add forces
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
@@ -233,8 +233,9 @@ def _agree(simulation: SceneState, fix: Fix) -> None:
             raise ScriptError(
                 f"fix {fix.style}: {name} is {first[name]:.6g} on one process and "
                 f"{other[name]:.6g} on another",
-                hint=f"tell the author of {fix.style}: point_by_point, each has a part of the "
-                "points; points.total(terms) and nodes.total(terms) are sums over all",
+                hint=f"report this to the author of {fix.style}: with point_by_point each "
+                "process has some of the points; points.total(terms) and nodes.total(terms) "
+                "sum over all",
             )
 
 

@@ -1,4 +1,4 @@
-"""The water in the pores of a material: its numbers, and what such scenes do not support."""
+"""Pore water of a material: its constants, and unsupported combinations."""
 
 from typing import NamedTuple
 
@@ -64,7 +64,7 @@ class PoreWater(NamedTuple):
         if Tv < UNDRAINED:
             state = "undrained: less than 2 % of the water flows"
         elif Tv > DRAINED:
-            state = "drained: the dry soil and its weight in water would do"
+            state = "drained: the dry soil with its weight in water is enough"
         return f"Tv = {Tv:.2g} across the shortest side of '{solid.id}', {state}"
 
     def set_pressure(self, points: PointsView, pressure: np.ndarray) -> None:

@@ -169,7 +169,7 @@ def check_same_run(hub: Scene) -> None:
     if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
         raise Quit
     raise ScriptError(
-        "the processes do not come to the same run",
+        "the processes have reached different runs",
         mark=hub.mark,
         expected="the same script, files and variables for all of them",
     )

@@ -120,11 +120,11 @@ def _part(s: Setup, mine: np.ndarray) -> Setup:
 def report_lines(simulation: Simulation, ranks: int) -> list[str]:
     columns = np.array(plan(simulation, ranks))
     mean = columns[:, 0].mean()
-    lines = [f"shared out among {ranks} processes{'':<6}least     largest"]
+    lines = [f"distributed over {ranks} processes{'':<6}least     largest"]
     columns[:, -2:] >>= 20
     words = (
-        "points", "tiles", "nodes in use", "others to talk to", "bytes given in a step",
-        "memory, in MiB", "known to each, in MiB",
+        "points", "tiles", "nodes in use", "neighbour processes", "bytes sent per step",
+        "memory, in MiB", "in each process, MiB",
     )  # fmt: skip
     lines += [
         f"  {word:<30}{low:>8} {high:>11}"
@@ -133,7 +133,7 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
     over = columns[:, 0].max() / mean if mean else 1.0
     lines.append(f"  {'largest part over the mean':<30}{'':>8} {over:>11.2f}")
     if simulation.tiles.direct:
-        lines.append("  so few points are not shared out: the first process has them all")
+        lines.append("  so few points are not distributed: the first process has them all")
     elif over > MAY_CHANGE:
         lines.append("  tiles are not cut: fewer processes would wait less for the largest part")
     acting = (fix for pairs in simulation.fixes.lasting.in_python.values() for fix, _ in pairs)
@@ -142,12 +142,12 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
         moved = sum(array.nbytes for block in blocks for _, array in arrays_of(block.points))
         lines.append(
             f"  fix {fix.style} '{fix.id}' acts on the whole scene: in each step the first "
-            f"process takes in and gives back {moved >> 20} MiB, and has the memory of a single one"
+            f"process receives and returns {moved >> 20} MiB, and needs the memory of a serial run"
         )
     for fix in simulation.hub.fixes.values():
         if hasattr(fix, "sent"):
             lines.append(
-                f"  fix {fix.style} '{fix.id}' has the first process look at all points that may "
-                f"touch ({fix.sent(simulation)} now), and needs {SENT} bytes there for each"
+                f"  fix {fix.style} '{fix.id}' sends all points that may touch "
+                f"({fix.sent(simulation)} now) to the first process, {SENT} bytes each"
             )
     return lines

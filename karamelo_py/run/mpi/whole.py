@@ -34,7 +34,7 @@ class Whole:
         self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
 
     def act(self, function: Callable[[Setup], None]) -> None:
-        """Call a function of the whole on rank 0; all ranks take over its changes.
+        """Call a function of the whole scene on rank 0, and send its changes to all ranks.
 
         If it moved points, the step must begin again (`PointsMoved`).
         """
