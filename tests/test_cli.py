@@ -47,8 +47,8 @@ def test_parts_after_the_last_run_are_warned_of(run_interpreted, command):
     seen = "\n".join(["run(1)", *lines, "run(1)", "save_plot(p.png)", "print(E)"])
     assert run_interpreted(BODY + seen, command=command).err == ""
     late = run_interpreted(BODY + "\n".join(["run(1)", "run(1)", *lines]), command=command).err
-    said = [line for line in late.splitlines() if "comes after the last run" in line]
-    assert [f"{kind} comes after the last run" in line for kind, line in zip(
+    said = [line for line in late.splitlines() if "follows the last run" in line]
+    assert [f"{kind} follows the last run" in line for kind, line in zip(
         ("fix 'g'", "dump 'd'", "plot 'p'"), said, strict=True)] == [True] * 3  # fmt: skip
     assert all(f"| {line}" in late for line in lines if "compute" not in line)
 

@@ -81,10 +81,10 @@ def test_init(hub):
 @pytest.mark.parametrize(
     ("style", "message"),
     [
-        ("misplaced", "post_particles_to_grid is a moment of nodes, and its hook was made for po"),
-        ("swapped", "final_integrate is a moment of points, and its hook was made for nodes"),
-        ("cold", "supply_heat is a moment of heated points, and its hook was made for points"),
-        ("hot", "initial_integrate is a moment of points, and its hook was made for heated"),
+        ("misplaced", "post_particles_to_grid is a stage of nodes, but its hook was made for po"),
+        ("swapped", "final_integrate is a stage of points, but its hook was made for nodes"),
+        ("cold", "supply_heat is a stage of heated points, but its hook was made for points"),
+        ("hot", "initial_integrate is a stage of points, but its hook was made for heated"),
         ("many", "post_particles_to_grid: too_few has to take the 8 arguments of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
         ("heavily",
@@ -95,7 +95,7 @@ def test_init(hub):
         ("nodeless",
          "post_particles_to_grid reads 'position': 'mass', 'velocity', 'velocity_updat"),
         ("early", "post_update_grid_state writes 'force': 'velocity_update' or a class of a field"),
-        ("elsewhere", "final_integrate is a moment of points, and its hook was made for whole nod"),
+        ("elsewhere", "final_integrate is a stage of points, but its hook was made for whole nod"),
         ("slim", "final_integrate: laid has to take the 4 arguments of a hook on whole points: v"),
         ("unnamed",
          "initial_integrate takes a function with a name (def name(...): ...), not a <la"),
@@ -148,13 +148,13 @@ def test_a_column_belongs_to_one_field(hub):
 @pytest.mark.parametrize(
     ("style", "told"),
     [
-        ("idle)", "idle does nothing: no step calls it, and it measures nothing"),
-        ("idle)", "initial_integrat, which is no hook"),
+        ("idle)", "idle has no effect: no step calls it, and it measures nothing"),
+        ("idle)", "initial_integrat, which is not a hook"),
         ("idle)", "meant initial_integrate, or begins"),
-        ("misspelt, all)", "post_gird_to_point, which is no hook and is never called"),
-        ("misspelt, all)", "meant post_grid_to_point, or begins the name with _"),
+        ("misspelt, all)", "post_gird_to_point, which is not a hook, and no step"),
+        ("misspelt, all)", "rename it to post_grid_to_point, or begin the name with _"),
         ("blurred, all)", "meant post_update_grid_state, or begins"),
-        ("silent, all)", "says in `published` that it publishes, and none of its hooks does: s_x"),
+        ("silent, all)", "has names in `published`, but none of its hooks publishes: s_x"),
     ],
 )
 def test_what_would_be_silent(hub, capsys, style, told):
@@ -310,7 +310,7 @@ def test_a_hook_makes_a_vector_of_the_class_it_is_given(run_interpreted):
 
 def test_a_compute_that_publishes_nothing_is_told(run_interpreted):
     said = run_interpreted(scene("compute(c, mute, all)\nlog_modify(custom, step, c_x)")).err
-    assert "in.script:9:1: warning: compute mute has measured and published nothing: c_x" in said
+    assert "in.script:9:1: warning: compute mute has not published anything: c_x" in said
     assert said.count("published nothing") == 1
 
 

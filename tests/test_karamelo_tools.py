@@ -246,7 +246,7 @@ def test_indentation_after_hertz(run_script):
     [
         ("fix(F, indent, all, cube, 1, 1, 0, 0, 0)", "the word sphere"),
         ("fix(F, indent, all, sphere, 1, 1, 0, 0, 5)", "more components than the 2"),
-        ("fix(F, body_force, all, 1, 1, 0, 0)", "4 components, and space has 3 directions"),
+        ("fix(F, body_force, all, 1, 1, 0, 0)", "4 components, but there are at most 3"),
         ("fix(F, meldtool, all, 1, x, 0.1, 0, 0, 0, 0, 1, 0.3)", "a domain in 3D"),
         ("fix(F, cuttingtool, all, 1, 0, 0, 0, 0, 0, 0, 1, 1, 2, 2)", "lie in one line"),
         ("fix(F, impenetrablesurface, all, 1, 0, 0, 0, 0, 0, 0)", "normal has no direction"),

@@ -230,7 +230,7 @@ def test_included_decks_and_elements_that_no_solid_has(tmp_path):
         ("a.msh", b'(0 "Fluent")\n(2 3)\n(3010 (1 1 1 1 3)(\n' + bytes(24), "within brackets"),
         ("a.vtu", VTU.format(n=3, x="0 " * 9, nodes="0 1 7", type=5), "a node that is not"),
         ("a.med", b"\x89HDF\r\n\x1a\n" + bytes(200), "the file is damaged"),
-        ("a.mesh", "MFEM NURBS mesh v1.0\n", "it is of MFEM's kind 'MFEM NURBS mesh v1.0'"),
+        ("a.mesh", "MFEM NURBS mesh v1.0\n", "it has MFEM's kind 'MFEM NURBS mesh v1.0'"),
         ("a.mesh", "MFEM mesh v1.0\nvertices\n4\nnodes\n", "its edges are curved ('nodes'"),
         ("a.msh", "MESH dimension 2 ElemType Triangle Nnode 3\n", "it is a mesh of GiD"),
         ("a.inp", "$ by LS-PrePost\n*KEYWORD\n*NODE\n", "the mesh a.inp is empty"),

@@ -206,7 +206,7 @@ dimension(2, 0, 1, 0, 1, 0.1)
         ("text.msh", "hello", "cannot be read as a mesh: its content does not fit its ending"),
         ("words.inp", "hello", "cannot be read as a mesh: its content does not fit its ending"),
         ("lfs.vtu", "version https://git-lfs.github.com/spec/v1\n", "it is a pointer of Git LFS"),
-        ("body.foo", "hello", "cannot be read as a mesh: its ending tells no format"),
+        ("body.foo", "hello", "cannot be read as a mesh: its ending identifies no format"),
         ("part.step", "hello", "part.step cannot be read as a mesh: its content does not fit"),
         ("wrong.geo", "Rectangle(1 = ;", "Gmsh cannot mesh wrong.geo: 'wrong.geo', line"),
         ("void.geo", "a = 1;", "void.geo has nothing to mesh"),

@@ -242,7 +242,7 @@ def test_no_total_of_points_that_come_in_pieces(tmp_path, whole):
     shutil.copy(PLUGIN / "in.drag", tmp_path)
     done = karamelo_py(tmp_path / "site", tmp_path, "in.drag")
     assert done.returncode == (not whole), done.stderr
-    assert ("points.total(terms) is known in steps alone" in done.stderr) == (not whole)
+    assert ("points.total(terms) is known only in steps" in done.stderr) == (not whole)
 
 
 # --- compiled hooks of whole points ---------------------------------------------------------------

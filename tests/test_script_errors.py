@@ -137,7 +137,7 @@ COMMANDS = [
     ("fix(v)", 1, "style is missing"),
     ("fix(v, velocity_node, n, 1, 0)", 8, "one of velocity_nodes, "),
     ("fix(v, velocity_node, n, 1, 0)", 8, "karamelo-py styles fix lists all "),
-    ("fix(f, body_force, all, 0, -1, 0, 7)", 35, "4 components, and space has 3"),
+    ("fix(f, body_force, all, 0, -1, 0, 7)", 35, "4 components, but there are at most 3"),
     ("scheme(musl, strat=half)", 14, "did you mean 'start'?"),
     ("scheme(musl, strat=half)", 14, "expected: start=full or start=half"),
     ("dump(d, all, pyplot, 1, d.*.png, 300, 300, 2*vxx)", 46, " in all), or a number"),

@@ -28,7 +28,7 @@ OF = "material(rubber, eos-strength, e, s"
             "fix force_nodes 'f' acts on nodes that no point reaches", "reaches into the body",
         ),
         (["compute(Ek, kinetic_energy, all)", "plot(p, 1, time, Ek)"], "",
-         "plot 'p' is drawn nowhere: the script has no save_plot", "save_plot(curves.png)"),
+         "plot 'p' is not drawn: the script has no save_plot", "save_plot(curves.png)"),
         ([], "eos(e, linear, 1000, 1e6)\nstrength(s, linear, 1e9)",
          "bulk modulus 1e+06 and shear modulus 1e+09 make Poisson's ratio -0.996", "2.17e+09"),
         ([], "eos(e, linear, 1000, 1e6)\nstrength(s, plastic, 1e5, 4e5)",
@@ -92,7 +92,7 @@ def warm_block(T0, *fixes):
 @pytest.mark.parametrize(
     ("T0", "fix", "says"),
     [
-        (20, "", "T0 = 20, and the material counts temperatures from 300"),
+        (20, "", "T0 = 20, but temperatures of the material start at 300"),
         (300, "fix(f, temperature_nodes, near, -20)",
          "the temperature is -20, and bodies start at 3"),
         (300, "fix(f, convection_particles, top, 25, 20)",

@@ -263,7 +263,7 @@ def test_polygons_of_obj_files_that_turn_inwards(tmp_path):
 def test_a_wrong_line_of_an_obj_file_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     wrong = {
-        "f 1 2 9": "a vertex that is not there",
+        "f 1 2 9": "a vertex that does not exist",
         "f 1 2": "three corners or more",
         "v 1 2": "not enough values",
         "v 1 2 x": "could not convert",

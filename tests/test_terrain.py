@@ -63,7 +63,7 @@ def test_a_body_of_a_raster_and_its_depths(run_script, tmp_path):
         (TILTED.replace("0.6", "-9999"), "", "cells without a height in the domain"),
         (TILTED.replace(" 0.7", ""), "", "5 heights in 3 columns and 2 rows"),
         (TILTED.replace("cellsize 0.5\n", ""), "", "its header lacks cellsize"),
-        (TILTED.replace("0.7", "high"), "", "'high' is no height"),
+        (TILTED.replace("0.7", "high"), "", "'high' is not a height"),
         (HEAD.format(x=9) + "1 1 1 1 1 1", "", "is from x = 9 to 10.5, and the domain from 0"),
         (TILTED, ", y=0.25", "is from y = 0.25 to 1.25"),
     ],

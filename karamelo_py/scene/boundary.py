@@ -16,11 +16,11 @@ PERIODIC = Restrictions(
     only={"method": ("ulmpm",), "scheme": ("musl",), "basis": HATS_AND_SPLINES, "kinematics": FLAT},
     without=("heat", "series", "delete", "reflect", "ranks", "gpu", "pore_water", "rigid_body"),
     but={"F-bar": "quadratic-spline, which locks less",
-         "tools": "walls by fix velocity_nodes: a tool knows one period"},
+         "tools": "walls by fix velocity_nodes: a tool covers one period"},
 )  # fmt: skip
 WALLS = {
     "grids of solids": "method(ulmpm, ...), or walls by fix(ID, contact/surface, all, region): no "
-    "point can leave the grid of its solid, which goes with it"
+    "point can leave the grid of its solid, which moves with it"
 }
 CORNERS = "boundary(delete), or R4 and R8, whose domains do not carry corners with the grid"
 RESTRICTIONS = {
@@ -45,7 +45,7 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
     if none_before:
         hub.warn(
             f"step {step + 1}, time {simulation.time:.6g}: {named(hub, gone[0])} "
-            "leaves the domain and is deleted; more are only counted",
+            "leaves the domain and is deleted; later ones are only counted",
             mark=hub.update.boundary_mark,
         )
     if not simulation.present.any():

@@ -74,7 +74,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
     middle = pieces.middle[small]
     d = middle.shape[1]
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
-    # The side of its box where the region continues.
+    # The side of its box on which the region continues.
     lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
     for step in np.array(list(itertools.product((0, 1), repeat=d))):
         number = boxes.beside(pieces.number[small], step * lean)

@@ -92,16 +92,16 @@ def _around(hub: Scene, dimension: int) -> str | None:
     if len(ends) < 2 * dimension or "INF" in ends:
         return None
     line = f"dimension({dimension}, {', '.join(ends)}, h)"
-    return f"{line} is as large as this {words[0]}; what moves needs more room"
+    return f"{line} is as large as this {words[0]}; moving bodies need a larger one"
 
 
 def no_domain(hub: Scene) -> ScriptError:
     if announced := hub.announced_dimension:
         ends = [f"{axis}{end}" for axis in "xyz"[:announced] for end in ("min", "max")]
         return ScriptError(
-            f"the domain has no size yet: dimension({announced}) only says how many "
-            "directions there are",
-            expected=f"create_domain({', '.join(ends)}, h) before this line, or in its place "
+            f"the domain has no size yet: dimension({announced}) only sets the number of "
+            "directions",
+            expected=f"create_domain({', '.join(ends)}, h) before this line, or instead "
             f"dimension({announced}, {', '.join(ends)}, h)",
             hint=_around(hub, announced),
         )

@@ -16,7 +16,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
 ALL = "all"
-NOTHING_THERE = "what acts on this group does nothing there"
+NOTHING_THERE = "fixes of this group have no effect there"
 
 
 class AnyGroup(Named):

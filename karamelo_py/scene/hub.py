@@ -287,10 +287,10 @@ class Hub:
                 if catalogue is self.computes and item.published and not item.has_published:
                     item.has_published = True
                     self.warn(
-                        f"{name} has measured and published nothing: "
+                        f"{name} has not published anything: "
                         f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
                         item.mark,
-                        hint="its author calls self.publish in refresh, or says published = ()",
+                        hint="call self.publish in refresh, or set published = ()",
                     )
         # A plug-in's compute may use random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
@@ -331,7 +331,7 @@ class Hub:
         curve = next(iter(rehearsed.output.plots.values()), None)
         if curve is not None and rehearsed.output.plots.file is None and not self.open_ended:
             self.warn(
-                f"plot '{curve.id}' is drawn nowhere: the script has no save_plot",
+                f"plot '{curve.id}' is not drawn: the script has no save_plot",
                 curve.mark,
                 hint="save_plot(curves.png)",
             )
@@ -340,7 +340,7 @@ class Hub:
             if id(item) not in seen and item.mark is not None:
                 kind = next((c.kind for c in rehearsed.catalogues if item.id in c), "plot")
                 self.warn(
-                    f"{kind} '{item.id}' comes after the last run, and does nothing",
+                    f"{kind} '{item.id}' follows the last run, and has no effect",
                     mark=item.mark,
                     hint="define it before the run that needs it",
                 )

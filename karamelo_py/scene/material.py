@@ -34,7 +34,7 @@ class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
     thin = False
-    fluid: Any = None  # in its pores: ``around(law)`` wraps the law
+    fluid: Any = None  # water in its pores: ``around(law)`` wraps the law
 
     @property
     def whole(self) -> NamedTuple:

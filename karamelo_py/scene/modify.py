@@ -57,7 +57,7 @@ class Publisher:
     # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
-    unit = NUMBER  # of its values
+    unit = NUMBER  # units of its values
     restrictions: Restrictions | None = None  # what it does not support
 
     def publish(self, name: str, value: float) -> None:
@@ -127,7 +127,7 @@ class Fix(Publisher):
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # present faces (m, d, d) of a tool
     accelerates = False  # formulas are forces per mass
-    exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed if asked for
+    exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed on request
     presses = False  # it is the force of a surface on points
     brakes = False
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
@@ -215,11 +215,11 @@ def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool 
     if len(formulas) < d:
         raise ScriptError(
             f"{plural(len(formulas), 'component')} in {plural(d, 'dimension')}",
-            expected=wanted + " (NULL leaves a component alone)" * (not all_given),
+            expected=wanted + " (NULL does not act on a component)" * (not all_given),
             code="arguments",
         )
     if len(formulas) > 3:
-        message = f"{len(formulas)} components, and space has 3 directions"
+        message = f"{len(formulas)} components, but there are at most 3 directions"
         raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
     for extra in formulas[d:]:
         if extra is not None and not (extra.is_constant and extra.constant == 0):
@@ -230,7 +230,7 @@ def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool 
                 + ": gravity is a component of it" * (name == "b"),
             )
     if all(formula is None for formula in formulas[:d]):
-        hub.warn("all components are NULL: it leaves everything alone")
+        hub.warn("all components are NULL: it has no effect")
     return tuple(formulas[:d])
 
 

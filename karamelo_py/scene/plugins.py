@@ -62,22 +62,22 @@ def check_fix(hub: Scene, fix: Fix) -> None:
         stages = [stage for stage in STAGES if "heat" in method or "heat" not in stage]
         for close in get_close_matches(method, stages, 1, least):
             hub.warn(
-                f"{name} has a method {method}, which is no hook and is never called by a step",
-                hint=f"its author meant {close}, or begins the name with _",
+                f"{name} has a method {method}, which is not a hook, and no step calls it",
+                hint=f"rename it to {close}, or begin the name with _",
             )
     measures = type(fix).refresh is not Fix.refresh
     if not (fix.for_method or hooks or measures or fix.every):
         hub.warn(
-            f"{name} does nothing: no step calls it, and it measures nothing",
-            hint="its author writes a hook, such as post_particles_to_grid, or refresh",
+            f"{name} has no effect: no step calls it, and it measures nothing",
+            hint="define a hook, such as post_particles_to_grid, or refresh",
         )
     said = type(fix).published is not Fix.published and fix.published
     silent = all(isinstance(hook, CompiledHook) and not hook.publishes for hook in hooks.values())
     if hooks and silent and said and not measures:
         hub.warn(
-            f"{name} says in `published` that it publishes, and none of its hooks does: "
+            f"{name} has names in `published`, but none of its hooks publishes: "
             f"{fix.id}_{fix.published[0]} will stay 0".replace("_ ", " "),
-            hint="its author writes publishes=True to the hook, or published = ()",
+            hint="make the hook with publishes=True, or set published = ()",
         )
 
 
@@ -85,7 +85,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
     hooks = {moment: getattr(fix, moment) for moment in STAGES if hasattr(fix, moment)}
     if hooks and fix.group is None and not fix.for_method:
         yield (
-            f"{next(iter(hooks))} acts on a group, and the fix has none: its __init__ has to call "
+            f"{next(iter(hooks))} acts on a group, but the fix has none: its __init__ has to call "
             f"super().__init__(hub, group){faults.place_of(type(fix).__init__)}"
         )
     compiled = {m: h for m, h in hooks.items() if isinstance(h, CompiledHook)}
@@ -106,21 +106,21 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
             continue
         at_own = moment in NODE_WRITES if hook.where == WHOLE_NODES else acts_on != "nodes"
         if hook.where != acts_on and not (whole and at_own):
-            yield f"{moment} is a moment of {acts_on}, and its hook was made for {hook.where}"
+            yield f"{moment} is a stage of {acts_on}, but its hook was made for {hook.where}"
         function = hook.function
         takes = len(hook.reads) + 2 if whole else len(hook.signature.args)
         if misfit(function, takes):
             signature = ", ".join(inspect.signature(function).parameters)
             yield (
                 f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
-                f"{hook.where}: {signature} is what it takes"
+                f"{hook.where}, not {signature}"
             )
         if whole:
             yield from _wrong_items(fix, moment, hook)
             if hook.publishes and not in_a_row(fix.published):
                 yield (
                     f"{moment} publishes several numbers, and published = {fix.published} has to "
-                    "be a part of x, y, z, s, '' in that order, or names that are none of these"
+                    "be a part of x, y, z, s, '' in that order, or other names"
                 )
             continue
         gives = len(hook.signature.return_type)

@@ -89,26 +89,26 @@ class Solid(Named):
         Tm = min(melting, default=math.inf)
         if T0 is not None and T0 < 0:
             hub.warn(
-                f"T0 = {T0:g} is below absolute zero, unless it is counted from another point",
+                f"T0 = {T0:g} is below absolute zero, unless it has another origin",
                 hint="temperatures in kelvin throughout: T0, Tr, Tm",
             )
         elif T0 is not None and Tm <= T0:
             hub.warn(
                 f"T0 = {T0:g} is not below the melting temperature {Tm:g}: "
                 "the solid has no strength from the start",
-                hint="all temperatures counted from the same point",
+                hint="all temperatures on the same scale",
             )
         first = max(reference_temperatures(self.material.law).values(), default=-math.inf)
         if T0 is not None and 0 < T0 < COLD and first - T0 > WARM:
             hub.warn(
-                f"T0 = {T0:g}, and the material counts temperatures from {first:g}",
+                f"T0 = {T0:g}, but temperatures of the material start at {first:g}",
                 hint="kelvin throughout, or degrees Celsius throughout",
             )
         starts = [parameter(law, "initial_temperature", 1) for law in law_parts(self.material.law)]
         if self.T0 is None and 0 in starts:
             begins = "has no thermal stress at" if self.warm else "starts at"
             hub.warn(
-                f"the solid {begins} the temperature 0: neither it nor its material says one",
+                f"the solid {begins} the temperature 0: neither it nor its material sets one",
                 hint="give T0 after the cell size",
             )
 
@@ -219,8 +219,8 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
     for other in hub.solids.values():
         if other is not new and coinciding(new, other):
             hub.warn(
-                f"points of solid '{ID}' lie where points of solid '{other.id}' are: "
-                "there is twice the mass",
+                f"points of solid '{ID}' coincide with points of solid '{other.id}': the mass "
+                "there is doubled",
                 hint="another region for one of them, or region(ID, difference, ...)",
             )
 

@@ -52,7 +52,7 @@ def read_raster(path: Path) -> Raster:
     nx, ny, cell = int(head["ncols"]), int(head["nrows"]), float(head["cellsize"])
     numbers = [number_of(word) for word in words]
     if None in numbers:
-        raise _wrong(path, f"'{words[numbers.index(None)]}' is no height")
+        raise _wrong(path, f"'{words[numbers.index(None)]}' is not a height")
     if len(numbers) != nx * ny or cell <= 0 or not numbers:
         raise _wrong(path, f"{len(numbers)} heights in {nx} columns and {ny} rows")
     heights = np.array(numbers, float).reshape(ny, nx)[::-1].copy()
@@ -62,7 +62,7 @@ def read_raster(path: Path) -> Raster:
 
 
 def _wrong(path: Path, what: str) -> ScriptError:
-    return ScriptError(f"{path} is no ESRI ASCII grid: {what}", argument="file", expected=FORM)
+    return ScriptError(f"{path} is not an ESRI ASCII grid: {what}", argument="file", expected=FORM)
 
 
 def _of_geotiff(path: Path) -> Raster:
@@ -80,7 +80,7 @@ def _of_geotiff(path: Path) -> Raster:
     except rasterio.errors.RasterioError as error:
         raise ScriptError(f"{path} cannot be read: {error}", argument="file") from None
     if place.b or place.d or not np.isclose(place.a, -place.e):
-        message = f"{path} has cells of {place.a:g} by {-place.e:g}, or is turned"
+        message = f"{path} has cells of {place.a:g} by {-place.e:g}, or is rotated"
         raise ScriptError(message, argument="file", expected="square cells along the axes")
     corner = np.array([place.c, place.f + heights.shape[0] * place.e])
     return Raster(corner, place.a, heights[::-1])
@@ -91,7 +91,7 @@ def read_profile(path: Path) -> np.ndarray:
     profile = np.column_stack([*read_table(path).values()][:2])
     if profile.shape[1] < 2 or len(profile) < 2 or (np.diff(profile[:, 0]) <= 0).any():
         raise ScriptError(
-            f"{path} is no profile",
+            f"{path} is not a profile",
             argument="file",
             expected="rows of position and height, of which the positions increase",
         )

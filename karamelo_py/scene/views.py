@@ -316,8 +316,8 @@ class PointsView(View):
         """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
         if not self._in_steps:
             raise ValueError(
-                "points.total(terms) is known in steps alone; before the first, points come in "
-                "pieces where point_by_point is True"
+                "points.total(terms) is known only in steps; before the first, points come in "
+                "pieces if point_by_point is True"
             )
         return self._simulation.points.summed(np.asarray(terms, float))
 

@@ -101,7 +101,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
         raise ScriptError(
             f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
             argument="file",
-            hint=f"gmsh -{dimension} {path.name} says more",
+            hint=f"gmsh -{dimension} {path.name} prints more",
         ) from None
 
 

@@ -37,7 +37,7 @@ Of = TypeVar("Of")
 
 
 class OnDemand(Mapping[str, Of]):
-    """Values by name, computed when asked for."""
+    """Values by name, computed on access."""
 
     def __init__(self, names: Collection[str], of: Callable[[str], Of]):
         self.names, self.of = names, of

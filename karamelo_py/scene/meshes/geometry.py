@@ -76,8 +76,8 @@ def _refuse(token: _Token, reason: str, *, trusted: bool = False) -> None:
     raise ScriptError(
         f"{token.file.name}, line {token.line}: {reason}",
         argument="file",
-        expected="a geometry that describes a shape and no more",
-        hint=None if trusted else "the option --trust-geometries lets it",
+        expected="a geometry that only describes a shape",
+        hint=None if trusted else "the option --trust-geometries allows it",
     )
 
 
@@ -98,11 +98,11 @@ def _follow(tokens: list[_Token], k: int, files: dict[Path, list[_Token]]) -> No
     name, end = [*(other.text for other in tokens[k + 1 : k + 3]), "", ""][:2]
     other = token.file.parent / name[1:-1]
     if name[:1] not in ('"', "'") or end != ";" or not other.is_file():
-        _refuse(token, f"{token.text} of a file that is not there, or not named, might {_MAY}")
+        _refuse(token, f"{token.text} of a file that does not exist, or has no name, might {_MAY}")
     if token.text != "Include" and _is_data(other):
         _collect(other.with_name(f"{other.name}.opt"), files, trusted=False)
     elif token.text != "Include" and other.suffix.lower() not in _KINDS:
-        _refuse(token, f"{token.text} of {other.name}, which is no geometry or mesh, might {_MAY}")
+        _refuse(token, f"{token.text} of {other.name}, not a geometry or mesh, might {_MAY}")
     else:
         _collect(other, files, trusted=False)
 
@@ -126,7 +126,7 @@ def _tokens(path: Path, trusted: bool) -> Iterator[_Token]:
                 suspect = (
                     "a text over several lines, a very long one, or one with words such as EndIf"
                 )
-                _refuse(_Token(text, line, path), f"{suspect} can hide what would {_MAY}")
+                _refuse(_Token(text, line, path), f"{suspect} can hide commands that would {_MAY}")
         if not is_comment:
             yield _Token(text, line, path)
 
@@ -189,7 +189,7 @@ def _check(tokens: list[_Token], k: int, defined: set[str]) -> None:
             _refuse(token, f"the option {word} might {_MAY}")
     elif word not in _WORDS | _FIELDS and before not in _NAMES:
         if word not in defined:
-            _refuse(token, f"{word} is no word that only describes a shape, and might {_MAY}")
+            _refuse(token, f"{word} may do more than describe a shape, and might {_MAY}")
         if follows is not token and (
             follows.is_text or (follows.is_word and follows.text not in _AFTER_NAMES)
         ):

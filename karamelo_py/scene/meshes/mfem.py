@@ -55,11 +55,11 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Read a mesh, with attributes as groups; ValueError says what is not read."""
+    """Read a mesh, with attributes as groups; ValueError for unsupported content."""
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
         head = text.strip().splitlines()[0]
-        raise ValueError(f"it is of MFEM's kind '{head}': {_REMEDY}")
+        raise ValueError(f"it has MFEM's kind '{head}': {_REMEDY}")
     _, *sections = _SECTIONS.split(text)
     bodies = dict(zip(sections[::2], sections[1::2], strict=True))
     words = {name: body.split() for name, body in bodies.items()}

@@ -58,7 +58,7 @@ class _Entry(NamedTuple):
             raise self.wrong(f"has '{self.fields[k]}' instead of a whole number") from None
 
     def wholes(self, count: int) -> list[int]:
-        """Fields from the first on; a second one left out is the first."""
+        """Fields from the first on; an omitted second one equals the first."""
         try:
             numbers = list(map(int, self.fields[:count]))
         except ValueError:
@@ -181,7 +181,7 @@ def read_nastran(path: Path) -> Mesh:
             system = entry.whole(1) if len(entry.fields) > 1 and entry.fields[1] else -1
             at = entry, system, [entry.real(k) for k in (2, 3, 4)]
             if systems.nodes.setdefault(entry.whole(0), at)[1:] != at[1:]:
-                raise entry.wrong("is there twice, at two places", "one superelement")
+                raise entry.wrong("is defined twice, at different positions", "one superelement")
         elif name == "GRDSET":
             systems.default = entry.whole(1)
         elif re.fullmatch(r"CORD[12][RCS]", name):

@@ -28,7 +28,7 @@ def read_obj(path: Path) -> Mesh:
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
                 if min(corners) < 0 or max(corners) >= len(points):
-                    raise ValueError("a vertex that is not there")
+                    raise ValueError("a vertex that does not exist")
                 parts = [corners] if len(corners) <= 4 else _split(points, corners)
                 faces[len(parts[0])] += parts
                 owners[len(parts[0])] += [names["o"] + names["g"]] * len(parts)
@@ -37,7 +37,7 @@ def read_obj(path: Path) -> Mesh:
             raise ScriptError(
                 f"the file {path.name} cannot be read as a mesh: line {number}: {why}",
                 argument="file",
-                expected="v x y z, f a b c ..., and what else .obj files have",
+                expected="v x y z, f a b c ..., and other lines of .obj files",
             ) from None
     kinds = [n for n in faces if faces[n]]
     cells = [CellBlock({3: "triangle", 4: "quad"}[n], np.array(faces[n])) for n in kinds]

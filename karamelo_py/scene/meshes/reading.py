@@ -77,7 +77,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
         raise ScriptError(
             f"the file {path.name} changed while it was read",
             argument="file",
-            hint="start again when it is written",
+            hint="start again after it is complete",
         )
     return mesh
 
@@ -114,7 +114,7 @@ def _read(path: Path, dimension: int, size: float | None, _state: tuple[int, int
             continue
         if not 0 <= cells.nodes.min() <= cells.nodes.max() < len(mesh.points):
             raise ScriptError(
-                f"the mesh {path.name} has an element with a node that is not there",
+                f"the mesh {path.name} has an element with a node that does not exist",
                 argument="file",
             )
     return mesh
@@ -219,7 +219,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
             mesh = meshio.read(path, file_format)
     except FAILURES as error:
         unknown = "Could not deduce" in str(error)
-        reason = "its ending tells no format" if unknown else _reason(error)
+        reason = "its ending identifies no format" if unknown else _reason(error)
         raise _unreadable(path, (why or "") + reason) from None
     if np.ndim(mesh.points) != 2:
         raise _unreadable(path, "its content does not fit its ending")
