@@ -55,7 +55,6 @@ def _above_limit_as_cause(hub: Hub, simulation: Simulation) -> str:
     update = hub.update
     if step_by_script(update.fixed_dt, update.dt_factor) in update.warned_of:
         return "time step above the stability limit (see the warning)"
-    # The limit of the failed state is meaningless.
     here = "" if simulation.steps.too_large else f" {simulation.steps.limit:.4g}"
     return f"time step {simulation.dt:.4g} above the stability limit{here}"
 

@@ -66,7 +66,6 @@ class Narrator(Listener):
 
     def ready(self, simulation: Simulation, *, resumed: bool) -> None:
         hub, why = self.hub, unknown_work(self.hub)
-        # The limit of the first state; that of a failed one is meaningless.
         if simulation.steps.too_large:
             self.smaller = self.smaller or own_step_instead(simulation)
         facts: dict[str, Any] = {

@@ -340,7 +340,6 @@ def _parser(command: str) -> tuple[CommandLine, Any]:
 
 def _explain(options: argparse.Namespace) -> int:
     def manuals() -> dict[str, tuple[str, str]]:
-        # bench would import the compiler.
         names = [name for name in ELSEWHERE if name != "bench"]
         texts = {name: _parser(name)[1].choices[name].format_help() for name in names}
         return {name: (ELSEWHERE[name][1], text) for name, text in texts.items()}

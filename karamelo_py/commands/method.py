@@ -190,7 +190,6 @@ def scheme(
             hub.values.publish(name)
 
 
-# A resumed run may use another solver.
 registry.may_differ(scheme, keywords=("tolerance", "iterations", "solver", "limit"))
 
 
@@ -295,7 +294,6 @@ class _Call:
                 raise self._unknown(argument, slots)
             family, parameter = slot or numbers.pop(0)
             before, words = chosen.get((family, parameter.name)), parameter.kind.words
-            # Scripts with variables as options may repeat a word.
             if before and not (words and _word(before, words) == _word(argument, words)):
                 raise _chosen_twice(before, argument)
             chosen[family, parameter.name] = argument

@@ -178,8 +178,7 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run continues, and flushing at exit
-            # must not fail.
+            # The reader (head, less) has closed the pipe; the run continues without errors at exit.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())

@@ -347,7 +347,6 @@ class Response:
         largest = max(float(np.abs(table[name]).max()) for name in stresses)
         figure = blank_figure(9.6, 4.0)
         left, right = figure.subplots(1, 2)
-        # Dashes show a curve under another.
         for name, dashes in zip(stresses, ("-", "--", ":") * 2, strict=False):
             if np.abs(table[name]).max() > 1e-6 * largest:
                 left.plot(table[driven], table[name], dashes, label=name, linewidth=1.4)

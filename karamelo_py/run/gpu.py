@@ -361,7 +361,6 @@ class StepsOnCard:
 
     def send(self) -> None:
         self.use[:] = 2  # nodes may hold values of any step
-        # Failed steps leave terms in the copies of the totals.
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 

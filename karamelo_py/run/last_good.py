@@ -99,7 +99,6 @@ class LastGood(NamedTuple):
             return None
         with self._as_warnings():
             path = restart_file.write(hub, LAST_GOOD, within=True)
-            # restart(...) would write the same state again.
             for item in hub.output.last:
                 item.last_step = hub.update.step
             return path

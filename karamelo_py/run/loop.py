@@ -167,7 +167,6 @@ class RunLoop:
         self.interrupted = int(simulation.comm.allreduce_max(np.array([self.signalled]))[0])
 
     def _steps_left(self, simulation: Backend) -> bool:
-        # A limit load also ends a run, at the time reached.
         end_time = simulation.control.step[0].end_time
         return simulation.step < self.last_step and simulation.time < end_time
 

@@ -74,7 +74,6 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
     middle = pieces.middle[small]
     d = middle.shape[1]
     nearest, taker = np.full(len(small), np.inf), np.full(len(small), -1)
-    # The side of its box on which the region continues.
     lean = np.where(middle > boxes.middles(pieces.number[small]), 1, -1)
     for step in np.array(list(itertools.product((0, 1), repeat=d))):
         number = boxes.beside(pieces.number[small], step * lean)
@@ -143,7 +142,6 @@ def _measure(
         if halved == HALVED:
             rough = np.bincount(box[bent], volume[bent])
             bent[:] = False
-        # Simpson's rule for the mean.
         done = ~bent
         fraction, middle = _plane((mean + 2 * inmost)[done] / 3, slopes[:, done])
         fraction *= volume[done]

@@ -171,7 +171,6 @@ class NodeGroup(AnyGroup):
             pieces = [
                 numbers for definition in self.parts if len(numbers := self._find(*definition))
             ]
-            # Each is ascending: no sort of millions.
             members = [np.unique(np.concatenate(pieces))] if len(pieces) > 1 else pieces
             self._found = lattices, (members or [np.empty(0, np.int64)])[0]
         return self._found[1]

@@ -222,7 +222,6 @@ def fill(
         kept = region.inside(x)
         in_domain = domain.contains(x)
         if counted:
-            # Nothing is missing past an open side.
             beyond = x[kept & ~in_domain]
             outside += int(((beyond >= open_lo) & (beyond <= open_hi)).all(axis=1).sum())
         if rule == "cut":
@@ -254,7 +253,6 @@ def _least(region: Region, domain: Domain, spacing: float, most: float) -> float
         x = lo + size * random.random((max(SAMPLE, places), domain.dimension))
         places, inside = places + len(x), inside + int(region.inside(x).sum())
         fraction = inside / places
-        # Four standard deviations of the mean.
         unsure = 4 * math.sqrt(max(fraction * (1 - fraction), 1 / places) / places)
         least = (fraction - unsure) * whole
         if least > most or (fraction + unsure) * whole <= most:

@@ -42,7 +42,6 @@ class Region(Named):
         self.exterior = exterior
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
-        # Depends on results that a rehearsal lacks.
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
         # Bounding box, infinite if open; 0 in unused directions.
         self.box_lo, self.box_hi = np.zeros((2, 3))

@@ -28,7 +28,6 @@ from karamelo_py.script.errors import ScriptError
 _SIGNALS = {one.value: one.name for one in signal.Signals}
 MODULE = "karamelo_py.app.bench.apart"
 COMMAND = (sys.executable, "-m", MODULE)
-# Workloads with --ranks.
 USUAL = ("disks-320", "block-3d-mls", "bar-3d-ul", "dam-break")
 HEADING = (
     f"  {'processes x threads':<22}{'points':>9} {'million/s':>10} {'times one':>10} "
@@ -148,7 +147,6 @@ def main() -> int:
     keep_to_oneself()
     if job.ranks > 1:
         return together(job.ranks, lambda comm: _measure(job, comm))
-    # The input closes when the parent stops waiting.
     threading.Thread(target=lambda: (os.read(0, 1), os._exit(0)), daemon=True).start()
     status, text = outcome_of(lambda: _measure(job), debugging=job.debug)
     if text:

@@ -226,7 +226,6 @@ def comparison(now: Record, then: Record) -> list[str]:
         before, after = (f"{each['best'] / 1e6:.2f}" if each else "-" for each in (other, one))
         ratio, said = "-", "new" if other is None else "not measured now"
         if one and other:
-            # If these differ, ratios mean nothing.
             about = ("points", "precision", "variables")
             said = ", ".join(f"other {key}" for key in about if one.get(key) != other.get(key))
             ratio = "-" if said else f"{one['best'] / other['best']:.2f}"

@@ -433,7 +433,6 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if best.forecast is None:
         alone = ", and it is not known whether finer runs are as good" * (len(adviser.values) == 1)
         return f"sure: it was run ({numbers}){alone}"
-    # The orders give no bound: these may end the fall.
     if doubts := adviser.doubts(best):
         return "\n  ".join(
             [f"not sure: expected {numbers}, if the error continues to fall", *doubts]
@@ -441,7 +440,6 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     low, high = best.forecast.low, best.forecast.high
     word = "almost sure"
     if high > adviser.target:
-        # Nearer to the expected error than to the bound.
         near = adviser.target**2 < best.error * high
         word = "uncertain" if near else "likely"
     return (

@@ -64,7 +64,6 @@ COLUMNS = {
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
     "stable_dt": "stable step (time of the script)",  # at the beginning
-    # The program's own choice, if the script chose another.
     "own_dt": "the program's own step (time of the script)",
     "path": "path of the fastest points (cells)",  # upper bound
     "bytes_per_particle": "bytes per particle",  # all fields, mean over points

@@ -193,7 +193,6 @@ class Family:
         self.by = [*by, *(n for n in differing if n not in by and n != self.along)]
         ends = values[along] if along else []
         self.words = ends if any(number_of(v) is None for v in ends) else []
-        # A logarithmic axis has no zero.
         self.linear = bool(self.words or any(number_of(v) <= 0 for v in ends))
         groups: dict[tuple[str, ...], list[Mapping[str, str]]] = {}
         for row in rows:

@@ -270,7 +270,6 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
         if each.stopped:
             axes.plot(each.x[-1], each.y[-1], "X", color=colour, markersize=9, zorder=4)
             name += " (stopped)"
-        # Curves end where they leave the axis.
         last = max(np.flatnonzero(each.y >= low), default=-1)
         ends.append((each.x[last], max(each.y[last], low), name, colour))
     sheet.finish(figure, axes, ends)
@@ -363,7 +362,6 @@ def draw_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, shee
     left.set_xlabel(sheet.x)
     right.set_xlabel(sheet.y)
     left.set_title(sheet.title, loc="left", fontsize=10)
-    # Above the axes: within them it would hide points.
     left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False, fontsize=9)
     for axes in (left, right):
         tidy(axes)

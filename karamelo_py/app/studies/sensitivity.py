@@ -143,7 +143,6 @@ def run(options: Namespace) -> int:
     fixed = variables.choices(options.var)
     if several := next((name for name, words in fixed.items() if words[1:]), None):
         raise ScriptError(f"-var {several} has several values", expected="one, or a distribution")
-    # Two values represent a distribution in the plan of the study.
     options.var = [f"{one.name}={one.law.ppf(0.3):.10g},{one.law.ppf(0.7):.10g}" for one in randoms]
     options.var += [f"{name}={word}" for name, (word,) in fixed.items()]
     plan = variables.family(options)

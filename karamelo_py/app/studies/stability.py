@@ -258,7 +258,6 @@ class Map:
             grows = GAINED if "energy-gain" in codes or change > watch.WITHIN else ""
             falls = LOST if "energy-loss" in codes or change < -watch.WITHIN else ""
         if not done:
-            # A domain that is too small says nothing about the step.
             left = code == "left-domain" and "energy-gain" not in codes
             verdict |= {"class": "left" if left else "failed", "why": in_short(row, code)}
         elif not (self.energy or changes) and row["steps"] < FEWEST:

@@ -30,7 +30,6 @@ PATIENCE = 20.0  # seconds: a start takes about 0.01, the import 2
 SUBREAPER = 36  # prctl: adopt processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
-# Functions of a script in Python may affect the next run.
 NOT_OURS = "karamelo_py.styles.fixes.python"
 
 

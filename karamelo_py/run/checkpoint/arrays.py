@@ -191,7 +191,6 @@ def reading() -> Iterator[None]:
 
 def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup
-    # Nodes not in use in the state must be empty.
     simulation.tiles.empty_nodes(s)
     blocks = []
     for k, block in enumerate(s.blocks):
@@ -381,7 +380,6 @@ def _joined(simulation: SceneState, local: dict[str, np.ndarray]) -> Iterator[St
         "touched": stripped(local, "touched/"),
     }
     parts = comm.gather(state)
-    # Tiles as in a serial run.
     tilings = [Tiles.empty_tiling(simulation.tiles) for _ in s.blocks]
     rows: dict[str, np.ndarray] = {}
     for k, tiling in enumerate(tilings if parts is not None else ()):

@@ -56,7 +56,6 @@ class Restarts(Rhythmic):
         self.hub = hub
         self.every = every
         self.file = file
-        # The initial state of a run needs no file.
         self.last_step = hub.update.step
 
     def write(self) -> None:
@@ -72,7 +71,6 @@ def write(hub: Hub, file: Path, *, within: bool) -> Path:
     path, comm, simulation = path_of(hub, file), hub.settings.comm, hub.simulation
     groups, point = {"state": stored(simulation)}, simulation.rollback if hub.in_run else None
     if point and point.halve and point.arrays:
-        # The last good state, if the run may return to it.
         groups["good"] = stored(simulation, point.arrays)
     if comm.leads:
         _write(hub, path, within, point, groups)

@@ -119,7 +119,6 @@ class LoadSteps:
                     break
                 fraction /= 2
                 if isinstance(reason, TooFar):
-                    # As many equal parts as the distance needs.
                     fraction = most = 2 * fraction / min(max(ceil(1.1 * reason.at), 2), 4)
                 continue
             left -= fraction

@@ -100,7 +100,6 @@ def check_scene(hub: Hub) -> None:
     _check_restrictions(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
-    # Domains of rigid points would deform.
     basis = type(method.basis)
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return

@@ -24,7 +24,6 @@ class Shape(NamedTuple):
     name: str
     words: str
     dimension: int
-    # Corner order of the reversed orientation.
     mirrored: tuple[int, ...]
     corners: tuple[tuple[float, ...], ...]  # natural coordinates
     simplex: bool = False  # coordinates >= 0 with a sum <= 1; else from -1 to 1
