@@ -476,7 +476,7 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ("abs(I1 - 3)", "abs has no derivative", "sqrt"),
         ("-(I1*J^(-2/3) - 3) + (J - 1)^2", "shear modulus at rest is -2", "grows"),
         ("(I1*J^(-2/3) - 3)", "the bulk modulus", "K/2*(J - 1)^2"),
-        ("l1^2 + l2^2 - log(J^2)", "change places", "each of l1, l2 and l3"),
+        ("l1^2 + l2^2 - log(J^2)", "are exchanged", "each of l1, l2 and l3"),
         ("I9", "unknown name 'I9'", "I1, I2, J"),
         ("T*(I1 - 3 - 2*log(J)) + (J - 1)^2", "the material has no temperature", "cp=..., kappa="),
         ("if(I1 < 3, 0, I1 - 3)", "< has no derivative", "sqrt"),

@@ -206,7 +206,7 @@ def test_compiled_is_the_same(run_script, run_interpreted):
         ("strength(s, fluid, -1)", "'mu' must be a number"),
         ("strength(s, mohr-coulomb, 80, 1, 90)", "the friction angle phi = 90 is impossible"),
         ("strength(s, mohr-coulomb, 80, 1, 30, 31)", "psi = 31 is impossible with phi = 30"),
-        ("strength(s, mohr-coulomb, 80, 0, 0)", "there is no strength"),
+        ("strength(s, mohr-coulomb, 80, 0, 0)", "neither cohesion nor friction"),
         ("strength(s, mohr-coulomb, 80, -1, 30)", "'cohesion' must be a number"),
         ("strength(s, mohr-coulomb, 80, 1, 30, 0, softening=1)", "needs a residual strength"),
         ("strength(s, mohr-coulomb, 80, 1, 30, 0, residual_phi=20)", "softening=plastic strain"),

@@ -15,7 +15,7 @@ from karamelo_py.points.kinematics import I, det, planar, product, stretch, tens
 
 LEAST = 1e-3
 MOST = 1.0
-STRETCHED = "half_size", "half_size", "deformation"  # half size now and at first, F
+STRETCHED = "half_size", "half_size", "deformation"  # present and initial half size, F
 
 
 class _Box(NamedTuple):

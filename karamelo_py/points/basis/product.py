@@ -179,7 +179,7 @@ def warn_of_many_nodes(basis: type) -> None:
     suggestion(
         basis,
         when=_seen,
-        cost="{scene.basis_name} sees {nodes} nodes per point; in a total Lagrangian method no "
+        cost="{scene.basis_name} uses {nodes} nodes per point; in a total Lagrangian method no "
         "point crosses cells, and a linear basis, with {scene.corners} nodes, has the same order",
         instead="linear in method(...); karamelo-py sweep shows the errors of both",
     )

@@ -1,6 +1,6 @@
 """B-splines, modified at walls: three or four nodes per direction.
 
-Walls inside the grid have separate classes (:class:`AtWalls`), so other scenes pay nothing.
+Walls inside the grid have separate classes (:class:`AtWalls`).
 """
 
 from typing import NamedTuple

@@ -56,7 +56,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the law or a part has the point function and does not merely hand it on."""
+    """Return True if the law or a part has the point function itself, not from a wrapped law."""
     kinds = (kind for kind in law_kind(law) if function.defined(kind))
     return any(function.find((kind,)) not in _handing_on for kind in kinds)
 

@@ -156,7 +156,7 @@ def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float
     others = [value_at(energy, (some[i], some[j], some[k])) for i, j, k in ((1, 0, 2), (2, 1, 0))]
     if not np.allclose(others, value_at(energy, some), rtol=1e-9):
         raise ScriptError(
-            "the energy changes when l1, l2 and l3 change places",
+            "the energy changes if l1, l2 and l3 are exchanged",
             argument="energy",
             expected="the same term for each of l1, l2 and l3",
         )

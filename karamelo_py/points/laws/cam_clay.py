@@ -193,7 +193,7 @@ def plastic_flow(law, q, p, pc):
     between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
-    q = where(yields, q, law.M * pc)  # outside the surface, for unused lanes
+    q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
     trial = ClayStress(q, p, pc)
     c, a = law.M**2 / (6 * law.G), law.kappa * (law.lam - law.kappa) / law.lam
     isotropic = a * log(p / pc)

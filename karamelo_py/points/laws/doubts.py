@@ -145,7 +145,7 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
     heat, counted = law.temperature, reference_temperatures(law)
     if counted and max(counted.values()) - min(counted.values()) > APART:
         yield (
-            "temperatures are counted from several points: "
+            "temperatures have different scales: "
             + ", ".join(f"{name} is {T:g}" for name, T in counted.items()),
             "kelvin throughout, or degrees Celsius throughout",
         )

@@ -208,13 +208,13 @@ def _strained(law, heat):
 suggestion(
     EosStrength,
     when=_idle_damage,
-    cost="material {owner.id} has a damage by plastic strain, and never yields",
+    cost="material {owner.id} has a damage by plastic strain, but never yields",
     instead="leave the damage out",
 )
 suggestion(
     EosStrength,
     when=_idle_heat,
-    cost="the temperature of material {owner.id} changes nothing but its column T",
+    cost="the temperature of material {owner.id} only affects its column T",
     instead="leave the temperature out",
 )
 
@@ -230,17 +230,17 @@ known_failure(
         _supersonic(law, scene) and isinstance(law.viscosity, Absent) and scene.kept > 0.9
     ),
     reason="points move at {scene.speed:.2g} times the speed of sound, and with "
-    "{scene.transfer_name} and no artificial viscosity nothing makes a shock: gas that runs "
-    "together goes through itself",
+    "{scene.transfer_name} and no artificial viscosity there are no shocks: colliding gas "
+    "passes through itself",
     cure="Q1=2, Q2=0.2 in eos ideal-gas, or TPIC with quadratic-spline",
 )
 known_failure(
     EosStrength,
     "wall heating in material '{owner.id}'",
     when=lambda law, scene: _supersonic(law, scene) and not isinstance(law.viscosity, Absent),
-    reason="artificial viscosity heats a gas that runs against a wall, an axis or a point too much "
-    "at first: there its density stays too low, about a point by half four cells from it and by a "
-    "quarter ten cells from it, with any basis, transfer and step",
+    reason="artificial viscosity initially overheats a gas that hits a wall, an axis or a "
+    "point: its density there stays too low, around a point by half at four cells and by a "
+    "quarter at ten cells, with any basis, transfer and step",
     cure="finer cells, or TPIC with quadratic-spline, dt_factor(0.1), and no Q1 and Q2",
 )
 
@@ -383,7 +383,7 @@ def intact_pressure(law, j, m):
 
 
 def energy_of_swelling(law, j, before, m):
-    """Return the elastic energy of a plastic change of volume, which changes what is stored."""
+    """Return the change of elastic energy by a plastic change of volume."""
     ratios = [strengths.inelastic_ratio(law.strength, memory) for memory in (before, m.strength)]
     elastic, energy = strengths.elastic_ratio(law.strength, m.strength, j), 0
     for old, new in zip(*ratios, strict=True):
@@ -402,7 +402,7 @@ def volume_energy(law, j, m):
 
 
 def energy_to_unload(law, elastic, m):
-    """Return the energy per elastic volume that a release of the pressure gives back."""
+    """Return the energy per elastic volume released with the pressure."""
     energy = energy_of_elastic_volume(law, elastic, m)
     if len(m.heat):
         # without pressure a warm point is larger than at rest

@@ -119,13 +119,13 @@ def _shear_part_of_fibres(law, kin, state):
 
 
 class PlacedFibre(Placed):
-    """One family by formulas of place."""
+    """One family by formulas of position."""
 
     __slots__ = ()
 
 
 class PlacedFibres(PlacedFibre):
-    """Two families, of which one is by formulas of place, or both."""
+    """Two families, at least one of them by formulas of position."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""Further parts of a composed law, of kinds that plug-ins may define.
+"""Further parts of a composed law, whose kinds plug-ins may define.
 
 A part is a NamedTuple of parameters; it may have a memory and add a pressure. The plastic strain
 rate is one, added if an output requests it.

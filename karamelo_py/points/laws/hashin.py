@@ -136,7 +136,7 @@ class State(NamedTuple):
     fibre_c: Any
     matrix_t: Any
     matrix_c: Any
-    fibres: Any  # fraction of the stress that is left
+    fibres: Any  # remaining fraction of the stress
     matrix: Any  # 1 if whole, else 0
     loss: Any  # dissipated energy per reference volume
 
@@ -172,7 +172,7 @@ def piola_stress(law, kin, state):
 
 @laws.advance.on(BreakingApart)
 def _advance_hashin(law, kin, state, dl, dt):
-    # What a step breaks does not carry in the next: a stress that jumps within a load step has no
+    # Broken parts lose their stress in the next step: a load step in which stress jumps has no
     # equilibrium.
     new = state._replace(
         fibres=where(max(state.fibre_t, state.fibre_c) < 1, 1, law.residual),

@@ -421,7 +421,7 @@ class Residual(NamedTuple):
 
 
 def residual(law, squares, before, x, dt):
-    """Return what vanishes for the increment x, linear in x for an isotropic body.
+    """Return the residual at the increment x, linear in x for an isotropic body.
 
     For constant or concave flow stress Y it is convex and falls with x: Newton's method from 0
     never passes the solution.

@@ -59,7 +59,7 @@ class HyperelasticFormula(OfInvariants, Fields):
         Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, I3 =
         det C, J = det F, with C = F^T F, and of I4 and I6, the squared stretches of two families of
         fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Script
-        variables are numbers. At rest I1 = I2 = 3, the others 1.
+        variables are numbers. At rest I1 = I2 = 3; all other variables are 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6: numbers, or formulas of x0, y0, z0.
     cp, kappa, alpha
@@ -107,7 +107,7 @@ class HyperelasticFormula(OfInvariants, Fields):
     ) -> Any:
         if "T" in energy.names and cp is None:
             raise ScriptError(
-                "the energy depends on T, and the material has no temperature",
+                "the energy depends on T, but the material has no temperature",
                 argument="energy",
                 expected="cp=..., kappa=... after the formula",
             )

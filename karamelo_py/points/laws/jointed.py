@@ -32,7 +32,7 @@ from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import ScriptError
 
 ALIGNED = 1e-9  # component of the normal that counts as none
-PASSES = 2  # of the return to two yield surfaces
+PASSES = 2  # iterations of the return to two yield surfaces
 
 
 class RockBetweenJoints(MohrCoulomb):
@@ -71,12 +71,12 @@ class Jointed(NamedTuple):
     Notes
     -----
     With traction t_n (tension positive) and shear tau on the joints, tau + t_n tan(phi) <= cohesion
-    and t_n <= tension; both return along the elastic stress of slip and opening. A specimen of
-    which the joints' normal is at an angle b to the load fails at s1 - s3 = 2 (c + s3 tan(phi)) /
-    ((1 - tan(phi) cot(b)) sin(2 b)) or, if that is more, at the strength of the rock (Jaeger 1960,
-    "Shear failure of anisotropic rocks", Geol. Mag. 97). The stress rotates with the point (Jaumann
-    rate). The joints are planes of the body, and their normal follows its deformation. A joint that
-    has opened sustains pressure as soon as it is pressed. Dump columns: `slip` and `opening` sum up
+    and t_n <= tension; both return along the elastic stress of slip and opening. A specimen with
+    joints whose normal is at an angle b to the load fails at s1 - s3 = 2 (c + s3 tan(phi)) / ((1 -
+    tan(phi) cot(b)) sin(2 b)) or, if that is more, at the strength of the rock (Jaeger 1960, "Shear
+    failure of anisotropic rocks", Geol. Mag. 97). The stress rotates with the point (Jaumann rate).
+    The joints are planes of the body, and their normal follows its deformation. A joint that has
+    opened sustains pressure as soon as it is pressed. Dump columns: `slip` and `opening` sum up
     plastic shear and plastic extension on the joints, `ep` is the equivalent plastic strain of rock
     with a strength.
 

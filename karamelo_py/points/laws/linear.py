@@ -84,9 +84,9 @@ class State(NamedTuple):
 gain(
     LinearElastic,
     when=lambda law, scene: scene.shear_stress > 0.25 * law.G,
-    cause="material linear at large strain: it adds up stress by rates, and gives back another "
-    "work than it took",
-    cure="material neo-hookean, which stores what it is given",
+    cause="material linear at large strain: stress summed by rates does not conserve the work "
+    "of a closed cycle",
+    cure="material neo-hookean, which conserves energy",
 )
 
 

@@ -1,4 +1,4 @@
-"""Axes of a law by formulas of place: the deformation gradient of a point starts as a rotation.
+"""Axes of a law by formulas of position: the deformation gradient of a point starts as a rotation.
 
 A law with directions that knows the deformation by F alone has other axes if F starts from the
 rotation R to them: then F R takes the place of F, and the axes turn with the body.

@@ -1,4 +1,4 @@
-"""Directions of a law by formulas of place: numbers of each point, stored in its state.
+"""Directions of a law by formulas of position: numbers of each point, stored in its state.
 
 A law that allows it has a field ``directions``, a NamedTuple of numbers; `Placed` wraps it and
 replaces them by the point's. A :class:`Place` in the law has the formulas. The state starts with
@@ -22,7 +22,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.script.values import Values
 
 Vector = tuple[float, ...]
-SOME = 1000  # points of a solid whose directions are judged before a run
+SOME = 1000  # points of a solid whose directions are checked before a run
 
 
 class Direction:
@@ -92,7 +92,7 @@ def unit_vector(components: Sequence[float], argument: Argument) -> Vector:
 
 @dataclass(frozen=True)
 class Place:
-    """Formulas of the directions of a law; in kernels a number that nothing reads."""
+    """Formulas of the directions of a law; unused in kernels."""
 
     of: tuple[Vector | Direction, ...]
 

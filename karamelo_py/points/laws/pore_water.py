@@ -1,4 +1,4 @@
-"""Saturated soil: any law as the skeleton, with effective stress, and water in its pores.
+"""Saturated soil: any law for the effective stress of the skeleton, and water in its pores.
 
 The state adds the volume of the water at zero pressure and of the pores, per volume before
 deformation: p = K ln(content / pores). With a suction a < K, p = a ln S where the saturation S =

@@ -98,7 +98,7 @@ class CochranBanner(NamedTuple):
     sigma0
         Tension, as a pressure, at which cracks begin to open.
     D0
-        Opening at which nothing is left, a length: 50e-6 m for copper.
+        Opening at which no tension is left, a length: 50e-6 m for copper.
 
     Example
     -------
@@ -133,7 +133,7 @@ column(CochranBanner, "damage_init", damage_initiation)
 
 class Opened(NamedTuple):
     w: Any  # opening over D0
-    left: Any  # of the stress
+    left: Any  # lost fraction of the stress
 
 
 @initial_damage.on(CochranBanner)
@@ -238,7 +238,7 @@ class DamageFormula(ByRate, DamageFields):
             growth = nan
         if isnan(growth):
             raise ScriptError(
-                "the growth is no number in uniaxial tension",
+                "the growth is not a number in uniaxial tension",
                 argument="rate",
                 expected="a number for every tension, such as max(s1, 0)",
             )

@@ -38,7 +38,7 @@ suggestion(
     when=lambda law, scene: (
         not (scene.hub.update.thermal or scene.reads_temperature or law.heat.alpha)
     ),
-    cost="material {owner.id} has a temperature, but no heat flows and nothing reads it",
+    cost="material {owner.id} has a temperature, but no heat flows and no output uses it",
     instead="leave cp and kappa out, or method(..., thermo-mechanical)",
 )
 

@@ -178,8 +178,8 @@ known_failure(
     Branch,
     "short relaxation times",
     when=lambda branch, scene: branch.tau < scene.simulation.dt and not scene.simulation.implicit,
-    reason="material '{owner.id}' has a relaxation time below the time step, in which that part "
-    "of the stress never acts",
+    reason="material '{owner.id}' has a relaxation time below the time step: that part of the "
+    "stress never acts",
     cure="leave the term out, with a softer elastic law",
 )
 
@@ -298,7 +298,7 @@ laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)
 
 
 def around_elastic(outer, stiffening):
-    """Let `outer` answer as its elastic law; `stiffening` raises the squared wave speed."""
+    """Delegate functions to the elastic law; `stiffening` raises the squared wave speed."""
     laws.wraps(
         outer, "elastic", "elastic", (
             laws.jacobian, laws.deformation, laws.elastic_strain, laws.temperature, laws.by_rates,
@@ -321,7 +321,7 @@ def around_elastic(outer, stiffening):
 
 
 def _stiffening(law, kin, state):
-    # the elastic stress that the body lacks
+    # the relaxed part of the elastic stress
     s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
     lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
     return 2 * lost * laws.specific_volume(law)

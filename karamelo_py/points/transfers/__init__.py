@@ -56,7 +56,7 @@ def in_step(transfer, kept):
 def lost_fractions(transfer, template):
     """Return the lost fractions (2,) of the energy removed by mapping to the nodes and back.
 
-    The rest returns with the data stored by points. If undefined, the loss is not recorded.
+    Stored data of points return the rest. If undefined, the loss is not recorded.
     """
 
 

@@ -164,7 +164,7 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
         transfer,
         when=lambda transfer, scene: _turns_away(transfer, scene) and {"share": 0.5},
         cause="a body has rotated freely, {scene.free_turns:.2g} times; {scene.transfer_name} "
-        "moves points with a velocity that differs from their own",
+        "moves points with a velocity that differs from the stored one",
         cure="APIC instead of {scene.transfer_name}, best with method tlmpm",
     )
 
@@ -188,7 +188,7 @@ def _brakes(transfer, scene):
 def warn_of_slow_rotation(transfer: type) -> None:
     """Warn about free rotations in the total frame.
 
-    Points move with another velocity than they store: a square of n cells rotates too slowly by
+    Points store another velocity than they move with: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(

@@ -25,7 +25,7 @@ from karamelo_py.script.errors import ScriptError
 
 LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size; dam breaks take 4
 FRONT = 1.5  # cells in which a point burns
-STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock, and of a strong one
+STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock and of a strong shock
 
 
 class Tait(NamedTuple):
@@ -217,7 +217,7 @@ def _shocks(eos, scene):
     elif ratio < STRONG or scene.scheme.traits.bears_drift:
         return None
     else:
-        loss = "this scheme, whose work is not the energy in its front, loses 3 to 15 % of it"
+        loss = "this scheme loses 3 to 15 % of the energy at the front"
     return {"mark": scene.method.mark, "ratio": ratio, "loss": loss}
 
 
@@ -342,8 +342,8 @@ known_failure(
     Jwl,
     "an explosive without a fuse",
     when=lambda eos, scene: not any(fix.ignites for fix in scene.hub.fixes.values()),
-    reason="nothing lights material '{owner.id}', which has no pressure until then",
-    cure="fix(light, detonation, all, x0/D): the time at which each point is lit",
+    reason="nothing ignites material '{owner.id}', which has no pressure until then",
+    cure="fix(light, detonation, all, x0/D): the ignition time of each point",
 )
 
 
@@ -361,7 +361,7 @@ def _stored_heat_of_gas(eos, loss):
 @taken_heat.on(IdealGas)
 @taken_heat.on(Jwl)
 def _taken_heat_of_gas(eos, memory, heat):
-    # A cold gas must not lose all its energy at once if a moment holds slightly more than it had.
+    # A moment may remove slightly more energy than a cold gas has.
     return (max(heat, -0.1 * memory.E),)
 
 

@@ -36,7 +36,7 @@ class PAlpha(NamedTuple):
     pe
         Pressure at which voids begin to be crushed.
     ps
-        Pressure at which none is left.
+        Pressure at which all voids are closed.
     n
         Exponent of the crush curve.
 
@@ -149,7 +149,7 @@ def _compressed_p_alpha(eos, memory, step, heating):
         new = p - excess / (1 - (K - solid) * slope / (alpha * alpha))
         new = where((low < new) & (new < high), new, 0.5 * (low + high))
         settled = abs(new - p) <= 4 * round_off(p) * eos.ps
-        p = where(moves, new, p)  # the same number of passes whatever other lanes need
+        p = where(moves, new, p)  # the same number of passes in all lanes
         moves = moves & (not settled)
         if not any_lane(moves):
             break

@@ -100,7 +100,7 @@ def no_loss_yet(strength, template):
 
 @point_function(otherwise=True)
 def inelastic_ratio(strength, memory):
-    """Return (ratio,), the part of the volume ratio that is plastic or that of gaps, or ()."""
+    """Return (ratio,), the volume ratio of plastic flow or gaps, or ()."""
     return ()
 
 

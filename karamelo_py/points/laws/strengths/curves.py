@@ -98,7 +98,7 @@ def _check_curve(points: np.ndarray, G: float) -> None:
     strain, stress = points.T
     if not len(points) or strain[0] != 0:
         raise ScriptError(
-            "the curve does not begin where plastic flow does",
+            "the curve does not begin at zero plastic strain",
             argument="curve",
             expected="a first point at the plastic strain 0, with the yield stress",
         )
@@ -189,9 +189,7 @@ class FlowStress(ByFlow, FlowFields):
     @classmethod
     def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0) -> Any:
         term = plain(Y, "Y")
-        smooth = plain(
-            term, "Y", {"sqrt": lambda a: to_power(a, 0.5)}
-        )  # its slope at 0 is no fault
+        smooth = plain(term, "Y", {"sqrt": lambda a: to_power(a, 0.5)})  # its slope at 0 is allowed
         writer = ProgramWriter(SEEDS)
         codes: dict[str, Any] = {
             "flow": writer.code(term),
@@ -220,7 +218,7 @@ def _check_formula(law: Any) -> None:
                     hint="max(epdot, 1) excludes a zero rate; T=... begins at another T",
                 )
     if not evaluated(law.flow, law, (1e-6, 1.0, *surroundings(law, ()))) > 0:
-        raise ScriptError("the flow stress is not above 0 at first", argument="Y")
+        raise ScriptError("the initial flow stress is not above 0", argument="Y")
 
 
 remembers(ByFlow, ep=0.0)

@@ -138,8 +138,8 @@ def frictional(strength: type) -> None:
         "locking",
         when=_locks,
         reason="plastic flow of soil prescribes volume changes, which the basis {scene.basis_name} "
-        "without F-bar cannot follow: limit loads are 10 to 33 % too high, and slopes stay up that "
-        "should slide (the run-out of flowing heaps is right)",
+        "without F-bar cannot follow: limit loads are 10 to 33 % too high, and slopes that "
+        "should slide stand (the run-out of flowing heaps is right)",
         cure="quadratic-spline; or anti_volumetric_locking(true), with method tlmpm if dilating "
         "soil does not mix, as below a footing: points that cross cells cost 10 % of such loads",
     )
@@ -162,7 +162,7 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # sine of dilatancy over sine of friction that is enough for neither to occur
+ENOUGH = 1 / 3  # sine of dilatancy over sine of friction above which neither occurs
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
 # latter also need steep friction and no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
@@ -179,7 +179,7 @@ def little_dilatancy(strength):
 
 
 def _vibrates(strength, scene):
-    """Return facts if strain cycles of a point at its limit release more work than they take.
+    """Return facts if strain cycles of a point at its limit release net work.
 
     Without dilatancy they release (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
@@ -245,7 +245,7 @@ def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
         )
     if cohesion == 0 and phi == 0:
         raise ScriptError(
-            "without cohesion and friction there is no strength",
+            "the strength has neither cohesion nor friction",
             argument="cohesion",
             expected="a cohesion or a friction angle above 0, or strength(ID, fluid, 0)",
         )

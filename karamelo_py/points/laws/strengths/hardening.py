@@ -143,7 +143,7 @@ def radial_return(strength, kin, step, memory, heat):
 
 
 class Around(NamedTuple):
-    """Surroundings of a flow stress that depends on pressure; takes the place of `heat`."""
+    """Surroundings of a flow stress that depends on pressure; replaces `heat`."""
 
     T: Any
     p: Any

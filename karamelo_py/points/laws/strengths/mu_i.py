@@ -84,7 +84,7 @@ known_failure(
     "pressure of grains",
     when=_jumps,
     reason="points of flowing grains cross cells; with {scene.transfer_name} and a linear basis "
-    "their pressure, and thus friction, is anything from 0 to twice the right value (flow down a "
+    "their pressure, and thus friction, varies from 0 to twice the right value (flow down a "
     "plane, any cell size)",
     cure="method(ulmpm, TPIC, quadratic-spline), or APIC: within 10 %, except at the surface and "
     "in the cell on the floor, where speeds are up to 17 % too low",

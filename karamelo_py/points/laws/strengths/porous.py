@@ -52,7 +52,7 @@ class CrushableFoam(NamedTuple):
     alpha^2 = 9/2 (1 - 2 nu)/(1 + nu); flow is associated, and dep is the axial strain in uniaxial
     compression (Deshpande & Fleck 2000, J. Mech. Phys. Solids 48, 1253-1283). The plastic volume
     ratio is the dump column Jp. With eos p-alpha, steps must be below the elastic strain at yield:
-    in larger ones pores take pressure that flow would.
+    in larger steps pores relieve pressure before flow does.
 
     See Also
     --------
@@ -109,7 +109,7 @@ class Gurson(NamedTuple):
     df = (1 - f) dev + fn/(sn sqrt(2 pi)) exp(-((em - en)/sn)^2/2) dem. From fc on, f in the surface
     grows by (1/q1 - fc)/(ff - fc) of df. Each step uses the matrix and f at its beginning: a pull
     to a strain of 0.4 errs by 6 % in steps of 0.04, by 1 % in steps of 0.008. Compression closes
-    voids, even of failed metal, which then is sound again; without voids, metal yields by q = Ym.
+    voids, even of failed metal, which then is intact again; without voids, metal yields by q = Ym.
     Dump columns: ep (em), f, Jp (plastic volume ratio).
 
     See Also

@@ -27,12 +27,12 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.points.laws.temperatures import temperature_or
 
-MELTED = 1e-6  # of the shear modulus
+MELTED = 1e-6  # fraction of the shear modulus
 LEAST = 1e-30  # plastic strain of a step that counts as a rate
 
 
 class SteinbergGuinan(NamedTuple):
-    """Flow stress and shear modulus of metals at high pressure, where the rate does not matter.
+    """Flow stress and shear modulus of metals at high pressure, where the rate has no effect.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def _flow_stress_norton(strength, before, increment, dt):
 
 @first_guess.on(Norton)
 def _first_guess_norton(strength, before, q, slope):
-    # Half of what relaxes all stress: Newton's method then converges from either side.
+    # Half the strain that relaxes all stress: Newton's method then converges from either side.
     return 0.5 * q / slope, q - q
 
 
@@ -283,7 +283,7 @@ class Mts(NamedTuple):
     Y = sa + s (1 - (k T/(g0 G) ln(rate0/epdot))^(1/q))^(1/p), with the threshold s: ds/dep = theta
     (1 - tanh(2 s/sm)/tanh 2), ln(sm/ss) = k T/(gs G) ln(epdot/rates) (Follansbee & Kocks 1988, Acta
     Metall. 36, 81-93). Dump column threshold. Its growth in a step follows from the threshold at
-    the beginning; the flow stress is of the end.
+    the beginning; the flow stress is the value at the end.
 
     See Also
     --------
