@@ -352,7 +352,7 @@ def test_a_full_disk_or_a_forbidden_folder(tmp_path, monkeypatch, call):
         assert fresh()(Tag()) == 42
         assert fresh()(Tag()) == 42
     assert len(told) == 1
-    assert f"cannot be kept in {tmp_path / 'kernels'}: {os.strerror(errno.ENOSPC)}" in told[0]
+    assert f"cannot be stored in {tmp_path / 'kernels'}: {os.strerror(errno.ENOSPC)}" in told[0]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert fresh()(Tag()) == 42
@@ -388,8 +388,8 @@ def test_what_another_user_may_have_written_is_not_read(tmp_path, monkeypatch, w
     with files.telling(told.append):
         assert fresh()(Tag()) == 42
     assert not (tmp_path / "harm").exists()
-    assert len(told) == 1 and f"cannot be kept in {tmp_path / 'kernels'}" in told[0]
-    word = {"link": "symbolic links", "file for all": "other users may write there"}
+    assert len(told) == 1 and f"cannot be stored in {tmp_path / 'kernels'}" in told[0]
+    word = {"link": "symbolic links", "file for all": "other users can write to it"}
     assert word.get(whose, "it belongs to another user") in told[0]
 
 
@@ -421,7 +421,7 @@ def test_a_folder_that_is_gone_when_a_loop_is_compiled(tmp_path, monkeypatch):
     told = []
     with files.telling(told.append):
         assert fresh()(Tag()) == 42
-    assert len(told) == 1 and "cannot be kept in" in told[0]
+    assert len(told) == 1 and "cannot be stored in" in told[0]
 
 
 def test_room_and_other_files(tmp_path, monkeypatch):

@@ -167,7 +167,7 @@ MISTAKES = {
     "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
     "velocity=(0, 1)": ("velocity=(0, 1), motion=(NULL, 2)", "motion says 2", "NULL or 2 for y"),
     "spin=2": ("spin=2, fixed=(rz)", "fixed says 0", "NULL or 0 for rz"),
-    "turning=1": ("", "nothing acts on the body 'body'", "gravity=(...)"),
+    "turning=1": ("", "no load acts on the body 'body'", "gravity=(...)"),
     "scheme(musl, start=half)": ("scheme(newmark)", "support scheme newmark", "velocity_particles"),
     "set_dt(0.1)": ("precision(single)", "not support precision(single)", "precision(double)"),
     "set_output(1)": (

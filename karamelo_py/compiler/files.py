@@ -29,7 +29,7 @@ def _refuse_of_others(about: os.stat_result) -> None:
         if about.st_uid not in (0, os.geteuid()):
             raise PermissionError(errno.EACCES, "it belongs to another user")
         if about.st_mode & _BY_OTHERS:
-            raise PermissionError(errno.EACCES, "other users may write there")
+            raise PermissionError(errno.EACCES, "other users can write to it")
 
 
 def _guard(directory: Path) -> None:
@@ -67,7 +67,7 @@ def report(text: str) -> None:
 
 
 def report_error(error: OSError) -> None:
-    report(f"compiled loops cannot be kept in {folder()}: {error.strerror or error}")
+    report(f"compiled loops cannot be stored in {folder()}: {error.strerror or error}")
 
 
 @contextlib.contextmanager

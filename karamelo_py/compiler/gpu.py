@@ -179,7 +179,7 @@ def text_of(
         entry = _as_threads if on_card else _as_loop
         module, _ = written(function, (types.int64, *kinds), types.none, entry)
     if module.needs or module.raises:
-        raise TypeError(f"{function.__qualname__} calls what no thread can call")
+        raise TypeError(f"{function.__qualname__} calls a function that threads cannot call")
     text = str(module)
     if on_card:
         outside = [f.name for f in module.functions if not f.blocks]
@@ -358,7 +358,7 @@ class Card(_Coded):
         except Exception as error:
             raise NoCard(
                 "there is no NVIDIA GPU with a driver on this machine",
-                "leave out --gpu: processors run the same script; nvidia-smi shows what there is",
+                "leave out --gpu: processors run the same script; nvidia-smi lists the GPUs",
             ) from error
         self._context = self._do("cuDevicePrimaryCtxRetain", device)
         self._do("cuCtxSetCurrent", self._context)

@@ -16,11 +16,12 @@ step. Convex bodies are apart if any direction shows a gap. The grid axes are tr
 the normal, as normals tilt where faces end.
 
 A wall is a body of prescribed velocity. In a liquid or granular material some points lie closer to
-the wall than the mean position says, so each apparent gap would let them sink in a little. Their
-points leave the wall for a few steps at a time. Bodies of such shapeless materials may therefore
-leave a wall but not approach it for 100 steps after a contact, also one at nodes that a moving wall
-has left. (With the same rule, an elastic disk takes 4 % less force: Hertz.) A wall may be one cell
-thick: only its faces towards the other body count. No face of a hollow corner may be entered.
+the wall than the mean position says, so each apparent gap would let them sink in a little. Points
+of these materials leave the wall for a few steps at a time. Bodies of such shapeless materials may
+therefore leave a wall but not approach it for 100 steps after a contact, also one at nodes that a
+moving wall has left. (With the same rule, an elastic disk takes 4 % less force: Hertz.) A wall may
+be one cell thick: only its faces towards the other body count. No face of a hollow corner may be
+entered.
 """
 
 from math import sqrt
@@ -493,7 +494,7 @@ def _touch_pair(bodies, control, i, j, where):
         return  # both prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction leaves the remaining approach: it is what closes the gap.
+    # Friction does not change the remaining approach, which closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     if contact.friction[a, b] > 0:

@@ -120,7 +120,7 @@ def _list_points(body, surface, s, block, number):
 
 @noinline
 def _give_to_points(body, s, block, number, measures):
-    """Give the impulses of contacts to the nodes of the points of a block; or sum their work."""
+    """Add the impulses of contacts to the nodes of a block's points, or sum their work."""
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
     kick, work = s.control.step[0].kick, 0.0
     for i in range(body.count[0]):
@@ -156,7 +156,7 @@ def _give_to_points(body, s, block, number, measures):
 
 @noinline
 def _lead_nodes(body, s):
-    """Give the nodes of a body's field its velocity, as contact at nodes reads it."""
+    """Set the velocity of a body at the nodes of its field, for contact at nodes."""
     first = arrays.of_momentum(s.kin)
     for r in range(1, 1 + s.spans[0, 0]):
         for n in range(s.spans[r, 0], s.spans[r, 1]):
@@ -245,7 +245,7 @@ def _follow(s, n, again):
 
 @noinline
 def _list_contacts(body, s):
-    """List the contacts of a body with what deforms."""
+    """List the contacts of a body with deformable solids."""
     body.count[0] = 0
     for surface in body.surfaces:
         for c in range(s.kin.dimension):
@@ -261,7 +261,7 @@ def _list_contacts(body, s):
 
 @noinline
 def _push(body, s):
-    """Give the impulses of a body to what deforms; its nodes take its velocity."""
+    """Apply the impulses of a body to deformable solids; its nodes take its velocity."""
     if isinstance(s.contact, SeparateFields):
         _lead_nodes(body, s)
     else:

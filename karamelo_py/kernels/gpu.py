@@ -335,7 +335,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Sum what precedes an item of a level; `above` is the level above, or -1."""
+    """Sum the items before one of a level; `above` is the level above, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):

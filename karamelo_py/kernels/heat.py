@@ -1,7 +1,7 @@
 """Heat flow through the nodes, and the fixes that act on it.
 
-Temperature is to heat capacity what velocity is to mass, so nodes of heat are `Nodes` with one
-component, served by the same loops (:mod:`karamelo_py.kernels.equations.heat`).
+Heat capacity and temperature are treated like mass and velocity: nodes of heat are `Nodes` with one
+component, used by the same loops (:mod:`karamelo_py.kernels.equations.heat`).
 """
 
 from typing import NamedTuple

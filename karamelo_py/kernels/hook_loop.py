@@ -674,7 +674,7 @@ def _act_on_motion(members, task, call, count):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
             for moment in members.moments:
-                # otherwise nodes, and strains around, follow what the point had from the grid
+                # otherwise nodes, and strains around, follow the point's velocity from the grid
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
                 for k in range(d * d + c if leads else moment.shape[0], moment.shape[0], d):

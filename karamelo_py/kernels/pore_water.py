@@ -42,8 +42,8 @@ def _at_water(row, s, step):
 
 
 def _rim(s):
-    # With hats every node is at the rim. Splines: inside, B is what the positions of points leave
-    # of 0.
+    # With hats every node is at the rim. Splines: inside, B differs from 0 by the positions of
+    # points.
     return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
 
 
@@ -71,7 +71,7 @@ SLOW_COMPANIES = COMPANIES[:1]
 
 
 class Water(NamedTuple):
-    """Water in the pores: its fields, and what joins tasks and quantities."""
+    """Water in the pores: its fields and the parts that join tasks and quantities."""
 
     point_fields = pores.POINT_FIELDS
     node_fields = pores.NODE_FIELDS

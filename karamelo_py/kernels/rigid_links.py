@@ -1,4 +1,4 @@
-"""Contacts and joints between rigid bodies, solved together with what else acts on them.
+"""Contacts and joints between rigid bodies, solved together with all other loads.
 
 A link has a position, 3 x 6 matrices A and B, and the relative velocity r = A U_a - B U_b of two
 bodies there; its impulse p acts on the first body, and -p on the second, so momentum and angular
@@ -43,7 +43,7 @@ SOFT = 1e-5
 GIVEN_BACK = 0.1  # fraction of a penetration removed in a step
 SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # square of the residual over the squared momentum
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # along a step; slope there over the slope at its start
-SLOW = 1e-9  # approach that is no collision, over the fastest one
+SLOW = 1e-9  # largest approach without a collision, over the fastest one
 COLLISIONS = 50  # at most, for each contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
@@ -213,7 +213,7 @@ def _relative(links, link, u, k):
 
 @noinline
 def _set_weight(links, link):
-    """Set W = A M^-1 A^T + B M^-1 B^T: what impulses change of the relative velocity."""
+    """Set W = A M^-1 A^T + B M^-1 B^T: the change of relative velocity per impulse."""
     W = links.weight
     for k in range(3):
         for j in range(3):

@@ -225,7 +225,7 @@ def from_start(state, a):
 
 @noinline
 def place_of(state, constants, x):
-    """Return where the position `x` (3,) of a body at the start is now."""
+    """Return the present position of a point at `x` (3,) at the start."""
     begin = constants.start
     way = from_start(state, (x[0] - begin[0], x[1] - begin[1], x[2] - begin[2]))
     return way[0] + state.x[0], way[1] + state.x[1], way[2] + state.x[2]

@@ -266,11 +266,12 @@ def _described_scene(row, setup):
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row with what joins it in a scene; None if it does nothing there."""
+    """Describe a row with the parts that join it in a scene; None if it does nothing there."""
     return _described.find((type(row),))(row, setup)
 
+    # Kinds of rows that are replaced before a step.
 
-# Kinds of rows that become others before a step takes them.
+
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
@@ -326,7 +327,7 @@ def _after_others(row, s):
 
 @in_scene.on(Sweep)
 def _in_company(row, s):
-    """Add what joins the visit, and rows before it; F-bar adds a visit before strains."""
+    """Add parts that join the visit, and rows before it; F-bar adds a visit before strains."""
     averages = average_volumes(row) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)

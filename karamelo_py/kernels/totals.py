@@ -197,7 +197,7 @@ def agree_on_heat(ranks, control):
 
 @point_function(otherwise=True)
 def take_over(ranks, due):
-    """Wait for what tiles of other processes give to nodes in use here."""
+    """Wait for the contributions of other processes' tiles to nodes in use here."""
 
 
 def publish(control, slot, count):

@@ -20,7 +20,7 @@ from karamelo_py.points.kinematics import dot, zero_vector
 
 STIFF = 0.5  # contact stiffness, over m / dt^2
 DAMPED = 0.2  # contact damping, over m / dt
-STIFFENING = 0.02  # in a step, of a contact that is deep
+STIFFENING = 0.02  # fraction of the depth removed in a step, of a deep contact
 ASIDE = 0.05  # step of depth differences, over the reach
 LEVEL = 1e-3  # change of depth over that step, below which there is no direction
 CALL = types.int64(types.int64)
@@ -54,7 +54,7 @@ def memory_of(tag, members):
 
 
 def spring_rate(before, now, within, reach):
-    """Return stiffness over mass, as at the first touch, which gives back what it takes.
+    """Return stiffness over mass, as at the first touch, which conserves energy.
 
     A larger one would add energy, a much softer one let points through.
     """

@@ -82,7 +82,7 @@ COMPANIES = (
 
 
 class Rotating(NamedTuple):
-    """Rotation around the axis: its fields, and what joins tasks and quantities."""
+    """Rotation around the axis: its fields and the parts that join tasks and quantities."""
 
     point_fields = (twist.VelocityAround, twist.AngleAround, twist.RadiusAfterMove)
     node_fields = (

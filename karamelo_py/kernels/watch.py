@@ -3,7 +3,7 @@
 Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
 the middles of steps, stresses to their ends: two consecutive steps give energies at one time, to
 second order. Growth is relative to the energy without drift (of the centres of mass), which could
-hide vibrations. The same looks measure how many cells stressed material moves through
+hide vibrations. The same checks measure how many cells stressed material moves through
 (`note_crossing`), by which a linear basis in the updated frame loses stress.
 """
 
@@ -31,9 +31,9 @@ from karamelo_py.points.laws import (
     temperature,
 )
 
-LOOK = 10  # steps between two looks
-FEW = 3  # looks compared before a window is full
-LOOKS = 10  # looks averaged in a window, 100 steps
+LOOK = 10  # steps between two checks
+FEW = 3  # checks compared before a window is full
+LOOKS = 10  # checks averaged in a window, 100 steps
 GROWTH = 0.01  # of the largest energy, in a window: more is a warning
 WITHIN = 0.1  # of the unit, since the start: more is a warning
 DRIFTING = 1e-3  # fraction of drift energy in the unit: relevant vibrations have more
@@ -192,7 +192,7 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add the cells that elastic energy moved through since the last look.
+    """Add the cells that elastic energy moved through since the last check.
 
     New energy has no path; vibrations renew it in the time of a wave there and back.
     """
@@ -266,7 +266,8 @@ def judge(control):
         energy.supplied,
         energy.of_bodies,
     )
-    # Rigid bodies exchange energy with what they touch, to which a small part of theirs may be all.
+    # A small part of a rigid body's energy may be all of the energy of a body that it
+    # touches.
     vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
@@ -278,15 +279,15 @@ def judge(control):
         if loss > energy.lost:
             energy.lost = loss
             energy.crossed = way
-    # means, because a single look also shows the shortest waves
+            # means, because a single check also shows the shortest waves
     unit = unit_of(energy)
     if energy.looks == FEW:
         energy.first_few = energy.first_mean = energy.largest_mean = (
             balance + energy.last_balance + energy.last_but_one
         ) / FEW
     if energy.looks >= 2 * FEW:
-        # Minimum of a few, because a look or two may be wrong in collisions; stored, so that the
-        # result does not depend on the last look.
+        # Minimum of a few, because a check or two may be wrong in collisions; stored, so that the
+        # result does not depend on the last check.
         least = min(balance, energy.last_balance, energy.last_but_one)
         energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
     energy.sum_of_balance += balance
@@ -340,7 +341,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store energies if a look is due; `level` is the fraction of the later stored energy in
+    """Store energies if a check is due; `level` is the fraction of the later stored energy in
     balances.
     """
     energy = s.control.energy[0]

@@ -290,7 +290,7 @@ class Hub:
                         f"{name} has not published anything: "
                         f"{item.id}_{item.published[0]} is 0".replace("_ ", " "),
                         item.mark,
-                        hint="call self.publish in refresh, or set published = ()",
+                        hint="in the plug-in, call self.publish in refresh, or set published = ()",
                     )
         # A plug-in's compute may use random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)

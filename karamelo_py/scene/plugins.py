@@ -63,13 +63,13 @@ def check_fix(hub: Scene, fix: Fix) -> None:
         for close in get_close_matches(method, stages, 1, least):
             hub.warn(
                 f"{name} has a method {method}, which is not a hook, and no step calls it",
-                hint=f"rename it to {close}, or begin the name with _",
+                hint=f"in the plug-in, rename it to {close}, or begin the name with _",
             )
     measures = type(fix).refresh is not Fix.refresh
     if not (fix.for_method or hooks or measures or fix.every):
         hub.warn(
             f"{name} has no effect: no step calls it, and it measures nothing",
-            hint="define a hook, such as post_particles_to_grid, or refresh",
+            hint="in the plug-in, define a hook, such as post_particles_to_grid, or refresh",
         )
     said = type(fix).published is not Fix.published and fix.published
     silent = all(isinstance(hook, CompiledHook) and not hook.publishes for hook in hooks.values())
@@ -77,7 +77,7 @@ def check_fix(hub: Scene, fix: Fix) -> None:
         hub.warn(
             f"{name} has names in `published`, but none of its hooks publishes: "
             f"{fix.id}_{fix.published[0]} will stay 0".replace("_ ", " "),
-            hint="make the hook with publishes=True, or set published = ()",
+            hint="in the plug-in, make the hook with publishes=True, or set published = ()",
         )
 
 

@@ -40,7 +40,7 @@ ROOM = 400e6  # bytes
 _began = time.time()
 _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
 _INSTALLED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
-_NAMED = (python.FunctionType, python.ModuleType, type)  # their sources say what they are
+_NAMED = (python.FunctionType, python.ModuleType, type)  # determined by their sources
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, np.number, np.bool_)
 _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
@@ -116,7 +116,7 @@ def _words(thing: Any) -> str:
     if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
         named = _names_in(thing.__module__).get(thing.__name__)
         if named is thing or (hasattr(named, "function") and named.function is thing):
-            return f"{thing.__module__}:{thing.__name__}"  # its source says what it is
+            return f"{thing.__module__}:{thing.__name__}"  # determined by its source
     function = thing.definition if hasattr(thing, "definition") else thing  # of an intrinsic
     if not isinstance(function, python.FunctionType):
         raise Unknown(repr(thing))

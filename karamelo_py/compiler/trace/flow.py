@@ -224,7 +224,7 @@ class Flow:
         grown: dict[tuple, Any] = {}
         for name, before in head.names.items():
             if name not in names:
-                raise Untraceable(f"'{name}' is not known on all ways through a loop")
+                raise Untraceable(f"'{name}' is not defined on all paths through a loop")
             self._close_phis(head, before, names[name], values, grown)
         if grown:
             raise Grows(grown)

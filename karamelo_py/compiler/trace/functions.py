@@ -99,7 +99,7 @@ def _is_instance(thing: Any, kind: Any) -> bool:
 
 def _attribute(thing: Any, *name: Any) -> Any:
     if isinstance(thing, Module):
-        raise values.Untraceable("what is taken from a module has to be named: module.name")
+        raise values.Untraceable("an attribute of a module has to be named: module.name")
     return getattr(thing, *name)
 
 
@@ -125,7 +125,7 @@ def _seen(thing: Any) -> Any:
     if isinstance(thing, np.ndarray):
         return values.now().constant(thing)
     if type(thing).__hash__ is None:
-        raise values.Untraceable(f"a {type(thing).__name__} is nothing that kernels know")
+        raise values.Untraceable(f"a {type(thing).__name__} is unknown to kernels")
     cached = session.seen
     if thing not in cached:
         cached[thing] = _copy(thing), modules_of(thing)

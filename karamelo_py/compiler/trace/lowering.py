@@ -85,7 +85,7 @@ class Lowering:
             return FunctionType(thing.seen)
         if isinstance(thing, type) and issubclass(thing, tuple) and hasattr(thing, "_fields"):
             return types.NamedTupleClass(thing)
-        raise traced.Untraceable(f"{thing!r} is nothing that a kernel knows")
+        raise traced.Untraceable(f"{thing!r} is unknown to kernels")
 
     def lowered(self, thing: Any, wanted: types.Type) -> Any:
         if isinstance(thing, _TRACED):
@@ -125,7 +125,7 @@ class Lowering:
             return value
         self.operations += 1
         if self.operations > MOST_OPERATIONS and self.builder is None:
-            raise traced.Untraceable(f"it has more than {MOST_OPERATIONS} operations: take a loop")
+            raise traced.Untraceable(f"it has more than {MOST_OPERATIONS} operations: use a loop")
         if function in _OF_ITEMS:
             return self.of_item(*arguments)
         kinds = tuple(map(self.kind_of, arguments))

@@ -241,7 +241,7 @@ def all_same(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
 @intrinsic
 def _branch(value):
     raise Untraceable(
-        "several points are computed at once, which a branch cannot tell apart: take where, "
+        "several points are computed at once, and a branch cannot separate them: use where, "
         "all_lanes or any_lane, or name the point function in scalarised"
     )
 

@@ -79,14 +79,14 @@ def _has(node: ast.expr, code: python.CodeType) -> bool:
 def source_of(code: python.CodeType) -> list[ast.stmt]:
     text = "".join(linecache.getlines(code.co_filename))
     if not _is_as_read(code, text):
-        raise Untraceable("its file has changed since Python read it: start anew")
+        raise Untraceable("its file has changed since Python read it: start again")
     candidates = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
     if code.co_name == "<lambda>":  # perhaps one of several in a line, or nested
         candidates = sorted(
             (n for n in candidates if _has(n.body, code)), key=lambda n: -n.body.col_offset
         )
     if not candidates:
-        raise Untraceable("its text is not known: write it into a file")
+        raise Untraceable("its text is unknown: write it to a file")
     node = candidates[0]
     if isinstance(node, ast.FunctionDef):
         return node.body
@@ -204,7 +204,7 @@ class AstCompiler:
             self.returns.append(self.edge())
         self.meet(self.returns)
         if "" not in self.names:
-            raise Untraceable("what it returns is not of one kind on all edges")
+            raise Untraceable("its results have different types on different branches")
         return self.names[""]
 
     @property
@@ -258,7 +258,7 @@ class AstCompiler:
             return self.free[name]
         code = self.walked.__code__
         if name in code.co_varnames and name not in _globals_in(code):
-            raise Untraceable(f"'{name}' is not of one kind on all ways to here")
+            raise Untraceable(f"'{name}' has different types on different branches")
         return self.walked.of_module(name)
 
     def Name(self, node: ast.Name) -> Any:
@@ -377,7 +377,7 @@ class AstCompiler:
             condition, lambda: self.give(result, then()), lambda: self.give(result, otherwise())
         )
         if "?" not in self.names:
-            raise Untraceable("an expression gives things of two kinds")
+            raise Untraceable("an expression has values of two types")
         return self.names.pop("?")
 
     def IfExp(self, node: ast.IfExp) -> Any:
@@ -446,7 +446,7 @@ class AstCompiler:
             items = self.do(one.iter)
             if isinstance(items, range) and len(items) > LONGEST:
                 raise Untraceable(
-                    f"a range of more than {LONGEST} numbers in a comprehension: take a loop"
+                    f"a range of more than {LONGEST} numbers in a comprehension: use a loop"
                 )
             for value in items:
                 self.give(one.target, value)

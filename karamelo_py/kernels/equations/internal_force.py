@@ -23,8 +23,8 @@ class Force(StepField):
 class Lever(Field):
     """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
 
-    The force f n at x - r n acts like one at x and the stress f r n n / V. 0: no contact. Then
-    stiffness over mass, the depth, and the part of f that damps.
+    The force f n at x - r n acts like a force at x and the stress f r n n / V. 0: no contact.
+    The others are stiffness over mass, depth, and the damping part of f.
     """
 
     shape = staticmethod(lambda kin: kin.dimension + 4)
@@ -35,7 +35,7 @@ class ContactLoss(Field):
 
 
 class WorkOfForces(Field):
-    """Work of `Force` since the last look at the energy."""
+    """Work of `Force` since the last check of the energy."""
 
 
 @eq.reads("mass", "state", "material", "deformation gradient")

@@ -11,10 +11,10 @@ XPIC removes Q^m v from v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With
 terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >=
 [m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each term is local and >= 0.
 
-The change dv by forces is excluded: in musl, with strain from the re-mapped velocity, what points
-do not take does not strain them either, and a hot point alone in its cells would heat itself. The
-rest is time integration, moments mapped differently after a move (not with splines), and usl's
-strain by dv.
+The change dv by forces is excluded: in musl, with strain from the re-mapped velocity, the part of
+dv that points do not take does not strain them either, and a hot point alone in its cells would
+heat itself. The rest is time integration, moments mapped differently after a move (not with
+splines), and usl's strain by dv.
 """
 
 from collections import namedtuple
@@ -115,7 +115,7 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Return the part of `moment` that a point of a gas retains: none if it is alone.
+    """Return the retained part of the `moment` of a gas point: none if it is alone.
 
     Nodes seen by no other point return its moment: driven by its pressure, its volume would grow
     without bound. The energy of the rest heats it.

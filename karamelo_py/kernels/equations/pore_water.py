@@ -9,7 +9,8 @@ open nodes, else the mean pressure; no flux crosses B at nodes that are not open
 The flux j = m / V (v_w - v_s) is made at the nodes. Rate and force use the same gradients: at the
 cell centre with a linear basis (one pressure rate per cell), else at the points.
 
-With splines, pressures that no node sees would build up: in a step p loses the part R = 1/20 of (1
+With splines, pressures in the null space of the grid would grow: in a step p loses the part R =
+1/20 of (1
 - S)^2 p, with S the mean through the nodes and back. The volume of pores follows, not the water.
 
 Drag D acts over the step as for a solid of constant acceleration: with b = dt D / m and f = (1 -
@@ -338,7 +339,7 @@ def _is_wet_node(nodes, n):
 
 @node_task
 class ShareForces(NamedTuple):
-    """Force on the water, and the node as fixes see it: with the water that drag carries along."""
+    """Force on the water, and the node as fixes see it: with the water that drag accelerates."""
 
     rim: float  # |B| / V of closed nodes
     surface: float  # |B| / V of nodes at the surface
@@ -471,7 +472,7 @@ class MoveWater(eq.Task):
         at_nodes, change = total
         law, state = pt.law_and_state
         new = updated_velocity(pt.w.transfer, pt.load(RelativeVelocity, pt.v), at_nodes, change)
-        # Drag of what the nodes do not see, at constant momentum of the point.
+        # Drag of velocities in the null space of the grid, at constant momentum of the point.
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
