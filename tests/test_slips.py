@@ -94,7 +94,7 @@ def warm_block(T0, *fixes):
     [
         (20, "", "T0 = 20, but temperatures of the material start at 300"),
         (300, "fix(f, temperature_nodes, near, -20)",
-         "the temperature is -20, and bodies start at 3"),
+         "the temperature is -20, but bodies start at 3"),
         (300, "fix(f, convection_particles, top, 25, 20)",
          "the temperature is 20, and bodies begin"),
         (300, "fix(f, heat_flux_particles, all, 1e3)", "all points of solid 'body' get heat as if"),

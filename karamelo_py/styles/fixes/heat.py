@@ -31,7 +31,7 @@ class HeatFix(Fix):
         warmest = max(begins, default=-inf)
         if T.is_constant and T.constant < COLD and warmest - T.constant > WARM:
             self.hub.warn(
-                f"the temperature is {T.constant:g}, and bodies begin at {warmest:g}",
+                f"the temperature is {T.constant:g}, but bodies start at {warmest:g}",
                 hint="kelvin throughout, or degrees Celsius throughout",
             )
 

@@ -218,12 +218,12 @@ class ContactMinimizePenetration(PairContact):
         self.rubs(hub, float(mu or 0.0))
         if mu is not None and hub.domain.dimension > 1:
             hub.warn(
-                f"bodies that slide do not feel the friction {mu:g}: their surfaces are made of "
-                "balls, which brake by about 0.2 of the pressing force for a coefficient of 0, "
-                "by half of it for all from 0.3 on, and by more where faces lean to the grid",
+                f"friction {mu:g} does not act as given: surfaces of balls brake a sliding body "
+                "with about 0.2 of the normal force for a coefficient of 0, 0.5 for any above "
+                "0.3, and more if faces are inclined to the grid",
                 hint="method(ulmpm/contacts, ...) with fix contact/friction has smooth surfaces, "
-                "and fix contact/surface where one of the two is rigid; leave mu out where "
-                "nothing slides",
+                "as has fix contact/surface if one of the two is rigid; leave mu out if nothing "
+                "slides",
             )
 
     def law(self) -> MinimizePenetration:

@@ -139,7 +139,7 @@ def frictional(strength: type) -> None:
         when=_locks,
         reason="plastic flow of soil prescribes volume changes, which the basis {scene.basis_name} "
         "without F-bar cannot follow: limit loads are 10 to 33 % too high, and slopes that "
-        "should slide stand (the run-out of flowing heaps is right)",
+        "should slide do not (the run-out of flowing heaps is right)",
         cure="quadratic-spline; or anti_volumetric_locking(true), with method tlmpm if dilating "
         "soil does not mix, as below a footing: points that cross cells cost 10 % of such loads",
     )
