@@ -219,7 +219,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("in.a -var n=10", "hint: -var n 10"),
         ("in.a -var n 5*", "-var n:1:2: error: the expression ends after '*'"),
         ("in.a -var n 10 -v n 20", "-var n is given twice, 10 and 20"),
-        ("in.a -var n ten", "-var n ten is a text, and the script has a number"),
+        ("in.a -var n ten", "-var n ten is a text, but the script has a number"),
         ("in.a -np 4", "did you mean --ranks N?"),
         ("in.a -j4", "did you mean --threads N?"),
         ("in.a --threads abc", "1, 2, ... or auto)\nexpected: --threads N\n"),

@@ -178,4 +178,4 @@ def test_a_solid_in_the_place_of_another_is_warned_of(run_interpreted):
     twice = run_interpreted(block(2, "solid(twin, region, box, 2, rubber, 0.1, 0)", "run(0)"))
     assert "points of solid 'twin'" in twice.err
     beside = "region(side, block, 0.6, 0.9, 0.3, 0.5)\nsolid(side, region, side, 2, rubber, 0.1)"
-    assert "twice the mass" not in run_interpreted(block(2, beside, "run(0)")).err
+    assert "mass there is doubled" not in run_interpreted(block(2, beside, "run(0)")).err

@@ -560,7 +560,7 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     said = run_interpreted(scene, command="check").err
     told_of = "gives all nodes around 36 points of this group a different vx: this fix decides how"
     assert (told_of in said) == told and ("another v" in said) == told
-    assert ("fix: nodes that these points do not see" in said) == told
+    assert ("fix: nodes that these points do not reach" in said) == told
 
 
 @pytest.mark.parametrize(("rho", "told"), [("2", False), ("2e-9", True)])

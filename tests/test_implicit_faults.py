@@ -305,7 +305,7 @@ def test_a_scheme_that_no_run_has(run_interpreted):
     twice = once.replace("scheme(quasi-static)", "scheme(musl)\n    scheme(quasi-static)")
     assert "replaces the one in line 7" in run_interpreted(twice).err
     then = once.replace("run(1)", "run(1)\n    scheme(quasi-static)\n    run(1)")
-    assert "takes the place" not in run_interpreted(then).err
+    assert "replaces the one" not in run_interpreted(then).err
 
 
 def test_columns_of_load_steps_in_explicit_ones(run_interpreted):

@@ -105,8 +105,8 @@ def test_an_explosive_that_nobody_lights_is_reported(run_interpreted):
         run(1)
     """
     light = "fix(light, detonation, all, x0/6930)"
-    assert "nothing lights material 'tnt'" in run_interpreted(script.format("tnt", "")).err
-    assert "nothing lights" not in run_interpreted(script.format("tnt", light)).err
+    assert "nothing ignites material 'tnt'" in run_interpreted(script.format("tnt", "")).err
+    assert "nothing ignites" not in run_interpreted(script.format("tnt", light)).err
     said = run_interpreted(script.format("soft", light)).err
     assert "no point of the group is explosive" in said
     squeeze = "fix(squeeze, initial_stress, all, -1e6, NULL, NULL, NULL, NULL, NULL)"

@@ -158,7 +158,7 @@ def _branches(a, out):
 
 
 def test_a_branch_says_what_to_write():
-    with pytest.raises(CannotCompile, match="take where, all_lanes or any_lane"):
+    with pytest.raises(CannotCompile, match="use where, all_lanes or any_lane"):
         _branches(np.ones(4), np.zeros((1, 4)))
 
 

@@ -126,7 +126,7 @@ def test_numbers_from_which_points_began_cannot_change(run_interpreted):
         "material(m, eos-strength, e, s)", "material(m, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 1e5)"
     )
     said = run_interpreted(script + "    modify(material, m, pc=2e5)\n", status=1).err
-    assert "the state of the points of material 'm' began from pc" in said
+    assert "the initial state of the points of material 'm' depends on pc" in said
     run_interpreted(
         script.replace("    solid", "    modify(material, m, pc=2e5)\n    solid") + "    run(1)\n"
     )

@@ -499,7 +499,7 @@ PART_OF_ALL = """
 @pytest.mark.parametrize(
     "line, says",
     [
-        ("second and points.total(points.mass)", "to its end on one process, and to a total on"),
+        ("second and points.total(points.mass)", "reaches its end on one process, and a total on"),
         ("self.publish('x', points.position[:, 0].sum())", "fix drag: air_x is "),
         ("self.publish('x', points.total(points.mass))", ""),
     ],
@@ -627,7 +627,7 @@ def test_the_page_of_many_processes(tmp_path):
     if bash := shutil.which("bash"):
         subprocess.run([bash, "-n"], input=batch, text=True, check=True)
     checked = started(tmp_path, *PROGRAM, "check", str(script(tmp_path, "run(1)")), "--ranks", "2")
-    lines = checked.communicate(timeout=100)[0].partition("shared out among 2 processes")[2]
+    lines = checked.communicate(timeout=100)[0].partition("distributed over 2 processes")[2]
     names = re.findall(r"^  ([a-z][a-zMB, ]*[a-zB]) +[\d.]", lines, re.M)
     assert len(names) == 8 and all(f"| `{name}` |" in page for name in names)
     assert "so few points are not distributed" in lines

@@ -407,13 +407,13 @@ HELD = "fix(walls, velocity_nodes, all, NULL, NULL, 0)"
 def test_space_for_what_is_plane(advice):
     slab = SPACE.format(region="block, 1, 4, 1, 3, 0, 2", v="0.1*x0, 0.2, 0", held=HELD)
     said = advice(slab)
-    assert "the same along z" in said and "4 times the points of plane strain" in said
+    assert "uniform along z" in said and "4 times the points of plane strain" in said
     assert "dimension(2, 0, 6, 0, 5, 1)" in said
     # Free to move along z, moved by a formula of z, or another shape in each layer: no.
     for old, new in (
         (HELD, ""), ("0.1*x0", "0.1*z0"), ("block, 1, 4, 1, 3, 0, 2", "sphere, 2, 2, 1, 1")
     ):  # fmt: skip
-        assert "the same along" not in advice(slab.replace(old, new))
+        assert "uniform along" not in advice(slab.replace(old, new))
 
 
 PLATE = """
@@ -445,7 +445,7 @@ def test_plane_stress_for_a_thin_plate(advice):
 def test_a_plane_for_what_is_a_line(advice):
     text = plane(more="fix(walls, velocity_nodes, all, 0, NULL)", side=8)
     said = advice(text)
-    assert "the same along x" in said and "8 times the points of a line" in said
+    assert "uniform along x" in said and "8 times the points of a line" in said
     assert "dimension(1, 0, 8, 1), with y called x" in said
 
 
@@ -486,8 +486,8 @@ PRESS = "fix(p, velocity_nodes, foot, NULL, -0.1)\n"
 @pytest.mark.parametrize(
     ("fixes", "changed", "said"),
     [
-        (BOX + FLOOR, {}, "the same along x"),  # uniaxial strain
-        (BOX + FLOOR + PRESS, {}, "the same along x"),
+        (BOX + FLOOR, {}, "uniform along x"),  # uniaxial strain
+        (BOX + FLOOR + PRESS, {}, "uniform along x"),
         (BOX + FLOOR + PRESS, {"groups": foot("0.5")}, ""),  # a footing
         (FLOOR, {}, ""),  # bulges to both sides
         (FLOOR + BOX.splitlines()[0], {}, ""),  # a column that collapses
@@ -499,7 +499,7 @@ PRESS = "fix(p, velocity_nodes, foot, NULL, -0.1)\n"
 def test_a_line_only_between_walls_that_act_alike(advice, fixes, changed, said):
     """What is held at its foot only, or moved by a part of the width, is no line."""
     found = advice(STANDS.format(**{**SQUARE, "fixes": fixes, **changed}))
-    assert said in found if said else "the same along" not in found
+    assert said in found if said else "uniform along" not in found
 
 
 def test_plane_strain_only_between_walls(advice):
@@ -510,13 +510,13 @@ def test_plane_strain_only_between_walls(advice):
     }  # fmt: skip
     floor = "fix(b, velocity_nodes, floor, 0, 0, 0)\nfix(w, body_force, all, 0, -9.81, 0)\n"
     low, high = (f"fix({w}, velocity_nodes, {w}, NULL, NULL, 0)\n" for w in ("low", "high"))
-    assert "the same along z" in advice(STANDS.format(**space, fixes=floor + low + high))
+    assert "uniform along z" in advice(STANDS.format(**space, fixes=floor + low + high))
     for fixes in (floor, floor + low):
-        assert "the same along" not in advice(STANDS.format(**space, fixes=fixes))
+        assert "uniform along" not in advice(STANDS.format(**space, fixes=fixes))
 
 
 def test_bodies_of_which_one_ends_before_the_other_are_no_line(advice):
-    """Side by side between the walls: each is the same along x, both together are not."""
+    """Side by side between the walls: each is uniform along x, both together are not."""
     text = STANDS.format(**{**SQUARE, "box": "0, 0.5, 0, 0.5"}, fixes=BOX + FLOOR)
     second = "region(rest, block, 0.5, 1, 0, 0.5)\nsolid(other, region, rest, 2, soil, 0.1)\n"
     assert advice(text.replace("region(floor", second + "region(floor")) == ""
@@ -573,7 +573,7 @@ fix(h, velocity_nodes, floor, 0, 0, 0)
 fix(g, body_force, all, 0, 0, -0.1)
 run(1)
 """
-    assert ("on both sides of x = 3" in advice(text)) == mirrored
+    assert ("symmetric about x = 3" in advice(text)) == mirrored
 
 
 @pytest.mark.parametrize(

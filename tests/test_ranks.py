@@ -452,7 +452,7 @@ def test_python_at_every_moment(state_interpreted, tmp_path, script):
     "function, says",
     [
         ("is_silent", "is_silent returns 1.0 on one process and None on another"),
-        ("asks", "comes to its end on one process, and to a total on another"),
+        ("asks", "reaches its end on one process, and a total on another"),
         ("differs", "differs returns 0.1 on one process and 1.1 on another"),
     ],
 )

@@ -151,7 +151,7 @@ def test_without_h_the_first_solid_lays_the_grid():
 
 def test_the_domain_comes_once():
     hub = SmallHub()
-    with pytest.raises(ScriptError, match="set already"):
+    with pytest.raises(ScriptError, match="already set"):
         commands.dimension(hub, *arguments(2, 0, 1, 0, 1, 0.1))
     hub.solid("s1", hub.region("r", BlockRegion, "INF", "INF", "INF", "INF"))
     with pytest.raises(ScriptError, match="once solid 's1' is in it"):

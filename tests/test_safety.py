@@ -54,7 +54,7 @@ def test_the_list_of_a_series(run_interpreted, tmp_path):
     (tmp_path / "run" / "p.pvd").write_text("notes")
     script = RUN.replace("run(2)", "dump(d, all, vtk, 1, p.*.vtu, x)\nrun(2)")
     result = run_interpreted(script, status=1)
-    assert "p.pvd, which would list the snapshots, is there" in result.err
+    assert "p.pvd, which would list the snapshots, exists" in result.err
     (tmp_path / "run" / "p.pvd").unlink()
     run_interpreted(script)
     run_interpreted(script)  # over its own

@@ -341,7 +341,7 @@ def test_commands(text, column, part, tmp_path):
 def test_an_id_of_a_solid_is_refused_before_its_points_are_made(tmp_path, capsys):
     with pytest.raises(ScriptError, match="'s' is already used"):
         run(SCENE + "solid(s, region, b, 2, m, 0.1, 0)\n", tmp_path)
-    assert "twice the mass" not in capsys.readouterr().err
+    assert "mass there is doubled" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("text", "column", "part"), LAMMPS)

@@ -96,7 +96,7 @@ def warm_block(T0, *fixes):
         (300, "fix(f, temperature_nodes, near, -20)",
          "the temperature is -20, but bodies start at 3"),
         (300, "fix(f, convection_particles, top, 25, 20)",
-         "the temperature is 20, and bodies begin"),
+         "the temperature is 20, but bodies start"),
         (300, "fix(f, heat_flux_particles, all, 1e3)", "all points of solid 'body' get heat as if"),
         (300, "fix(f, temperature_nodes, far, 400)", "'f' acts on nodes that no point reaches"),
     ],

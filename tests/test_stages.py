@@ -113,7 +113,7 @@ def test_points_in_the_way_of_fill_are_named(run_interpreted):
              "fix(v, initial_velocity_particles, all, 20, 0)", "run_time(0.008)",
              "activate(fill)", "run(1)")  # fmt: skip
     result = run_interpreted(block(2, *lines))
-    assert "are where points of group 'fill' come in" in result.err
+    assert "are at positions where points of group 'fill' enter" in result.err
 
 
 def test_stages_and_surfaces_need_no_scipy(tmp_path):

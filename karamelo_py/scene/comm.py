@@ -87,7 +87,7 @@ class SerialComm:
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
-                f"a function in Python calls {asked[0]} on one process, and {other} on another",
+                f"a function in Python reaches {asked[0]} on one process, and {other} on another",
                 hint="all processes have to call points.total(terms) and nodes.total(terms), "
                 "even without points",
             )
