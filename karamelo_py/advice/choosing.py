@@ -8,8 +8,10 @@ import copy
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cached_property
-from math import inf
+from math import inf, pi
 from typing import NamedTuple
+
+import numpy as np
 
 from karamelo_py.advice.basics import is_zero
 from karamelo_py.advice.bodies import fixes_at
@@ -19,6 +21,7 @@ from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.points.laws import can, conductivity, law_kind, law_traits, parameter
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.eos.by_formula import MieGrueneisen
+from karamelo_py.points.laws.eos.fluid import Jwl
 from karamelo_py.points.laws.eos.p_alpha import PAlpha
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.strengths import shear_modulus
@@ -26,6 +29,7 @@ from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
 # To look at a scene with: the first that the program does not refuse.
@@ -129,6 +133,14 @@ class Scouted(SceneFacts):
         return any((time < self.duration).any() for time in times)
 
     rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
+    burns = property(
+        lambda s: any(isinstance(parameter(law, "eos", None), Jwl) for law in s.laws)
+    )
+
+    @property
+    def rolls(self) -> bool:
+        """Return True if a body that rubs is a disk or a ball."""
+        return self.rubs and self.d > 1 and any(map(is_round, self.soft))
 
     @property
     def grid(self) -> str:
@@ -148,6 +160,14 @@ class Scouted(SceneFacts):
         }
         several = len(self.hub.solids) > 1 and any(ID not in touching for ID in self.hub.solids)
         return not (several or self.wall_ahead or self.hub.domain.periodic)
+
+
+def is_round(solid: Solid) -> bool:
+    """Return True if no point is further out than 1.1 radii of a ball of the same volume."""
+    d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
+    radius = (solid.volume0.sum() / unit) ** (1 / d)
+    away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)
+    return bool(away.max() < 1.1 * radius)
 
 
 def flows(kind: type) -> bool:
