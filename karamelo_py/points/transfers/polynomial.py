@@ -37,7 +37,8 @@ class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
     In the total frame with a linear basis, where it is all that nodes have: a disk that vibrates
-    for 20 periods loses 4 % of its energy with musl and gains 1 % with usl; APIC loses 15 %.
+    for 20 periods loses 4 % of its energy with 4 cells in the radius and less than 0.1 % with 8;
+    with APIC 20 and 13 %.
 
     Example
     -------
