@@ -234,9 +234,23 @@ def test_axes_that_lean_out_of_the_plane_are_reported(run_interpreted):
     leaning_is_reported(run_interpreted, DISK, "hard, 30, R", "hard, 30, 40, R")
 
 
+def test_axes_by_formulas_of_place(state_interpreted):
+    """A sheet with angle 30, and axes of 30 degrees by a formula and by vectors."""
+    names, found = ("s11", "s22", "s12", "ep"), []
+    for axes in ("30", "axes=(30 + 0*x0)", "axes=(cos(PI/6), 0.5, 0, -0.5, cos(PI/6), 0)"):
+        script = DISK.replace("hard, 30, R", f"hard, {axes}, R").replace("run(10)", "run(4)")
+        script = script.replace("90*x, -60*y + 30*x", "9000*x, -6000*y + 3000*x")
+        found.append(state_interpreted(script, *names))
+    assert found[0]["ep"].max() > 0.01
+    for name in names:
+        for one in found[1:]:
+            assert np.allclose(one[name], found[0][name], rtol=1e-9, atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("line", "says"),
     [
+        ("elastic, hard, R=(1, 1, 1), axes=(1, 0, 0, 2, 0, 0)", "parallel or zero"),
         ("elastic, hard", "either R-values or yield stresses"),
         ("elastic, hard, R=(1, 1)", "R-values (R0, R45, R90)"),
         ("elastic, hard, R=(1, -1, 1)", "all above 0"),

@@ -183,6 +183,17 @@ def test_compiled_lanes_are_the_point_function(run_script, run_interpreted):
     lanes_are_the_point_function(run_script, run_interpreted, SLIDE)
 
 
+def test_joints_by_formulas_of_place(state_interpreted):
+    """Joints of angle 60 beside axes of 40 degrees in which their angle is 20."""
+    names, found = ("s11", "s22", "s12", "slip"), []
+    for angle in ("60, 90", "20, 90, axes=(40 + 0*x0)"):
+        script = SLIDE.replace("30, 60, 90", f"30, {angle}").replace("run(10)", "run(4)")
+        found.append(state_interpreted(script, *names))
+    assert found[0]["slip"].max() > 0
+    for name in names:
+        assert np.allclose(found[1][name], found[0][name], rtol=1e-9, atol=1e-9)
+
+
 def test_joints_that_lean_out_of_the_plane_are_reported(run_interpreted):
     leaning_is_reported(run_interpreted, SLIDE, "60, 90, psi", "60, 45, psi")
 
@@ -196,6 +207,7 @@ def test_joints_that_lean_out_of_the_plane_are_reported(run_interpreted):
         ("1, 2, 0.2, 1, 45, tension=2", "at most cohesion/tan(phi), 1"),
         ("1, 2, 0.2, 1, 30, matrix_psi=3", "does not dilate"),
         ("1, 2, 0.2, 1, 30, matrix_phi=95", "matrix_phi"),
+        ("1, 2, 0.2, 1, 30, axes=(1, 0)", "gives no axes"),
     ],
 )
 def test_joints_that_no_rock_has(run_interpreted, line, says):

@@ -432,13 +432,18 @@ def test_plane_stress_for_a_thin_plate(advice):
     said = advice(PLATE.format(box=12, thick=2, fixes=pull))
     assert "a plate with free faces, and nothing acts along z: 2 times the points of" in said
     assert "dimension(2, 0, 12, 0, 14, 1) and plane_stress(true, thickness=2)" in said
+    loaded = "fix(pull, edge_traction, all, box, xhi, {tx}, 0, 0)"
+    said = advice(PLATE.format(box=12, thick=2, fixes=loaded.format(tx="2*y")))
+    assert "plane_stress(true, thickness=2)" in said
     bent = "fix(v, initial_velocity_particles, all, 0, 0, 0.1*x0)"
+    uneven = loaded.format(tx="z")
+    sheared = loaded.format(tx=1).replace("xhi", "zhi")
     held = (
         "group(all_nodes, nodes, region, box, all)\n"
         + pull
         + ("\nfix(hold, velocity_nodes, all_nodes, NULL, NULL, 0)")
     )
-    for thick, fixes in ((4, pull), (2, bent), (2, held)):
+    for thick, fixes in ((4, pull), (2, bent), (2, held), (2, uneven), (2, sheared)):
         assert "plane stress" not in advice(PLATE.format(box=12, thick=thick, fixes=fixes))
 
 
@@ -539,6 +544,26 @@ def test_space_for_what_is_round(advice):
     half = walls(half="-INF, 3, -INF, INF, -INF, INF") + "\n"
     part = rod.replace("fix(f, body_force, all", half + "fix(f, body_force, half")
     assert advice(part) == ""
+
+
+TWIST = """
+group(ends, nodes, region, box, all)
+fix(turn, velocity_nodes, ends, {velocity})
+"""
+
+
+def test_twist_for_a_rod_in_torsion(advice):
+    """Velocities of a rotation about the axis, whatever its time, and none other."""
+    rod = SPACE.format(region="cylinder, z, 3, 2.5, 2, 0, 2", v="0, 0, 0", held=TWIST)
+    said = advice(rod.replace("{velocity}", "-3*(y0 - 2.5), 3*(x0 - 3), 0"))
+    assert "which rotate and twist about it" in said
+    assert "axisymmetric(true, twist=true)" in said
+    assert "fix(turn_around, angular_velocity_nodes, ends, 3)" in said
+    ramp = "-time*z0*(y0 - 2.5), time*z0*(x0 - 3), 0"
+    assert "angular_velocity_nodes, ends, omega)" in advice(rod.replace("{velocity}", ramp))
+    for other in ("-3*(y0 - 2), 3*(x0 - 3), 0", "3*(x0 - 3), 3*(y0 - 2.5), 0", "-3*y0*(y0 - 2.5), "
+                  "3*y0*(x0 - 3), 0"):  # fmt: skip
+        assert "twist" not in advice(rod.replace("{velocity}", other))
 
 
 def test_wide_functions_where_no_point_crosses(advice):

@@ -123,6 +123,112 @@ def test_a_plastic_bar_twists(run_interpreted):
     assert log["hold_s"][-1] == pytest.approx(-log["turn_s"][-1], rel=1e-3)
 
 
+LOADED = """
+    fix(low, velocity_nodes, low, NULL, 0)
+    fix(high, velocity_nodes, high, NULL, 0)
+    fix(hold, angular_velocity_nodes, low, 0)
+    fix(turn, angular_velocity_nodes, high, 0.005)
+    log_modify(custom, time, turn_s, hold_s, iterations)
+    log(1)
+    set_dt(0.0625)
+    run(4)
+"""
+
+
+@pytest.mark.parametrize(
+    "method", [TOTAL, "ulmpm, FLIP, quadratic-spline, 1)\nanti_volumetric_locking(true"]
+)
+def test_a_plastic_bar_twists_in_load_steps(run_interpreted, method):
+    """Nadai 1923, as above; the elastic step k r^2 beyond the yield stress ends on it."""
+    script = bar(0, method=method, scheme="quasi-static", size=(1, 0.25), more=LOADED)
+    script = script.replace(
+        "material(m, neo-hookean, 1, 100, 0.3)",
+        "eos(e, linear, 1, 100)\nstrength(s, plastic, 100, sqrt(3)*0.1)\n"
+        "material(m, eos-strength, e, s)",
+    )
+    log = run_interpreted(
+        script.replace("fix(v, initial_velocity_particles, bar, 0, 0, 0)", "")
+    ).log
+    k, c = 0.1, 1 / (20 * log["Time"][1:])
+    assert log["turn_s"][1:] == pytest.approx(k / 3 * (1 - c**3 / 4), rel=0.005)
+    assert log["hold_s"][1:] == pytest.approx(-log["turn_s"][1:], rel=1e-9)
+    assert log["iterations"].max() <= 3
+
+
+def test_rubber_twists_in_large_load_steps(run_interpreted):
+    """A neo-Hookean bar that is free to shorten and bulge (Rivlin 1948): by 0.5 radians in one step
+    as in two, to round-off."""
+    found = {}
+    for steps in (1, 2):
+        script = bar(0, scheme="quasi-static, stabilisation=0", n=2, size=(1, 0.5), more=f"""
+        fix(low, velocity_nodes, low, 0, 0)
+        fix(hold, angular_velocity_nodes, low, 0)
+        fix(turn, angular_velocity_nodes, high, 0.5)
+        log_modify(custom, turn_s, Es, iterations)
+        set_dt({1 / steps})
+        run({steps})""")  # fmt: skip
+        script = script.replace("fix(v, initial_velocity_particles, bar, 0, 0, 0)", "")
+        found[steps] = run_interpreted(script, folder=f"run{steps}").log
+    assert found[1]["turn_s"][-1] == pytest.approx(found[2]["turn_s"][-1], rel=1e-9)
+    assert found[1]["Es"][-1] == pytest.approx(found[2]["Es"][-1], rel=1e-9)
+    assert found[1]["turn_s"][-1] == pytest.approx(100 / 2.6 / 4, rel=0.2)
+    assert found[1]["iterations"][-1] < 8
+
+
+DISKS = """
+    method(ulmpm/contacts, FLIP, linear, 1)
+    dimension(2, 0, 1.5, -0.5, 1, 0.25)
+    axisymmetric(true, twist=true)
+    material(m, neo-hookean, 1, 100, 0)
+    region(low, block, 0, 1, 0, 0.25)
+    region(high, block, 0, 1, 0.25, 0.5)
+    solid(low, region, low, 2, m, 0.25)
+    solid(high, region, high, 2, m, 0.25)
+    group(upper, particles, region, high, solid, high)
+    fix(v, initial_velocity_particles, upper, 0, -0.5, x0)
+    fix(rub, contact/friction, low, high, {mu})
+    compute(L, angular_momentum, all)
+    compute(U, angular_momentum, upper)
+    compute(Ek, kinetic_energy, all)
+    compute(Es, strain_energy, all)
+    log_modify(custom, L_y, L_drift, U_y, Ek, Es, ContactTorque_high_y, ContactTorque_low_y,
+               ContactForce_high_y)
+    {more}
+    log(1)
+    run(10)
+"""
+
+
+def test_a_disk_rubs_on_a_disk_that_spins(run_interpreted):
+    """Torque 2/3 mu N R of a disk under uniform pressure, with opposite torques on both."""
+    log = run_interpreted(DISKS.format(mu=0.3, more="")).log
+    torque, force = log["ContactTorque_high_y"][1:3], log["ContactForce_high_y"][1:3]
+    assert torque == pytest.approx(-2 / 3 * 0.3 * force, rel=0.01)
+    assert log["ContactTorque_low_y"] == pytest.approx(-log["ContactTorque_high_y"], rel=1e-12)
+    assert log["L_drift"][-1] < 1e-14
+    assert abs(log["U_y"][-1]) < 0.9 * abs(log["U_y"][0])
+    assert log["Ek"][-1] + log["Es"][-1] < log["Ek"][0]
+
+
+def test_disks_that_stick_spin_together(run_interpreted):
+    log = run_interpreted(DISKS.format(mu="no-slip", more="")).log
+    assert log["U_y"][-1] == pytest.approx(log["L_y"][-1] / 2, rel=0.15)
+    assert log["L_drift"][-1] < 1e-14
+    assert log["Ek"][-1] + log["Es"][-1] < log["Ek"][0]
+
+
+def test_contact_leaves_nodes_that_are_held_around_the_axis(run_interpreted):
+    """Their reaction takes the torque of friction, and no more: the disk below is at rest."""
+    hold = """region(held, block, -INF, INF, -INF, INF)
+    group(held, nodes, region, held, solid, low)
+    fix(held, angular_velocity_nodes, held, 0)
+    log_modify(custom, L_y, U_y, held_s, ContactTorque_low_y)"""
+    log = run_interpreted(DISKS.format(mu=0.3, more=hold)).log
+    assert log["ContactTorque_low_y"][1] > 0.01
+    assert log["held_s"][1:] == pytest.approx(-log["ContactTorque_low_y"][1:], rel=1e-9, abs=1e-9)
+    assert log["U_y"] == pytest.approx(log["L_y"], rel=1e-12)
+
+
 SPIN_UP = """
     method(ulmpm, APIC, linear)
     dimension(2, 0, 1, 0, 1/8, 1/8)
@@ -207,8 +313,22 @@ def test_processes_and_restarts_have_the_same_bits(state_interpreted, run_interp
     [
         (("axisymmetric(true", "axisymmetric(false"), "only a body of revolution can twist"),
         (("dimension(2, 0, 2, 0, 2,", "dimension(3, 0, 2, 0, 2, 0, 2,"), "two dimensions"),
-        (("musl", "quasi-static"), "twist=true does not support scheme quasi-static"),
-        (("method(ulmpm, AFLIP", "method(ulmpm/contacts, AFLIP"), "does not support method"),
+        (("AFLIP, quadratic-spline, 0.99)\n    scheme(musl", "FLIP, linear, 1)\n    set_dt(1)\n"
+          "    scheme(newmark"), "has no inertia of rotation around an axis"),
+        (
+            (
+                "method(ulmpm, AFLIP, quadratic-spline, 0.99)\n    scheme(musl)",
+                "method(ulmpm/contacts, FLIP, quadratic-spline, 0.99)\n    scheme(quasi-static)",
+            ),
+            "no friction of contact around an axis",
+        ),
+        (
+            (
+                "    run",
+                "    region(r, block, 0, 1, -1, 0)\n    fix(w, contact/surface, bar, r)\n    run",
+            ),
+            "does not support fix contact/surface",
+        ),
         (("method(ulmpm, AFLIP, quadratic-spline, 0.99", "method(ulmpm, XPIC, linear, 2"), "XPIC"),
         (("axisymmetric(true, twist=true)", "axisymmetric(true)"), "nothing rotates"),
         (("    run", "    fix(w, velocity_nodes, high, NULL, 0, mu=0.1)\n    run"), "friction"),
@@ -217,3 +337,48 @@ def test_processes_and_restarts_have_the_same_bits(state_interpreted, run_interp
 def test_what_cannot_twist_is_refused(run_interpreted, change, says):
     err = run_interpreted(TWISTED.replace(*change), status=1).err
     assert says in err and err.count("error:") <= 2
+
+
+STRESS = "s11, s22, s33, s12, s13, s23"
+DUMPS = f"""
+    log_modify(custom, time)
+    dump(flat, all, particle, 100, flat.*.LAMMPS, x, y, twist, vtheta, vx, vy, {STRESS})
+    dump(w, all, particle, 100, whole.*.LAMMPS, x, y, z, x0, z0, vx, vy, vz, {STRESS}, revolve=8)
+    dump(vtk, all, vtk, 100, whole.*.vtu, vx, vz, s11, revolve=8)
+    run(5)"""
+
+
+def test_dumps_revolve_twisted_bodies(run_interpreted):
+    """Lengths, speeds and invariants of stress are those of the half plane; angles are twists."""
+    result = run_interpreted(bar("x*(1 + cos(PI*y))", n=2, more=DUMPS))
+    flat, whole = (result.snapshots(name)[-1] for name in ("flat", "whole"))
+    n = len(flat.x)
+    assert len(whole.x) == 8 * n and len(set(whole.id)) == 8 * n
+    r, speed = np.hypot(whole.x, whole.z), whole.vx**2 + whole.vy**2 + whole.vz**2
+    assert r.reshape(8, n) == pytest.approx(np.tile(flat.x, (8, 1)), rel=1e-7)
+    square = flat.vx**2 + flat.vy**2 + flat.vtheta**2
+    assert speed.reshape(8, n) == pytest.approx(np.tile(square, (8, 1)), rel=1e-6)
+    turned = np.arctan2(whole.z, whole.x) - np.arctan2(whole.z0, whole.x0)
+    off = np.angle(np.exp(1j * (turned.reshape(8, n) - flat.twist)))
+    assert abs(off).max() < 1e-6 < abs(flat.twist).max()
+
+    def stress(t):
+        rows = (t.s11, t.s12, t.s13), (t.s12, t.s22, t.s23), (t.s13, t.s23, t.s33)
+        return np.array(rows).transpose(2, 0, 1)
+
+    assert abs(flat.s23).max() > 0.1
+    values = np.linalg.eigvalsh(stress(whole)).reshape(8, n, 3)
+    assert values == pytest.approx(np.tile(np.linalg.eigvalsh(stress(flat)), (8, 1, 1)), abs=1e-4)
+    # The shear acts around the axis: along (-z, x).
+    s = stress(whole)
+    around = np.stack([-whole.z / r, 0 * r, whole.x / r], axis=1)
+    shear = np.einsum("ni,nij->nj", around, s)[:, 1]
+    assert shear.reshape(8, n) == pytest.approx(np.tile(flat.s23, (8, 1)), abs=1e-4)
+
+
+def test_copies_around_no_axis_are_refused(run_interpreted):
+    script = TWISTED.replace("axisymmetric(true, twist=true)", "")
+    begin = script.index("solid(bar")
+    dump = "dump(d, all, particle, 100, d.*.LAMMPS, x, revolve=8)"
+    err = run_interpreted(f"{script[:begin]}{dump}", status=1).err
+    assert "only bodies of revolution in 2D have copies around an axis" in err

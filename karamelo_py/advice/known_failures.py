@@ -245,7 +245,7 @@ def warn_about_loads(hub: Hub, steps: float) -> None:
     loads, moves = [], False
     for fix, formulas in formulas_by_fix.items():
         acts = not all(map(is_zero, formulas))
-        if fix.prescribes_velocity or fix.leads_points:
+        if fix.prescribes_velocity or fix.prescribes_rotation or fix.leads_points:
             moves |= acts
         elif acts:
             loads.append(fix)

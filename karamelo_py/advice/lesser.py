@@ -13,6 +13,7 @@ from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
+from karamelo_py.script.values import TIME
 
 Words = Iterator[tuple[str, str]]  # reason, what to write instead
 
@@ -32,7 +33,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 def _given(fix: Fix) -> tuple:
     """Return the formulas; NaN if there are none, because the effect of the fix is unknown."""
-    return tuple(fix.formulas) or (np.nan,) * 3
+    return tuple(fix.formulas) or fix.components or (np.nan,) * 3
 
 
 def _depends(formula: Any, axes: str) -> bool:
@@ -45,15 +46,15 @@ def _depends(formula: Any, axes: str) -> bool:
 
 def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
     """Return True if a group has all or no points (nodes) of equal `key`."""
-    group = fix.group
-    if group is None or group.all:
+    group, within = fix.group, fix.points_within()
+    if group is None or (group.all and within is None):
         return group is not None
     if isinstance(group, NodeGroup):
         groups = [(lattice.first, lattice.positions()) for lattice in hub.lattices]
         members = fix.nodes
     else:
         groups = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
-        members = group.members
+        members = group.members if within is None else within
     for first, x in groups:
         keys = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
         _, cell = np.unique(keys, axis=0, return_inverse=True)
@@ -192,23 +193,83 @@ def _round(hub: Hub) -> Words:
         r = np.linalg.norm((x - centre)[:, across], axis=1)
         return np.stack([r, x[:, along]], axis=1)
 
+    twists, lines = False, []
     for fix in _acting(hub):
+        if fix.friction is not None:
+            continue  # of contact: the same around the axis
         act = _given(fix)
-        if len(act) < 3 or not all(is_zero(act[axis]) for axis in across):
+        if len(act) < 3 or _depends(act[along], "".join(AXES[axis] for axis in across)):
             return
-        if _depends(act[along], "".join(AXES[axis] for axis in across)):
-            return
+        if not all(is_zero(act[axis]) for axis in across):
+            omega = _angular_velocity(hub, fix, across, centre)
+            if omega is None:
+                return
+            twists = True
+            lines.append(_line_of_rotation(fix, omega))
+        elif fix.prescribes_velocity:
+            lines.append(_line_of_rotation(fix, "0"))
         if not _alike(hub, fix, turned):
             return
     radius = max(region.radius for region in regions)
     lo, hi = hub.domain.lo[along], hub.domain.hi[along]
     h = hub.domain.h
-    yield (
-        "cylinders about one axis, and nothing acts around it: about "
-        f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis",
-        f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g}) "
-        "and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
+    line = (
+        f"dimension(2, 0, {max(hub.domain.hi[axis] for axis in across):g}, {lo:g}, {hi:g}, {h:g})"
     )
+    times = f"{np.pi * radius / h:.3g} times the points of the plane of radius and axis"
+    if twists:
+        yield (
+            f"cylinders about one axis, which rotate and twist about it: about {times}",
+            f"{line} and axisymmetric(true, twist=true), y along the axis, and for the velocities "
+            f"around it {', '.join(lines)}",
+        )
+        return
+    yield (
+        f"cylinders about one axis, and nothing acts around it: about {times}",
+        f"{line} and axisymmetric(true), y along the axis, and the nodes at x = 0 held in x",
+    )
+
+
+ROTATING = "velocity_nodes", "initial_velocity_particles"
+
+
+def _line_of_rotation(fix: Fix, omega: str) -> str:
+    ID, group = fix.id, "all" if fix.group.all else fix.group.id
+    if isinstance(fix.group, NodeGroup):
+        return f"fix({ID}_around, angular_velocity_nodes, {group}, {omega})"
+    return f"fix({ID}, initial_velocity_particles, {group}, 0, 0, {omega}*x)"
+
+
+def _angular_velocity(hub: Hub, fix: Fix, across: list[int], centre: np.ndarray) -> str | None:
+    """Return the angular velocity of a fix; None if its velocities are not a rotation."""
+    formulas = [fix.formulas[axis] for axis in across]
+    if fix.style not in ROTATING or any(one is None for one in formulas):
+        return None
+    if isinstance(fix.group, NodeGroup):
+        x = np.concatenate([lattice.positions() for lattice in hub.lattices])
+        x = x[np.isin(np.arange(len(x)), fix.nodes)]
+    else:
+        x = np.concatenate([solid.x0 for solid in hub.solids.values()])
+    time, hub.values.array[TIME] = hub.values.array[TIME], 1.0  # a rotation may begin from rest
+    first, second = (one.evaluate_points(hub.values, x) for one in formulas)
+    hub.values.array[TIME] = time
+    r = (x - centre)[:, across]
+    square = np.maximum((r * r).sum(axis=1), 1e-18 * hub.domain.h**2)
+    omega = (r[:, 0] * second - r[:, 1] * first) / square
+    apart = np.hypot(first + omega * r[:, 1], second - omega * r[:, 0])
+    keys = np.rint(
+        np.stack([np.sqrt(square), *np.delete(x, across, axis=1).T]) * (1e6 / hub.domain.h)
+    )
+    _, alike = np.unique(keys, axis=1, return_inverse=True)
+    most = np.full(alike.max(initial=-1) + 1, -np.inf)
+    np.maximum.at(most, alike, omega)
+    scale = 1e-9 * np.abs(omega).max(initial=0.0)
+    same = (apart <= scale * np.sqrt(square)).all() and (omega >= most[alike] - scale).all()
+    if not same:
+        return None
+    off = omega[square > 1e-12 * hub.domain.h**2]
+    constant = not any("time" in one.names for one in formulas) and np.ptp(off) <= 2 * scale
+    return f"{off[0]:.6g}" if constant else "omega"
 
 
 def _mirrored(hub: Hub) -> Words:

@@ -33,9 +33,12 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
     and fix angular_velocity_nodes holds and rotates nodes. Columns of points: ``vtheta``, this
     velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the
-    angular momentum about the axis as ID_y; steps conserve it to round-off. Needs ulmpm or tlmpm on
-    one process and no GPU, an explicit scheme, no rigid solids, and neither contact between solids
-    nor fixes velocity_nodes with bounds or friction.
+    angular momentum about the axis as ID_y; steps conserve it to round-off.
+
+    Load steps (scheme quasi-static) find the angles of the nodes, too. In ulmpm/contacts, fix
+    contact/friction also rubs around the axis: ContactTorque_ID_y is the torque about it. Refused:
+    scheme newmark, contact in load steps, contact between points or with surfaces, tools, walls
+    with bounds or friction, rigid solids, periodic directions, ulcpdi and tlcpdi.
 
     See Also
     --------

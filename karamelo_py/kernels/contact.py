@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.compiler import kernel, noinline
+from karamelo_py.compiler import kernel, noinline, point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
@@ -76,8 +76,8 @@ class SeparateFields(NamedTuple):
     copies: np.ndarray  # (k, 2) slot of a field, and of another solid that gets its force
     touched: np.ndarray  # (N, F) int32: last step (from 1) of contact between a node and a later
     #                      field's node; negative if they stuck
-    prescribed: np.ndarray  # (N, d) 1 + slot of the reaction if a fix prescribes v, else 0
-    reactions: np.ndarray  # number of such slots, then the slots
+    prescribed: np.ndarray  # (N, k) 1 + slot of the reaction if a fix prescribes v, else 0
+    reactions: np.ndarray  # number of such slots, then the slots; negative of a torque
     forces: np.ndarray  # number of slots of forces and torques, then the slots
     rigid: np.ndarray  # (F,) bool: contact does not move the field
     torque: np.ndarray  # (F,) slot of the torque on each field
@@ -86,13 +86,40 @@ class SeparateFields(NamedTuple):
     surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
     partners: np.ndarray  # (F,) int64 scratch: contacts of each
-    change: np.ndarray  # (F, d) scratch: velocity change of each
+    change: np.ndarray  # (F, k) scratch: velocity change of each
 
 
 class Bodies(NamedTuple):
     contact: SeparateFields
     kin: Tag
     nodes: Nodes
+
+
+# Rotation around an axis adds a sliding speed, and friction a torque.
+
+
+@point_function(otherwise=True)
+def around_of(kin, contact, nodes, pair, again):
+    """Return sliding speed around the axis, its change per impulse, and speed before the step.
+
+    Of the angular velocities w*, or `again` of those that deform. () without rotation.
+    """
+    return ()
+
+
+@point_function(otherwise=True)
+def take_around(kin, bodies, control, sides, impulse):
+    """Change angular velocities by an impulse on the second of two sides, and count the torque."""
+
+
+@point_function(otherwise=True)
+def stay_around(kin, bodies, pair, i, j, share):
+    """Change the angular velocities that deform, so that a pair sticks."""
+
+
+@point_function(otherwise=True)
+def turn(kin, nodes, n, change, i, again):
+    """Add a field's change to its angular velocity; `again`: to the one that deforms."""
 
 
 # --- two bodies at a position -----------------------------------------------------------------
@@ -392,9 +419,9 @@ def _excess_of(bodies, pair, where):
 
 
 @noinline
-def _friction_of(pair, friction, push, slide, share):
+def _friction_of(yielding, friction, push, slide, share):
     """Return the tangential impulse per sliding speed, and whether it stops all sliding."""
-    compliance = dot(slide, slide, pair.yielding)
+    compliance = dot(slide, slide, yielding)
     if not compliance > 0:
         return 0.0, False
     slip = sqrt(dot(slide, slide))
@@ -497,21 +524,26 @@ def _touch_pair(bodies, control, i, j, where):
     # Friction does not change the remaining approach, which closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
+    around = around_of(kin, contact, nodes, pair, False)
+    slides, yields = (*slide, *around[:1]), (*pair.yielding, *around[1:2])
     if contact.friction[a, b] > 0:
-        rub, sticks = _friction_of(pair, contact.friction[a, b], push, slide, share)
+        rub, sticks = _friction_of(yields, contact.friction[a, b], push, slides, share)
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
         # Dissipation is the impulse times the mean of the sliding speeds at start and end of the
         # step; within it, internal forces offset the change that the impulse makes.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
-        for speed, first, yielding in zip(slide, before, pair.yielding, strict=True):
+        for speed, first, yielding in zip(slides, (*before, *around[2:3]), yields, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
     work = -heat  # remaining work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
+    if rub > 0:
+        for speed in around[:1]:
+            take_around(kin, bodies, control, (first, second), rub * speed)
     for k in range(kin.dimension):
         impulse = push * pair.outward[k] / size
         if rub > 0:
@@ -548,6 +580,7 @@ def _touch_place(bodies, control, count, where):
             for k in range(kin.dimension):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
+            turn(kin, nodes, n, contact.change, i, False)
 
 
 @noinline
@@ -585,9 +618,12 @@ def _publish_forces(s):
         publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):
         slot = contact.reactions[1 + c]
-        publish(control, slot, s.kin.dimension)
-        if contact.torques[slot]:
-            publish(control, contact.torques[slot], 3)
+        if slot < 0:
+            publish(control, -slot, 1)
+        else:
+            publish(control, slot, s.kin.dimension)
+            if contact.torques[slot]:
+                publish(control, contact.torques[slot], 3)
     for c in range(len(contact.copies)):
         for k in range(3):
             control.values[contact.copies[c, 1] + k] = control.values[contact.copies[c, 0] + k]
@@ -667,6 +703,8 @@ def _stay_pair(bodies, i, j, pair, sticks):
                 contact.change[i, k] -= impulse * pair.per_n
             if not _immovable(contact, pair.m, k):
                 contact.change[j, k] += impulse * pair.per_m
+    if sticks:
+        stay_around(kin, bodies, pair, i, j, share)
 
 
 @noinline
@@ -687,6 +725,7 @@ def _stay_place(bodies, node, count, step):
             n = _node(contact, node, i)
             for k in range(kin.dimension):
                 nodes.velocity[n, k] += contact.change[i, k]
+            turn(kin, nodes, n, contact.change, i, True)
 
 
 @noinline

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import config
 
-from karamelo_py.compiler import at_hand, kernel, on_numbers
+from karamelo_py.compiler import at_hand, kernel, on_numbers, point_function
 from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.compiler.threads import by_threads
@@ -29,7 +29,6 @@ from karamelo_py.points.kinematics import (
     outer,
     total,
     unit,
-    vector,
     zero,
     zero_vector,
 )
@@ -136,8 +135,13 @@ def see(frame, at, matter, seen, chunk):
                 for j in range(len(g)):
                     pushed = 0.0
                     for i in range(len(g)):
-                        pushed += g[i] * back[i, j] if (i, j) in back else 0.0
+                        within = (i, j) in back and (i < kin.dimension or i == j)
+                        pushed += g[i] * back[i, j] if within else 0.0
                     seen.gradients[p, k, j] = pushed
+
+
+def unknowns(kin, values, node):
+    return kin.Unknown._make([values[node, i] for i in range(len(kin.Unknown._fields))])
 
 
 def gradient_at(kin, seen, p, k):
@@ -155,8 +159,9 @@ def strain(kin, seen, u, response, chunk):
         shift = zero_vector(kin, u[0, 0])
         for k in range(seen.count[p]):
             node = seen.nodes[p, k]
-            moved = vector(kin, [u[node, i] for i in range(kin.dimension)])
-            H = H + outer(moved, gradient_at(kin, seen, p, k))
+            moved = unknowns(kin, u, node)
+            H = H + gradient_of(kin, moved, gradient_at(kin, seen, p, k))
+            moved = kin.Vector._make(moved[: kin.dimension])
             shift = shift + seen.weights[p, k] * moved
         store(response.increment, p, H)
         most = max(most, shift.largest())
@@ -171,14 +176,45 @@ def strained_point(matter, response, p):
     return law, state, H, mass * specific_volume(law)
 
 
-def nominal_stress(law, kin, state, H, dt):
+# Rotation around an axis has an H and a stress conjugate to it that are linear in the unknowns of
+# nodes, but depend on the radius r of the point before the step.
+
+
+@point_function(otherwise=True)
+def radius_of(kin, points, p):
+    return ()
+
+
+@point_function(otherwise=True)
+def gradient_of(kin, u, slopes):
+    """Return the part of a node with the unknowns `u` in H."""
+    return outer(u, slopes)
+
+
+@point_function(otherwise=True)
+def increment_of(kin, H, r):
+    return H
+
+
+@point_function(otherwise=True)
+def conjugate(kin, P, H, r):
+    return P
+
+
+@point_function(otherwise=True)
+def add_force(kin, start, stress, slopes):
+    return start + stress.dot(slopes)
+
+
+def nominal_stress(law, kin, state, H, dt, r=()):
     """Return P per reference volume, relative to the positions before the step."""
-    after = advance(law, kin, state, large(H) if by_rates(law) else H, dt)
-    return kirchhoff_stress(law, kin, after).nominal(I + H)
+    dl = increment_of(kin, H, r)
+    after = advance(law, kin, state, large(dl) if by_rates(law) else dl, dt)
+    return conjugate(kin, kirchhoff_stress(law, kin, after).nominal(I + dl), H, r)
 
 
-def stress_and_tangent(law, kin, state, H, dt):
-    P = nominal_stress(law, kin, state, seeded(H), dt)
+def stress_and_tangent(law, kin, state, H, dt, r=()):
+    P = nominal_stress(law, kin, state, seeded(H), dt, r)
     return P._make([x.value for x in P]), tuple([slopes_of(x, len(H)) for x in P])
 
 
@@ -195,7 +231,8 @@ def respond(matter, dt, response, chunk):
     for q in range(points_of(points.mass.size, chunk), end, lanes.width):
         p = points_from(lanes, q, end)
         law, state, H, volume = strained_point(matter, response, p)
-        store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt))
+        r = radius_of(kin, points, p)
+        store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt, r))
 
 
 @by_threads
@@ -208,7 +245,8 @@ def respond_to_changes(matter, dt, response, tangent, chunk):
     for q in range(points_of(count, chunk), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
         law, state, H, volume = strained_point(matter, response, p)
-        _, slopes = stress_and_tangent(law, kin, state, H, dt)
+        r = radius_of(kin, points, p)
+        _, slopes = stress_and_tangent(law, kin, state, H, dt, r)
         columns = points_from(lanes, q, last)
         store(tangent.values, columns, tuple([volume * s for row in slopes for s in row]))
 
@@ -219,7 +257,9 @@ def keep_stress(matter, stress):
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         tau = kirchhoff_stress(law, kin, state)
-        store(stress, p, points.mass[p] * specific_volume(law) * tau.nominal(unit(kin)))
+        none, r = zero(kin, points.mass[p]), radius_of(kin, points, p)
+        P = conjugate(kin, tau.nominal(unit(kin)), none, r)
+        store(stress, p, points.mass[p] * specific_volume(law) * P)
 
 
 # --- at the nodes -----------------------------------------------------------------------------
@@ -276,45 +316,46 @@ def add_forces(kin, seen, stress, f, chunk):
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
     for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
-        total = vector(kin, [f[a, i] for i in range(kin.dimension)])
+        total = unknowns(kin, f, a)
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // width, seen.entries[e] % width
-            total = total + load(stress, p, zero(kin, f[0, 0])).dot(gradient_at(kin, seen, p, k))
+            of_point = load(stress, p, zero(kin, f[0, 0]))
+            total = add_force(kin, total, of_point, gradient_at(kin, seen, p, k))
         for i, force in enumerate(total):
             f[a, i] = force
 
 
-def along(kin, row):
-    """Return the direction in which a tensor row acts, radial for the hoop row."""
-    return row if row < kin.dimension else 0
+def along(kin, i):
+    """Return index and column of the tensor components that act on an unknown; hoop radially."""
+    d, places = kin.dimension, kin.Tensor.places
+    return [
+        (c, column) for c, (row, column) in enumerate(places)
+        if (column < d or row == column) and i == (0 if row == column >= d else row)
+    ]  # fmt: skip
 
 
 def by_gradient(kin, h, C):
     """Return df/dH (d t) of a node with gradient h, from dP/dH (t t)."""
-    d, places = kin.dimension, kin.Tensor.places
-    t = len(places)
+    d, t = len(kin.Unknown._fields), kin.tensor_size
     return tuple(
         [
-            total([h[column] * C[c * t + b] for c, (row, column) in enumerate(places)
-                   if along(kin, row) == i])
+            total([h[column] * C[c * t + b] for c, column in along(kin, i)])
             for i in range(d)
             for b in range(t)
         ]
-    )  # fmt: skip
+    )
 
 
 def by_displacement(kin, D, g):
     """Return df/du (d d) by a node with gradient g, from df/dH (d t) of another."""
-    d, places = kin.dimension, kin.Tensor.places
-    t = len(places)
+    d, t = len(kin.Unknown._fields), kin.tensor_size
     return tuple(
         [
-            total([D[i * t + b] * g[column] for b, (row, column) in enumerate(places)
-                   if along(kin, row) == j])
+            total([D[i * t + b] * g[column] for b, column in along(kin, j)])
             for i in range(d)
             for j in range(d)
         ]
-    )  # fmt: skip
+    )
 
 
 @by_threads

@@ -24,11 +24,21 @@ from karamelo_py.compiler.fields import load, rows_of_points, store
 from karamelo_py.compiler.slopes import seeded, slopes_of, value_of
 from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
-from karamelo_py.kernels.implicit import PARTS, gradient_at, points_of, row_of, strained_point
+from karamelo_py.kernels.implicit import (
+    PARTS,
+    add_force,
+    conjugate,
+    gradient_at,
+    increment_of,
+    points_of,
+    radius_of,
+    row_of,
+    strained_point,
+)
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.views import state_at
 from karamelo_py.points.frames import Updated, scaled_increment
-from karamelo_py.points.kinematics import I, det, inv, tensor, vector, zero
+from karamelo_py.points.kinematics import I, det, inv, tensor, zero
 from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specific_volume
 
 
@@ -72,14 +82,15 @@ def grow(matter, response, averages, chunk):
         store(averages.cofactors, p, volume * cofactors(A))
 
 
-def averaged_stress(law, kin, state, change, dt):
+def averaged_stress(law, kin, state, change, dt, r):
     """Return P and q per reference volume after an increment H, with averaged volume ratio."""
     H, ratio = change
-    A = I + H
-    dl = scaled_increment(Updated(), kin, H, (), ratio / det(A))
+    strain = increment_of(kin, H, r)
+    A = I + strain
+    dl = scaled_increment(Updated(), kin, strain, (), ratio / det(A))
     tau = kirchhoff_stress(law, kin, advance(law, kin, state, dl, dt))
     p = tau.mean_of_stretching()
-    return (tau - p * I).nominal(A), p / ratio
+    return conjugate(kin, (tau - p * I).nominal(A), H, r), p / ratio
 
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -98,7 +109,8 @@ def respond_averaged(matter, dt, response, averages, chunk):
         law, state, H, volume = strained_point(matter, response, p)
         (ratio,) = load(averages.ratio, p, (volume,))
         *by_H, by_ratio = seeded((*H, ratio))
-        P, pressure = averaged_stress(law, kin, state, (tensor(kin, by_H), by_ratio), dt)
+        change, r = (tensor(kin, by_H), by_ratio), radius_of(kin, points, p)
+        P, pressure = averaged_stress(law, kin, state, change, dt, r)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))
         store(averages.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))
@@ -119,7 +131,8 @@ def keep_averaged_stress(matter, response, averages):
         volume = points.mass[p] * specific_volume(law)
         none = zero(kin, volume)
         store(response.increment, p, none)
-        store(response.stress, p, volume * (tau - mean * I).nominal(I + none))
+        P = (tau - mean * I).nominal(I + none)
+        store(response.stress, p, volume * conjugate(kin, P, none, radius_of(kin, points, p)))
         averages.pressure[0, p] = volume * mean
 
 
@@ -166,7 +179,7 @@ def average(seen, nodes, values, chunk):
 def add_slopes(kin, seen, tensors, blocks, chunk):
     """Add N_a T grad N_b of point tensors T (t, n) to pairs of nodes, d numbers each."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)
-    d = kin.dimension
+    d = len(kin.Unknown._fields)
     m, width = pairs.codes.size, seen.nodes.shape[1]
     for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
         for e in range(seen.starts[a], seen.starts[a + 1]):
@@ -175,7 +188,8 @@ def add_slopes(kin, seen, tensors, blocks, chunk):
             T = load(tensors, p, zero(kin, weight))
             for other in range(seen.count[p]):
                 at = d * row_of(pairs, a, seen.nodes[p, other])
-                made = vector(kin, T.dot(gradient_at(kin, seen, p, other)))
+                none = kin.Unknown._make([weight - weight] * d)
+                made = add_force(kin, none, T, gradient_at(kin, seen, p, other))
                 for j, x in enumerate(made):
                     out[at + j] += weight * x
 

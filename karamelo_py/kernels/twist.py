@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function, real
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels import arrays, hook_loop
+from karamelo_py.kernels import arrays, contact_twist, hook_loop  # noqa: F401
 from karamelo_py.kernels.clock import kick
 from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations import twist

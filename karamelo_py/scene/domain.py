@@ -16,8 +16,8 @@ from karamelo_py.script.errors import Mark, ScriptError
 NO_F_BAR = {"F-bar": "no anti_volumetric_locking: thin bodies do not lock"}
 TWIST = Restrictions(
     "twist", "axisymmetric(true) without twist, or 3D",
-    only={"method": ("ulmpm", "tlmpm")},
-    without=("implicit", "series", "corners", "mass=corrected", "periodic", "rigid", "rigid_body",
+    only={"method": ("ulmpm", "tlmpm", "ulmpm/contacts")},
+    without=("series", "corners", "mass=corrected", "periodic", "rigid", "rigid_body",
              "tools", "yielding walls"),
 )  # fmt: skip
 THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)

@@ -97,6 +97,7 @@ class Fix(Publisher):
 
     group: Any = None
     formulas: tuple = ()  # of compiled hooks: one or None per component
+    components: tuple = ()  # of a force in Python: a formula or None per direction
     first_step_only = False  # in the first step after its definition
     # Python hooks treat each point or node separately and move none. They get the local points, in
     # any order, before the first step in several calls. Sums need ``total``.
@@ -105,6 +106,7 @@ class Fix(Publisher):
     # Prescribes nodal velocities in ``post_update_grid_state`` where there is a formula; contact
     # does not change them.
     prescribes_velocity = False
+    prescribes_rotation = False  # the angular velocity of its nodes, published as ID_s
     # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
     # are all held, as at the ends of the grid.
     held_directions: tuple[int, ...] = ()
@@ -175,6 +177,10 @@ class Fix(Publisher):
             if formula is not None:
                 values[acts, k] = formula.evaluate_points(self.hub.values, x, x)
         return mask, values
+
+    def points_within(self) -> np.ndarray | None:
+        """Numbers of the points of the group on which the fix acts; None: all."""
+        return None
 
     def defined(self) -> None:
         """Called when the fix has its ID."""

@@ -515,6 +515,7 @@ for _tag in TAGS:
     else:
         _tag.Vector = _tag.Gradient = tensor_class(Vector, _tag, _names)
     _tag.Gradient.tensor = _tag.Tensor
+    _tag.Unknown = _tag.Vector  # of a node, in implicit steps
     for _one in (_tag.Tensor, _tag.Symmetric):
         set_rows(_one, _tag.Tensor)
     for _one in (_tag.Vector, _tag.Gradient, _tag.Tensor, _tag.Symmetric):

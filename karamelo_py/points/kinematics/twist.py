@@ -43,6 +43,7 @@ class TwistedStress(SymmetricTensor):
         return made._make([*made[:4], hoop, *made[5:]])
 
 
+Twisted.Unknown = Space.Vector  # displacement, and angle of rotation
 Twisted.Tensor = tensor_class(Tensor, Twisted, Twisted.tensor_names)
 Twisted.Symmetric = tensor_class(TwistedStress, Twisted, Twisted.symmetric_names)
 Twisted.Tensor.symmetric = Twisted.Symmetric

@@ -28,15 +28,16 @@ from karamelo_py.points.kinematics import (
 from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.eos_strength import Strength
 from karamelo_py.points.laws.leaning import warn_of_leaning
+from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.orthotropic import (
     INDEX,
     STIFFNESS,
     VOIGT,
     Directional,
-    axes,
     fastest,
     rotated,
 )
+from karamelo_py.points.laws.orthotropic import axes as rotation
 from karamelo_py.points.laws.strengths import initial_memory
 from karamelo_py.points.laws.strengths.hardening import (
     LinearHardening,
@@ -191,6 +192,8 @@ class Hill(NamedTuple):
     yields
         Instead of R, yield stresses (r11, r22, r33, r12, r13, r23) over the reference; all 1 for an
         isotropic body. In shear they are over the reference divided by sqrt(3).
+    axes
+        As for orthotropic; the elastic material also rotates with them.
 
     Example
     -------
@@ -235,6 +238,7 @@ class Hill(NamedTuple):
         *,
         R: Lankford | None = None,
         yields: YieldRatios | None = None,
+        axes: Axes | None = None,
     ):
         if (R is None) == (yields is None):
             raise ScriptError(
@@ -263,7 +267,8 @@ class Hill(NamedTuple):
                 "1/r33^4",
             )
         law = elastic.whole
-        return built(law, hard, turned(surface(constants), axes(angle, tilt, spin)))
+        P = turned(surface(constants), rotation(angle, tilt, spin))
+        return oriented(built(law, hard, P), axes)
 
 
 def built(law: Any, strength: Any, P: np.ndarray) -> YieldingByHill:

@@ -19,7 +19,8 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.leaning import warn_of_leaning
-from karamelo_py.points.laws.orthotropic import axes
+from karamelo_py.points.laws.oriented import Axes, oriented
+from karamelo_py.points.laws.orthotropic import axes as rotation
 from karamelo_py.points.laws.parameters import (
     AboveZero,
     FromZero,
@@ -62,6 +63,8 @@ class Jointed(NamedTuple):
     matrix_cohesion, matrix_phi, matrix_psi
         Cohesion, friction and dilatancy of the rock between the joints (strength mohr-coulomb);
         without a cohesion or friction angle it is elastic.
+    axes
+        As for orthotropic: `angle` and `tilt` rotate the normal from axis 3 within them.
 
     Example
     -------
@@ -118,6 +121,7 @@ class Jointed(NamedTuple):
         matrix_cohesion: FromZero | None = None,
         matrix_phi: FromZero | None = None,
         matrix_psi: FromZero | None = None,
+        axes: Axes | None = None,
     ):
         if not phi < 90:
             raise ScriptError(
@@ -153,10 +157,10 @@ class Jointed(NamedTuple):
                 argument="matrix_psi",
                 expected="matrix_cohesion=... and matrix_phi=... as well",
             )
-        normal = map(float, axes(angle, tilt, 0.0)[:, 2])
+        normal = map(float, rotation(angle, tilt, 0.0)[:, 2])
         kind = cls if isinstance(matrix, Absent) else YieldingBetween
         joints = cohesion, friction, tan(radians(psi)), tension
-        return kind(1 / rho, lam, G, *joints, *normal, matrix)
+        return oriented(kind(1 / rho, lam, G, *joints, *normal, matrix), axes)
 
 
 class YieldingBetween(Jointed):

@@ -7,7 +7,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.kernels import implicit_averaging as loops
-from karamelo_py.kernels.arrays import matter_of
 from karamelo_py.kernels.implicit import PARTS, Blocks
 
 
@@ -20,7 +19,7 @@ class AveragedVolumes:
     def _parts(self) -> Iterator[tuple]:
         e = self.equations
         return (
-            (matter_of(e.s.kin, block), seen, response, averages)
+            (e.matter(block), seen, response, averages)
             for block, (seen, response), averages in zip(
                 e.blocks, e.parts, self.averages, strict=True
             )
@@ -60,13 +59,14 @@ class AveragedVolumes:
 
     def _matrix(self, name: str) -> sp.csr_matrix:
         e = self.equations
-        columns = (e.pairs[1][:, None] * e.d + np.arange(e.d)).ravel()
+        k = e.per_node
+        columns = (e.pairs[1][:, None] * k + np.arange(k)).ravel()
         data = np.zeros(len(columns))
         for _, seen, _, averages in self._parts():
             tensors = getattr(averages, name)
             loops.add_slopes(self.mode, PARTS, e.s.kin, seen, tensors, Blocks(e.layout, data))
         m = len(e.nodes)
-        return sp.csr_matrix((data, columns, e.d * e.layout.first), (m, m * e.d))
+        return sp.csr_matrix((data, columns, k * e.layout.first), (m, m * k))
 
     def stiffness(self) -> sp.csr_matrix:
         e, m = self.equations, len(self.equations.nodes)

@@ -9,6 +9,7 @@ from karamelo_py.compiler.slopes import NoSlope
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.implicit import stress_and_tangent
 from karamelo_py.language import registry
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.laws import initial_state
 from karamelo_py.points.laws.strengths.mu_i import yields_early_with_fbar
 from karamelo_py.scene.hub import Hub
@@ -18,6 +19,7 @@ from karamelo_py.styles.methods.base import takes_average
 # Fix hooks in implicit steps; plug-in hooks may run several times per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
+_OF_ROTATION = "post_update_grid_rotation", "post_rotation_to_grid"
 _OF_PLUGINS = _MOMENTS[1:]
 RELAXED = 1e30  # a time over which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
@@ -35,6 +37,14 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     kin = method.kinematics(hub)
+    if update.scheme.traits.inertia and isinstance(kin, Twisted):
+        yield (
+            "has no inertia of rotation around an axis, as twist=true needs",
+            f"scheme(quasi-static), or {_EXPLICIT}",
+            None,
+        )
+    if method.fields_per_solid and isinstance(kin, Twisted):
+        yield "knows no friction of contact around an axis (twist=true)", _EXPLICIT, method.mark
     for solid in hub.solids.values():
         law = solid.material.law
         if solid.rigid:
@@ -70,7 +80,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         other = [
             hook
             for hook in fix.hooks()
-            if hook not in (_MOMENTS + _OF_HEAT if built_in else _OF_PLUGINS)
+            if hook not in (_MOMENTS + _OF_HEAT + _OF_ROTATION if built_in else _OF_PLUGINS)
         ]
         prescribes = fix.prescribes_velocity or fix.first_step_only
         if prescribes:
@@ -122,7 +132,8 @@ def _bears_shear(law: Tag, kin: Tag) -> bool:
     """Return True if a law resists slow shear; in 1D all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
-    _, C = on_numbers(stress_and_tangent)(law, kin, initial_state(law, kin, 1.0), rest, RELAXED)
+    state = initial_state(law, kin, 1.0)
+    _, C = on_numbers(stress_and_tangent)(law, kin, state, rest, RELAXED, 1.0)
     if kin.dimension == 1:
         return True
     shear = places.index((0, 1))

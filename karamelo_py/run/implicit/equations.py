@@ -12,9 +12,11 @@ from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import field, rows_of_points
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import implicit as loops
-from karamelo_py.kernels.arrays import MASS, Block, Matter, OnGrids, Setup, Tag, matter_of
+from karamelo_py.kernels import implicit_twist  # noqa: F401
+from karamelo_py.kernels.arrays import MASS, Block, Matter, OnGrids, Setup, Tag, known_to_laws
 from karamelo_py.kernels.equations.fbar import FBar
 from karamelo_py.kernels.equations.heat import Conductance
+from karamelo_py.kernels.equations.twist import RadiusAfterMove
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes
@@ -56,13 +58,15 @@ class Equations:
     """Forces at the nodes of a step, and their derivatives.
 
     `nodes` (m,) are in stencils of points: `mass` (m,) is 0 where there are gradients only,
-    `places` (m, d) are grid indices, `deforming` (m,) masks nodes of points that deform (`blocks`,
+    `places` (m, d) are grid indices, `per_node` unknowns at each (d, and the angle of a rotation
+    around the axis), `deforming` (m,) masks nodes of points that deform (`blocks`,
     with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
     d). `cached` is from the previous step, or empty.
     """
 
     def __init__(self, s: Setup, mode: Tag, cached: dict[str, np.ndarray], stabilised: bool):
         self.s, self.mode, self.d = s, mode, s.kin.dimension
+        self.per_node = len(s.kin.Unknown._fields)
         self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
         # Points on cell boundaries have gradients at nodes without weight.
@@ -83,6 +87,11 @@ class Equations:
             vars(self).update(cached)
         self._find_pairs(stabilised)
         self.averaged = AveragedVolumes(self) if isinstance(s.averaging, FBar) else None
+
+    def matter(self, block: Block) -> Matter:
+        radius = [one for one in block.points.fields if isinstance(one, RadiusAfterMove)]
+        points = known_to_laws(block.points)._replace(fields=tuple(radius))
+        return Matter(self.s.kin, points, block.laws)
 
     def cached(self) -> dict[str, np.ndarray]:
         return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
@@ -109,7 +118,7 @@ class Equations:
         return seen, response
 
     def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
-        mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.d))
+        mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.per_node))
         for block, seen in tools:
             loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
             loops.scatter(seen, block.points.mass, block.points.v, momentum)
@@ -137,7 +146,7 @@ class Equations:
 
         Includes pairs of the ghost stabilisation, and each node with itself.
         """
-        d, m = self.d, len(self.nodes)
+        d, k, m = self.d, self.per_node, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
         weights = row ** np.arange(d)[::-1]
@@ -160,7 +169,7 @@ class Equations:
         np.cumsum(np.bincount(self.pairs[0], minlength=m), out=self.layout.first[1:])
         rank[rows, offsets] = np.searchsorted(every, pairs) - self.layout.first[rows]
         self.K = sp.bsr_matrix(
-            (np.zeros((len(every), d, d)), self.pairs[1], self.layout.first), (m * d, m * d)
+            (np.zeros((len(every), k, k)), self.pairs[1], self.layout.first), (m * k, m * k)
         )
 
     def number_of(self, nodes: np.ndarray) -> np.ndarray:
@@ -183,11 +192,11 @@ class Equations:
             self.averaged.respond(dt)
         else:
             for block, (_, response) in zip(self.blocks, self.parts, strict=True):
-                loops.respond(self.mode, loops.PARTS, matter_of(s.kin, block), dt, response)
+                loops.respond(self.mode, loops.PARTS, self.matter(block), dt, response)
         return self._forces()
 
     def _forces(self) -> np.ndarray:
-        f = np.zeros((len(self.nodes), self.d))
+        f = np.zeros((len(self.nodes), self.per_node))
         for seen, response in self.parts:
             loops.add_forces(self.mode, loops.PARTS, self.s.kin, seen, response.stress, f)
         return f
@@ -201,7 +210,7 @@ class Equations:
         Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
         `fixed` (nodes, d) without points.
         """
-        cells = u / self.s.grids.spacing[self.grid][:, None]
+        cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
         g, start, way, most = self.grid[far], self.places[far], cells[far, k], 0.0
         ends = np.stack([self.s.grids.nx[g], self.s.grids.ny[g], self.s.grids.nz[g]], 1)[
@@ -241,7 +250,19 @@ class Equations:
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
-        return rigid_motions(self.positions, free_from(self.s.kin))
+        motions = rigid_motions(self.positions, free_from(self.s.kin))
+        if self.per_node == self.d:
+            return motions
+        motions = np.pad(motions, ((0, 0), (0, 1), (0, 1)))
+        motions[:, -1, -1] = 1.0
+        return motions
+
+    @cached_property
+    def levers(self) -> np.ndarray:
+        """Lengths (m, k) that make displacements of unknowns: 1, or the radius of a rotation."""
+        levers = np.ones((len(self.nodes), self.per_node))
+        levers[:, self.d :] = self.positions[:, :1]
+        return levers
 
     def for_all_components(self, matrix: sp.csr_matrix) -> sp.bsr_matrix:
         blocks = matrix.data[:, None, None] * np.eye(self.d)
@@ -249,7 +270,7 @@ class Equations:
         return sp.bsr_matrix((blocks, matrix.indices, matrix.indptr), shape)
 
     def linearise(self, dt: float, ghost: sp.csr_matrix | None = None) -> None:
-        d, t, kin = self.d, self.s.kin.tensor_size, self.s.kin
+        d, t, kin = self.per_node, self.s.kin.tensor_size, self.s.kin
         blocks = self.K.data
         blocks[:] = 0
         alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
@@ -261,7 +282,7 @@ class Equations:
                 some = loops.Tangent(0, n, self.averaged.averages[k].tangent, done)
                 loops.add_stiffness(self.mode, loops.PARTS, kin, seen, some, into)
                 continue
-            matter = matter_of(kin, block)
+            matter = self.matter(block)
             tangent = rows_of_points((t * t, min(n, BATCH)), np.float64)
             for first in range(0, n, BATCH):
                 some = loops.Tangent(first, min(first + BATCH, n), tangent, done)
@@ -272,7 +293,8 @@ class Equations:
             rows = np.repeat(np.arange(m), np.diff(ghost.indptr))
             every = self.pairs[0] * np.int64(m) + self.pairs[1]
             at = np.searchsorted(every, rows * m + ghost.indices)
-            blocks[at] += ghost.data[:, None, None] * np.eye(d)
+            levers = self.levers[rows] * self.levers[ghost.indices]
+            blocks[at] += ghost.data[:, None, None] * levers[:, None] * np.eye(d)
         self.whole = self.K
         if self.averaged is not None:
             self.whole = (self.K.tocsr() + self.averaged.stiffness()).tobsr((d, d))
@@ -297,7 +319,7 @@ class Equations:
                 law = record(block.laws, k)
                 rest = kin.Tensor._make([0.0] * len(places))
                 state = initial_state(law, kin, 1.0)
-                _, C = on_numbers(loops.stress_and_tangent)(law, kin, state, rest, 1.0)
+                _, C = on_numbers(loops.stress_and_tangent)(law, kin, state, rest, 1.0, 1.0)
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
                 rows = float(points.mass[points.material == k].sum() * specific_volume(law))
                 total, volume = total + rows * float(one), volume + rows

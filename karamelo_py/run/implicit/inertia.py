@@ -4,6 +4,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import Tag
+from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.implicit import gather, scatter
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.implicit.contact import Contact
@@ -29,6 +30,9 @@ class Rest:
     def end(self, u: np.ndarray) -> None:
         for block in self.blocks:
             block.points.v[:] = 0
+            around = field(block.points.fields, VelocityAround)
+            if around is not None:
+                around[:] = 0
 
 
 class Motion:

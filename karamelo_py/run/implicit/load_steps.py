@@ -9,10 +9,12 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, Tag, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.contact import SeparateFields
+from karamelo_py.kernels.equations.twist import AngularVelocity, SumsAround, UpdateAround
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
 from karamelo_py.kernels.totals import WORK, add_to, carry
+from karamelo_py.kernels.twist import HELD
 from karamelo_py.kernels.watch import look_at_end
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity
@@ -232,7 +234,9 @@ class LoadSteps:
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
         force = of_force(s.kin)
-        return s.nodes.sums[:, force : force + s.kin.dimension]
+        forces = s.nodes.sums[:, force : force + s.kin.dimension]
+        around = field(s.nodes.fields, SumsAround)
+        return forces if around is None else np.concatenate([forces, around[:, 2:3]], axis=1)
 
     def _equilibrium(
         self, hooks: Tag, dt: float, before: np.ndarray | None, after: np.ndarray
@@ -301,6 +305,11 @@ class LoadSteps:
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
         holding = [f for f in self.simulation.fixes.acting if "post_update_grid_state" in f.hooks()]
         mask, velocities = equations.prescribed(holding, equations.d)
+        if equations.per_node > equations.d:
+            fixes = self.simulation.fixes.acting
+            rotating = [f for f in fixes if "post_update_grid_rotation" in f.hooks()]
+            pairs = (mask, velocities), equations.prescribed(rotating, 1)
+            mask, velocities = (np.concatenate(two, axis=1) for two in zip(*pairs, strict=True))
         self._check_numbers(velocities, "a node gets a velocity that is not a number")
         if equations.s.kin.hoops:
             on_axis = equations.positions[:, 0] == 0
@@ -323,18 +332,29 @@ class LoadSteps:
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
         mass = result.equations.mass[:, None]
         v = result.u / dt
+        around = field(s.nodes.fields, UpdateAround)
+        if around is not None:
+            inertia = field(s.nodes.fields, SumsAround)[nodes, :1]
+            mass = np.concatenate([mass, mass, inertia], axis=1)
         bound = result.fixed & (mass > 0)
         without = np.where(bound, -result.reaction * dt / np.where(bound, mass, 1.0), 0.0)
         change = of_change(s.kin)
-        update[nodes, :d] = v + without
-        update[nodes, change : change + d] = without
+        update[nodes, :d] = (v + without)[:, :d]
+        update[nodes, change : change + d] = without[:, :d]
+        if around is not None:
+            around[nodes] = np.stack([(v + without)[:, d], without[:, d]], axis=1)
         work = s.control.totals[WORK].copy()
         with simulation.steps.altered(kept=0.0):  # reactions account for the whole velocity change
             take_rows(self.scheme.hold, s, simulation.mode, hooks)
+            if around is not None:
+                take_rows((HELD,), s, simulation.mode, hooks)
         s.control.totals[WORK] = work
         add_to(s.control.totals, WORK, result.inertia.work(result.u, result.reaction))
         carry(s.control.totals[WORK])
-        update[nodes, :d] = s.nodes.velocity[nodes, :d] = v
+        update[nodes, :d] = s.nodes.velocity[nodes, :d] = v[:, :d]
+        if around is not None:
+            around[nodes, 0] = field(s.nodes.fields, AngularVelocity)[nodes, 0] = v[:, d]
+            around[nodes, 1] = 0
         update[nodes, change : change + d] = 0
         for one in result.pushing:
             one.publish()
@@ -368,9 +388,8 @@ class LoadSteps:
             if np.linalg.matrix_rank(rows) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
-            loose = [
-                x for x, h in zip("xyz"[free:], fixed[nodes].any(0)[free:], strict=False) if not h
-            ]
+            held = fixed[nodes].any(0)[free : s.kin.dimension]
+            loose = [x for x, h in zip("xyz"[free:], held, strict=False) if not h]
             how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(rows) else "is held by nothing"
             raise self._loose(self._solid_at(equations, nodes), how)

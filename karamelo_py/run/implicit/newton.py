@@ -77,6 +77,7 @@ class Newton:
         self.pushing, self.external = pushing, external
         self.dt, self.seconds, self.fixed = dt, seconds, fixed
         self.free = free
+        self.lever = equations.levers.max(0)
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
@@ -101,7 +102,7 @@ class Newton:
         u = np.zeros_like(jump)
         for iteration in range(scheme.iterations + 1):
             balance = self.balance(u)
-            residual = float(np.linalg.norm(balance[free]) / self._size(u))
+            residual = self._norm(balance, free) / self._size(u)
             if self.seepage is not None:
                 residual = max(residual, self.seepage.residual(scheme.tolerance))
             if residual <= scheme.tolerance and not (iteration == 0 and np.any(jump)):
@@ -121,7 +122,8 @@ class Newton:
         if self.seepage is not None:
             forces += self.seepage.forces()
         if self.ghost is not None:
-            forces -= self.ghost @ u
+            levers = self.equations.levers
+            forces -= levers * (self.ghost @ (levers * u))
         return self.inertia.balance(u, forces)
 
     def reaction(self, u: np.ndarray) -> np.ndarray:
@@ -132,13 +134,17 @@ class Newton:
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
-        norms = np.linalg.norm(self.external), np.linalg.norm(self.inner), self.inertia.size(u)
+        norms = self._norm(self.external), self._norm(self.inner), self.inertia.size(u)
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
+
+    def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
+        """Return the norm of forces; torques count with the largest radius as lever."""
+        return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
         """Estimate the rounding of forces: of strains relative to 1, and of u."""
-        far = np.abs(u) + self.spacing
-        return ROUNDING * float(np.linalg.norm((self.stiff * far)[self.free]))
+        far = np.abs(u) + self.spacing / self.lever
+        return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
         """Solve the linear equations for the change of all displacements (m, d).

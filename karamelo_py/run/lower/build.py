@@ -148,7 +148,7 @@ def _features(hub: Hub) -> Iterator[Feature]:
             yield Feature(
                 "yielding walls", "", words, "velocities without geq, leq and mu", fix.mark
             )
-        if fix.solids or fix.follows_points:
+        if (fix.solids and fix.friction is None) or fix.follows_points:
             yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.mark)
 
 

@@ -2,15 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from karamelo_py.language.signature import OutputFile
+from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.fields import check_columns
 from karamelo_py.output.files import discarded, folder_of_discarded
 from karamelo_py.output.log import begins_anew
+from karamelo_py.output.revolve import revolved
 from karamelo_py.output.rhythm import Every, Rhythmic
+from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
@@ -89,6 +91,7 @@ class TableDump(Dump):
 
     to_first = False
     counts_rows = True
+    copies: int | None = None  # around an axis
 
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         columns_available = [*LEADING, *self.names(hub)]
@@ -129,9 +132,27 @@ class OfPoints:
         Columns for each point: x y z (position, the default), x0 y0 z0 (initial position), vx vy vz
         (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
         stress), p (pressure), rho (density), volume, mass and so on.
+    revolve
+        Axisymmetric scenes: number of copies of each point around the axis, in 3D. Positions,
+        velocities, stress and strain rotate, by the angle of twist, too.
     """
 
     rows_are = "points"
+
+    def __init__(
+        self,
+        hub: Hub,
+        every: Every,
+        file: OutputFile,
+        *columns: str,
+        revolve: Annotated[int, Positive] | None = None,
+    ):
+        super().__init__(hub, every, file, *columns)
+        self.copies = revolve
+        if revolve is not None and not isinstance(hub.require_domain().kin, Axisymmetric):
+            message = "only bodies of revolution in 2D have copies around an axis"
+            expected = "axisymmetric(true) before this line, or no revolve"
+            raise ScriptError(message, argument="revolve", expected=expected)
 
     @staticmethod
     def names(hub: Hub) -> Sequence[str]:
@@ -143,13 +164,18 @@ class OfPoints:
 
     def extent(self) -> tuple[int, int]:
         present = self.hub.fields.present
-        count = int(np.count_nonzero(present))
-        return count, len(present) - int(present[::-1].argmax()) if count else 0
+        count, copies = int(np.count_nonzero(present)), self.copies or 1
+        last = len(present) - int(present[::-1].argmax()) if count else 0
+        return copies * count, last + (copies - 1) * len(present)
 
     def tables(self) -> Iterator[TableRows]:
         for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
-            yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
+            if self.copies is None:
+                yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
+            for k in range(self.copies or 0):
+                columns = revolved(self.columns, fields.particle, 2 * np.pi * k / self.copies)
+                yield TableRows(ids + k * len(self.hub.fields.present), types, columns)
 
 
 class OfNodes:

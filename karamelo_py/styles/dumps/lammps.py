@@ -6,11 +6,11 @@ import zlib
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from karamelo_py.language.signature import OutputFile
+from karamelo_py.language.signature import OutputFile, Positive
 from karamelo_py.output.files import continued, whole
 from karamelo_py.output.rhythm import Every
 from karamelo_py.output.text import rows
@@ -88,6 +88,11 @@ class LammpsDump(TableDump):
             for begin in range(0, self._length, PIECE):
                 self._encoder.compress(file.read(min(PIECE, self._length - begin)))
 
+    def box(self) -> list[tuple[float, float]]:
+        ends = box(self.hub)
+        around = (-ends[0][1], ends[0][1])
+        return [around, ends[1], around] if self.copies else ends
+
     def _snapshot(self) -> Iterator[bytes]:
         update, units = self.hub.update, self.hub.output.units
         ends = ["pp" if k in self.hub.domain.periodic else "sm" for k in range(3)]
@@ -100,7 +105,7 @@ class LammpsDump(TableDump):
             "ITEM: NUMBER OF ATOMS",
             str(self.extent()[0]),
             f"ITEM: BOX BOUNDS {' '.join(ends)}",
-            *(f"{lo:.10g} {hi:.10g}" for lo, hi in box(self.hub)),
+            *(f"{lo:.10g} {hi:.10g}" for lo, hi in self.box()),
             "ITEM: ATOMS " + " ".join(["id", "type", *self.columns, *[ELEMENT] * self.named]),
         ]
         yield ("\n".join(lines) + "\n").encode("ascii")
@@ -157,7 +162,7 @@ class BinaryRows:
         line = " ".join(names).encode("ascii")
         yield struct.pack("<q", -len(MAGIC)) + MAGIC + struct.pack("<ii", ENDIAN, REVISION)
         yield struct.pack("<qqi", update.step, count, 0)  # 0: the box is not skewed
-        yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *np.ravel(box(self.hub)))
+        yield struct.pack("<6i6d", *[SHRUNK, AT_LEAST] * 3, *np.ravel(self.box()))
         yield struct.pack("<iibd", len(names), 0, 1, update.time)  # no units, but a time
         yield struct.pack("<i", len(line)) + line
         yield struct.pack("<ii", 1, count * len(names))
@@ -178,8 +183,15 @@ class Particle(OfPoints, LammpsDump):
     dump(d2, all, particle, 100, named.*.LAMMPS, seq, element)
     """
 
-    def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
-        super().__init__(hub, every, file, *columns)
+    def __init__(
+        self,
+        hub: Hub,
+        every: Every,
+        file: OutputFile,
+        *columns: str,
+        revolve: Annotated[int, Positive] | None = None,
+    ):
+        super().__init__(hub, every, file, *columns, revolve=revolve)
         self.named = ELEMENT in self.columns
         self.columns = tuple(name for name in self.columns if name != ELEMENT)
 

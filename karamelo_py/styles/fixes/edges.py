@@ -275,6 +275,9 @@ class EdgeFix(OnEdge, PointForces):
         super().__init__(hub, group)
         self.region = region
 
+    def points_within(self) -> np.ndarray:
+        return np.unique(np.concatenate([self._find(ids).point for ids in self.group.pieces()]))
+
     def loads(self, faces: Faces) -> np.ndarray:
         raise NotImplementedError
 
@@ -343,11 +346,11 @@ class EdgeTraction(EdgeFix):
                 expected=", ".join(SIDES) if side == "all" else "all",
             )
         self.side = None if side == "all" else SIDES.index(side)
-        self.traction = per_direction(hub, "t", traction)
+        self.components = per_direction(hub, "t", traction)
 
     def loads(self, faces: Faces) -> np.ndarray:
         x = faces.middle
-        return faces.area[:, None] * vector(self.traction, self.hub, x, lambda: x)
+        return faces.area[:, None] * vector(self.components, self.hub, x, lambda: x)
 
 
 class EdgePressure(EdgeFix):

@@ -35,6 +35,7 @@ class AngularVelocityNodes(Fix):
     """
 
     published = ("s",)
+    prescribes_rotation = True
 
     post_rotation_to_grid = node_hook(prescribe_mapped, publishes=False)
 

@@ -150,6 +150,7 @@ class ULMPMContacts(Method):
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
         count, d = len(lattices), hub.domain.dimension
+        unknown = len(hub.domain.kin.Unknown._fields)
         shape = lattices[0].shape[:d]
         nodes = sum(lattice.node_count for lattice in lattices)
         h = hub.domain.h
@@ -172,12 +173,12 @@ class ULMPMContacts(Method):
             copies=np.array(copies, np.int64).reshape(-1, 2),
             # Memory pages cost nothing until written.
             touched=np.zeros((nodes, count), np.int32),
-            prescribed=np.zeros((nodes, d), np.int32),
+            prescribed=np.zeros((nodes, unknown), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
             forces=np.zeros(1 + len(hub.values.array), np.int64),
             meeting=np.zeros(count, np.int64),
             partners=np.zeros(count, np.int64),
-            change=np.zeros((count, d)),
+            change=np.zeros((count, unknown)),
             rigid=np.array([can(law, constrained_velocity) for law in laws]),
             torque=slots[:, 1].copy(),
             torques=hub.values.torques,
@@ -199,11 +200,16 @@ class ULMPMContacts(Method):
         contact.forces[: 1 + len(published)] = [len(published), *published]
         fixes = [fix for fix in hub.fixes.values() if fix.prescribes_velocity]
         slots = [hub.values.slot(f"{fix.id}_x") for fix in fixes]
-        contact.reactions[: 1 + len(slots)] = [len(slots), *slots]
+        rotating = [fix for fix in hub.fixes.values() if fix.prescribes_rotation]
+        torques = [hub.values.slot(f"{fix.id}_s") for fix in rotating]
+        published = [*slots, *(-slot for slot in torques)]
+        contact.reactions[: 1 + len(published)] = [len(published), *published]
         prescribed: np.ndarray = contact.prescribed
         if self._prescribed is prescribed:
             prescribed[:] = 0
-        self._prescribed = prescribed if fixes else None
+        self._prescribed = prescribed if published else None
+        for fix, slot in zip(rotating, torques, strict=True):
+            prescribed[fix.nodes, -1] = 1 + slot
         for fix, slot in zip(fixes, slots, strict=True):
             nodes = slice(None) if fix.group.all else fix.nodes
             for k, formula in enumerate(fix.formulas):

@@ -1,0 +1,75 @@
+"""Friction of contact around an axis.
+
+Two nodes rub at their common radius of gyration, so that torques are opposite.
+"""
+
+from math import sqrt
+
+from karamelo_py.compiler.fields import field
+from karamelo_py.kernels import contact
+from karamelo_py.kernels.arrays import MASS
+from karamelo_py.kernels.equations.twist import AngularVelocity, SumsAround, UpdateAround
+from karamelo_py.kernels.totals import add_to, counts
+from karamelo_py.points.kinematics.twist import Twisted
+
+AROUND = 2
+
+
+def _radius(nodes, n, m):
+    inertia = field(nodes.fields, SumsAround)
+    mass = nodes.sums[n, MASS] + nodes.sums[m, MASS]
+    return sqrt((inertia[n, 0] + inertia[m, 0]) / mass)
+
+
+def _yielding(held, nodes, n, r):
+    return 0.0 if held.prescribed[n, AROUND] != 0 else r * r / field(nodes.fields, SumsAround)[n, 0]
+
+
+@contact.around_of.on(Twisted)
+def _around_of_twisted(kin, held, nodes, pair, again):
+    n, m = pair.n, pair.m
+    sums, r = field(nodes.fields, SumsAround), _radius(nodes, pair.n, pair.m)
+    omega = field(nodes.fields, AngularVelocity if again else UpdateAround)
+    before = r * (sums[n, 1] / sums[n, 0] - sums[m, 1] / sums[m, 0])
+    yields = _yielding(held, nodes, n, r) + _yielding(held, nodes, m, r)
+    return r * (omega[n, 0] - omega[m, 0]), yields, before
+
+
+@contact.take_around.on(Twisted)
+def _take_around_twisted(kin, bodies, control, sides, impulse):
+    held, _, nodes = bodies
+    first, second = sides
+    r = _radius(nodes, first.n, second.n)
+    for side, sign in ((first, -1.0), (second, 1.0)):
+        slot = held.prescribed[side.n, AROUND]
+        _change(bodies, side.n, side.i, sign * impulse, r)
+        if counts(control.ranks, side.n):
+            torque = sign * r * impulse / control.step[0].kick
+            add_to(control.totals, held.torque[side.field] + 1, torque)
+            if slot:
+                add_to(control.totals, slot - 1, -torque)
+
+
+def _change(bodies, n, i, impulse, r):
+    held, _, nodes = bodies
+    if held.prescribed[n, AROUND] == 0:
+        held.change[i, AROUND] += impulse * r / field(nodes.fields, SumsAround)[n, 0]
+
+
+@contact.stay_around.on(Twisted)
+def _stay_around_twisted(kin, bodies, pair, i, j, share):
+    held, _, nodes = bodies
+    speed, yields, _ = contact.around_of(kin, held, nodes, pair, True)
+    if yields > 0:
+        r = _radius(nodes, pair.n, pair.m)
+        _change(bodies, pair.n, i, -share * speed / yields, r)
+        _change(bodies, pair.m, j, share * speed / yields, r)
+
+
+@contact.turn.on(Twisted)
+def _turn_twisted(kin, nodes, n, change, i, again):
+    if again:
+        field(nodes.fields, AngularVelocity)[n, 0] += change[i, AROUND]
+    else:
+        for k in range(2):
+            field(nodes.fields, UpdateAround)[n, k] += change[i, AROUND]
