@@ -313,8 +313,13 @@ def test_processes_and_restarts_have_the_same_bits(state_interpreted, run_interp
     [
         (("axisymmetric(true", "axisymmetric(false"), "only a body of revolution can twist"),
         (("dimension(2, 0, 2, 0, 2,", "dimension(3, 0, 2, 0, 2, 0, 2,"), "two dimensions"),
-        (("AFLIP, quadratic-spline, 0.99)\n    scheme(musl", "FLIP, linear, 1)\n    set_dt(1)\n"
-          "    scheme(newmark"), "has no inertia of rotation around an axis"),
+        (
+            (
+                "AFLIP, quadratic-spline, 0.99)\n    scheme(musl",
+                "FLIP, linear, 1)\n    set_dt(1)\n    scheme(newmark",
+            ),
+            "has no inertia of rotation around an axis",
+        ),
         (
             (
                 "method(ulmpm, AFLIP, quadratic-spline, 0.99)\n    scheme(musl)",

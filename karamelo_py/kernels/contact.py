@@ -113,12 +113,12 @@ def take_around(kin, bodies, control, sides, impulse):
 
 
 @point_function(otherwise=True)
-def stay_around(kin, bodies, pair, i, j, share):
+def stay_around(kin, bodies, pair, sides, share):
     """Change the angular velocities that deform, so that a pair sticks."""
 
 
 @point_function(otherwise=True)
-def turn(kin, nodes, n, change, i, again):
+def turn(kin, nodes, n, change, again):
     """Add a field's change to its angular velocity; `again`: to the one that deforms."""
 
 
@@ -567,6 +567,7 @@ def _touch_pair(bodies, control, i, j, where):
 @noinline
 def _touch_place(bodies, control, count, where):
     contact, kin, nodes = bodies
+    last = len(kin.Unknown._fields) - 1
     contact.partners[:count] = 1  # a single pair checks its approach itself
     for _ in range(REPEATS if count > 2 else 1):
         if count > 2 and not _count_partners(where, bodies, where.node, count):
@@ -580,7 +581,7 @@ def _touch_place(bodies, control, count, where):
             for k in range(kin.dimension):
                 nodes.update[n, k] += contact.change[i, k]
                 nodes.update[n, of_change(kin) + k] += contact.change[i, k]
-            turn(kin, nodes, n, contact.change, i, False)
+            turn(kin, nodes, n, contact.change[i, last], False)
 
 
 @noinline
@@ -704,12 +705,13 @@ def _stay_pair(bodies, i, j, pair, sticks):
             if not _immovable(contact, pair.m, k):
                 contact.change[j, k] += impulse * pair.per_m
     if sticks:
-        stay_around(kin, bodies, pair, i, j, share)
+        stay_around(kin, bodies, pair, (i, j), share)
 
 
 @noinline
 def _stay_place(bodies, node, count, step):
     contact, kin, nodes = bodies
+    last = len(kin.Unknown._fields) - 1
     if not _count_partners(Touched(step), bodies, node, count):
         return
     for _ in range(REPEATS if count > 2 else 1):
@@ -725,7 +727,7 @@ def _stay_place(bodies, node, count, step):
             n = _node(contact, node, i)
             for k in range(kin.dimension):
                 nodes.velocity[n, k] += contact.change[i, k]
-            turn(kin, nodes, n, contact.change, i, True)
+            turn(kin, nodes, n, contact.change[i, last], True)
 
 
 @noinline

@@ -57,19 +57,19 @@ def _change(bodies, n, i, impulse, r):
 
 
 @contact.stay_around.on(Twisted)
-def _stay_around_twisted(kin, bodies, pair, i, j, share):
+def _stay_around_twisted(kin, bodies, pair, sides, share):
     held, _, nodes = bodies
     speed, yields, _ = contact.around_of(kin, held, nodes, pair, True)
     if yields > 0:
         r = _radius(nodes, pair.n, pair.m)
-        _change(bodies, pair.n, i, -share * speed / yields, r)
-        _change(bodies, pair.m, j, share * speed / yields, r)
+        _change(bodies, pair.n, sides[0], -share * speed / yields, r)
+        _change(bodies, pair.m, sides[1], share * speed / yields, r)
 
 
 @contact.turn.on(Twisted)
-def _turn_twisted(kin, nodes, n, change, i, again):
+def _turn_twisted(kin, nodes, n, change, again):
     if again:
-        field(nodes.fields, AngularVelocity)[n, 0] += change[i, AROUND]
+        field(nodes.fields, AngularVelocity)[n, 0] += change
     else:
         for k in range(2):
-            field(nodes.fields, UpdateAround)[n, k] += change[i, AROUND]
+            field(nodes.fields, UpdateAround)[n, k] += change

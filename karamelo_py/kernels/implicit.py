@@ -206,16 +206,22 @@ def add_force(kin, start, stress, slopes):
     return start + stress.dot(slopes)
 
 
-def nominal_stress(law, kin, state, H, dt, r=()):
+class Displaced(NamedTuple):
+    H: tuple
+    r: object = ()  # radius
+
+
+def nominal_stress(law, kin, state, trial, dt):
     """Return P per reference volume, relative to the positions before the step."""
+    H, r = trial
     dl = increment_of(kin, H, r)
     after = advance(law, kin, state, large(dl) if by_rates(law) else dl, dt)
     return conjugate(kin, kirchhoff_stress(law, kin, after).nominal(I + dl), H, r)
 
 
-def stress_and_tangent(law, kin, state, H, dt, r=()):
-    P = nominal_stress(law, kin, state, seeded(H), dt, r)
-    return P._make([x.value for x in P]), tuple([slopes_of(x, len(H)) for x in P])
+def stress_and_tangent(law, kin, state, trial, dt):
+    P = nominal_stress(law, kin, state, Displaced(seeded(trial.H), trial.r), dt)
+    return P._make([x.value for x in P]), tuple([slopes_of(x, len(trial.H)) for x in P])
 
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
@@ -231,8 +237,8 @@ def respond(matter, dt, response, chunk):
     for q in range(points_of(points.mass.size, chunk), end, lanes.width):
         p = points_from(lanes, q, end)
         law, state, H, volume = strained_point(matter, response, p)
-        r = radius_of(kin, points, p)
-        store(response.stress, p, volume * nominal_stress(law, kin, state, H, dt, r))
+        trial = Displaced(H, radius_of(kin, points, p))
+        store(response.stress, p, volume * nominal_stress(law, kin, state, trial, dt))
 
 
 @by_threads
@@ -245,8 +251,8 @@ def respond_to_changes(matter, dt, response, tangent, chunk):
     for q in range(points_of(count, chunk), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
         law, state, H, volume = strained_point(matter, response, p)
-        r = radius_of(kin, points, p)
-        _, slopes = stress_and_tangent(law, kin, state, H, dt, r)
+        trial = Displaced(H, radius_of(kin, points, p))
+        _, slopes = stress_and_tangent(law, kin, state, trial, dt)
         columns = points_from(lanes, q, last)
         store(tangent.values, columns, tuple([volume * s for row in slopes for s in row]))
 

@@ -26,6 +26,7 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.implicit import (
     PARTS,
+    Displaced,
     add_force,
     conjugate,
     gradient_at,
@@ -82,9 +83,9 @@ def grow(matter, response, averages, chunk):
         store(averages.cofactors, p, volume * cofactors(A))
 
 
-def averaged_stress(law, kin, state, change, dt, r):
+def averaged_stress(law, kin, state, change, dt):
     """Return P and q per reference volume after an increment H, with averaged volume ratio."""
-    H, ratio = change
+    (H, r), ratio = change
     strain = increment_of(kin, H, r)
     A = I + strain
     dl = scaled_increment(Updated(), kin, strain, (), ratio / det(A))
@@ -109,8 +110,8 @@ def respond_averaged(matter, dt, response, averages, chunk):
         law, state, H, volume = strained_point(matter, response, p)
         (ratio,) = load(averages.ratio, p, (volume,))
         *by_H, by_ratio = seeded((*H, ratio))
-        change, r = (tensor(kin, by_H), by_ratio), radius_of(kin, points, p)
-        P, pressure = averaged_stress(law, kin, state, change, dt, r)
+        trial = Displaced(tensor(kin, by_H), radius_of(kin, points, p))
+        P, pressure = averaged_stress(law, kin, state, (trial, by_ratio), dt)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))
         store(averages.tangent, p, tuple([volume * s for row in slopes for s in row[:t]]))

@@ -19,7 +19,7 @@ def revolved(
 ) -> list[np.ndarray]:
     """Return columns (n,) of a copy at an angle from x to z, in 3D.
 
-    `column` gives those of the half plane. Positions and tensors also rotate by the column twist,
+    `column` gives the columns of the half plane. Positions and tensors also rotate by twist,
     reference positions do not.
     """
     made: dict[str, np.ndarray] = {}

@@ -396,7 +396,8 @@ def lower_points(
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
-    elastic = laws.elastic_law(used)
+    # A law that hides the F of the one within has none.
+    elastic = laws.elastic_law(used) if laws.deformation.defined(type(used)) else used
     stored = [kind for kind in kinds if kind.needed(elastic)]
     points = arrays.Points(
         x=x, home=None if method.frame.moves else places,
