@@ -206,7 +206,7 @@ def add_force(kin, start, stress, slopes):
     return start + stress.dot(slopes)
 
 
-class Displaced(NamedTuple):
+class IncrementAt(NamedTuple):
     H: tuple
     r: object = ()  # radius
 
@@ -220,7 +220,7 @@ def nominal_stress(law, kin, state, trial, dt):
 
 
 def stress_and_tangent(law, kin, state, trial, dt):
-    P = nominal_stress(law, kin, state, Displaced(seeded(trial.H), trial.r), dt)
+    P = nominal_stress(law, kin, state, IncrementAt(seeded(trial.H), trial.r), dt)
     return P._make([x.value for x in P]), tuple([slopes_of(x, len(trial.H)) for x in P])
 
 
@@ -237,7 +237,7 @@ def respond(matter, dt, response, chunk):
     for q in range(points_of(points.mass.size, chunk), end, lanes.width):
         p = points_from(lanes, q, end)
         law, state, H, volume = strained_point(matter, response, p)
-        trial = Displaced(H, radius_of(kin, points, p))
+        trial = IncrementAt(H, radius_of(kin, points, p))
         store(response.stress, p, volume * nominal_stress(law, kin, state, trial, dt))
 
 
@@ -251,7 +251,7 @@ def respond_to_changes(matter, dt, response, tangent, chunk):
     for q in range(points_of(count, chunk), last, lanes.width):
         p = points_from(lanes, first + q, first + last)
         law, state, H, volume = strained_point(matter, response, p)
-        trial = Displaced(H, radius_of(kin, points, p))
+        trial = IncrementAt(H, radius_of(kin, points, p))
         _, slopes = stress_and_tangent(law, kin, state, trial, dt)
         columns = points_from(lanes, q, last)
         store(tangent.values, columns, tuple([volume * s for row in slopes for s in row]))

@@ -26,7 +26,7 @@ from karamelo_py.compiler.threads import by_threads
 from karamelo_py.kernels.arrays import Block
 from karamelo_py.kernels.implicit import (
     PARTS,
-    Displaced,
+    IncrementAt,
     add_force,
     conjugate,
     gradient_at,
@@ -110,7 +110,7 @@ def respond_averaged(matter, dt, response, averages, chunk):
         law, state, H, volume = strained_point(matter, response, p)
         (ratio,) = load(averages.ratio, p, (volume,))
         *by_H, by_ratio = seeded((*H, ratio))
-        trial = Displaced(tensor(kin, by_H), radius_of(kin, points, p))
+        trial = IncrementAt(tensor(kin, by_H), radius_of(kin, points, p))
         P, pressure = averaged_stress(law, kin, state, (trial, by_ratio), dt)
         slopes = [slopes_of(x, t + 1) for x in P]
         store(response.stress, p, volume * value_of(P))

@@ -7,7 +7,7 @@ from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.fields import declared
 from karamelo_py.compiler.slopes import NoSlope
 from karamelo_py.kernels.arrays import Tag
-from karamelo_py.kernels.implicit import Displaced, stress_and_tangent
+from karamelo_py.kernels.implicit import IncrementAt, stress_and_tangent
 from karamelo_py.language import registry
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.laws import initial_state
@@ -133,7 +133,7 @@ def _bears_shear(law: Tag, kin: Tag) -> bool:
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
     state = initial_state(law, kin, 1.0)
-    _, C = on_numbers(stress_and_tangent)(law, kin, state, Displaced(rest, 1.0), RELAXED)
+    _, C = on_numbers(stress_and_tangent)(law, kin, state, IncrementAt(rest, 1.0), RELAXED)
     if kin.dimension == 1:
         return True
     shear = places.index((0, 1))

@@ -317,7 +317,7 @@ class Equations:
             points = block.points
             for k in np.unique(points.material):
                 law = record(block.laws, k)
-                trial = loops.Displaced(kin.Tensor._make([0.0] * len(places)), 1.0)
+                trial = loops.IncrementAt(kin.Tensor._make([0.0] * len(places)), 1.0)
                 state = initial_state(law, kin, 1.0)
                 _, C = on_numbers(loops.stress_and_tangent)(law, kin, state, trial, 1.0)
                 one = C[0][0] if self.d == 1 else 1.3 * (C[0][0] - C[0][places.index((1, 1))])
