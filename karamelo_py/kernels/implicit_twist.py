@@ -8,7 +8,6 @@ r' P_32.
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import implicit
 from karamelo_py.kernels.equations.twist import RadiusAfterMove
-from karamelo_py.points.kinematics import Space
 from karamelo_py.points.kinematics.twist import Twisted, gradient_around
 
 
@@ -38,4 +37,4 @@ def _conjugate_twisted(kin, P, H, r):
 def _add_force_twisted(kin, start, stress, slopes):
     force = stress.dot(slopes)
     torque = stress[5] * slopes[0] + stress[6] * slopes[1]
-    return Space.Vector(start[0] + force[0], start[1] + force[1], start[2] + torque)
+    return start._make([start[0] + force[0], start[1] + force[1], start[2] + torque])

@@ -171,10 +171,11 @@ class OfPoints:
     def tables(self) -> Iterator[TableRows]:
         for fields in self.hub.fields.pieces(to_first=self.to_first):
             ids, types = (fields.particle(name).astype(np.int64) for name in ("id", "type"))
-            if self.copies is None:
+            copies = self.copies or 0
+            if not copies:
                 yield TableRows(ids, types, [fields.particle(name) for name in self.columns])
-            for k in range(self.copies or 0):
-                columns = revolved(self.columns, fields.particle, 2 * np.pi * k / self.copies)
+            for k in range(copies):
+                columns = revolved(self.columns, fields.particle, 2 * np.pi * k / copies)
                 yield TableRows(ids + k * len(self.hub.fields.present), types, columns)
 
 
