@@ -18,6 +18,7 @@ from karamelo_py.advice import energy
 from karamelo_py.points.kinematics import Axisymmetric
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.energy import unknown_work
+from karamelo_py.styles.fixes.rigid_body import contacts_of
 
 ROOT = Path(__file__).parent.parent
 INPUTS, PAGE = ROOT / "inputs", ROOT / "docs" / "balance.md"
@@ -70,7 +71,12 @@ def outer_forces(hub: Any) -> dict[str, float]:
         if {"x", "y", "z"} <= set(fix.published) and not fix.solids and fix.hooks()
         if not (fix.leads_points and any(map(fix.group.touches, rigid)))
     }
-    return names | {f"ContactForce_{solid.id}": -1.0 for solid in rigid}
+    for solid in rigid:
+        if f"ContactForce_{solid.id}_x" in hub.values:
+            names[f"ContactForce_{solid.id}"] = -1.0
+        else:
+            names |= {touch.id: 1.0 for touch in contacts_of(hub) if touch.touches is solid}
+    return names
 
 
 def run(sim: Simulation, script: Path, full: bool) -> None:

@@ -68,6 +68,8 @@ WAYS = {
     "led tool": ("contact/friction, box, mate, 0.3", "box", LED, GRID),
     "free body": ("contact/friction, box, mate, 0.3", "box", FREE, GRID),
     "surface of a body": ("contact/rigid_body, all, mate, 0.3", "box", FREE),
+    "body at a wall": (
+        "velocity_nodes, left, 0, NULL)\nfix(v, contact/rigid_body, all, mate, 0.3", "w, box", FREE),
 }  # fmt: skip
 
 

@@ -12,7 +12,6 @@ ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 # What a row calls missing: styles that would end it, as (family, part of a name).
 STYLES = {
     "pores that are partly": [("command", "unsaturated"), ("fix", "suction")],
-    "rigid bodies": [("fix", "hinge"), ("fix", "contact/rigid_rigid"), ("fix", "rigid/")],
     "cracks in laminae": [("damage", "cohesive"), ("fix", "cohesive")],
     "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],

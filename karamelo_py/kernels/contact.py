@@ -80,6 +80,7 @@ class SeparateFields(NamedTuple):
     reactions: np.ndarray  # number of such slots, then the slots; negative of a torque
     forces: np.ndarray  # number of slots of forces and torques, then the slots
     rigid: np.ndarray  # (F,) bool: contact does not move the field
+    free: np.ndarray  # (F,) bool: a rigid one that fix rigid_body moves
     torque: np.ndarray  # (F,) slot of the torque on each field
     torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
     memory: np.ndarray  # (F,) steps that a contact is remembered: MEMORY if shapeless, else 1
@@ -505,6 +506,16 @@ def _before(kin, nodes, n, per_mass):
 
 
 @noinline
+def _work_on(bodies, n, k, impulse, per_mass):
+    """Work of a rigid body's impulse, with the mean of a node's velocities in the step."""
+    _, kin, nodes = bodies
+    if _immovable(bodies.contact, n, k):
+        return 0.0
+    before = per_mass * nodes.sums[n, of_momentum(kin) + k]
+    return impulse * 0.5 * (before + nodes.update[n, k] + impulse * per_mass)
+
+
+@noinline
 def _touch_pair(bodies, control, i, j, where):
     contact, kin, nodes = bodies
     share = _share(contact, i, j)
@@ -539,7 +550,9 @@ def _touch_pair(bodies, control, i, j, where):
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    work = -heat  # remaining work of rigid bodies
+    # Of a free body the work is what the other one takes: what collisions lose is lost outside.
+    free = contact.free[a] != contact.free[b]
+    work = 0.0 if free else -heat  # remaining work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
     if rub > 0:
         for speed in around[:1]:
@@ -550,9 +563,12 @@ def _touch_pair(bodies, control, i, j, where):
             impulse += rub * slide[k]
         _take(contact, control, first, k, -impulse)
         _take(contact, control, second, k, impulse)
-        if contact.rigid[a] and not _immovable(contact, m, k):
+        if free:
+            work += _work_on(bodies, m, k, impulse, pair.per_m) if contact.free[a] else 0.0
+            work += _work_on(bodies, n, k, -impulse, pair.per_n) if contact.free[b] else 0.0
+        elif contact.rigid[a] and not _immovable(contact, m, k):
             work += impulse * nodes.update[n, k]
-        if contact.rigid[b] and not _immovable(contact, n, k):
+        elif contact.rigid[b] and not _immovable(contact, n, k):
             work -= impulse * nodes.update[m, k]
         for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
             if slot >= 0 and counts(control.ranks, n):

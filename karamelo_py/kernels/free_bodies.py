@@ -119,6 +119,17 @@ def _list_points(body, surface, s, block, number):
 
 
 @noinline
+def _hold(s, slot, x, c, force):
+    """Add a component of a force to the reaction of the fix that holds a node at `x`."""
+    values, turning = s.control.values, s.bodies.torques[slot]
+    values[slot + c] += force
+    if turning:
+        i, j = (c + 1) % 3, (c + 2) % 3
+        values[turning + i] += (x[j] if j < s.kin.dimension else 0.0) * force
+        values[turning + j] -= (x[i] if i < s.kin.dimension else 0.0) * force
+
+
+@noinline
 def _give_to_points(body, s, block, number, measures):
     """Add the impulses of contacts to the nodes of a block's points, or sum their work."""
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
@@ -132,8 +143,10 @@ def _give_to_points(body, s, block, number, measures):
         for node in range(support(s.basis, kin)):
             n, weight, _ = entry(s.basis, kin, grid, stencil, node)
             for c in range(d):
-                if nodes.sums[n, arrays.MASS] > 0 and not s.bodies.held[n, c]:
-                    impulse = weight * contact.impulse[c]
+                impulse, held = weight * contact.impulse[c], s.bodies.held[n, c]
+                if held and measures:
+                    _hold(s, held - 1, node_position(grid, n), c, -impulse / kick)
+                elif nodes.sums[n, arrays.MASS] > 0 and not held:
                     change = arrays.of_change(kin) + c
                     if measures:
                         # The mean of the velocities before and after the step, as for loads.
@@ -300,10 +313,7 @@ def _part(s):
         else:
             for number, block in enumerate(s.blocks):
                 _give_to_points(body, s, block, number, True)
-        change = motion.finish_step(body, s.control, s.kin.dimension)
-        if isinstance(s.contact, SeparateFields):
-            # Contact took the velocity at the end of the step, not the mean of both ends.
-            add_to(s.control.totals, WORK, -0.5 * change)
+        motion.finish_step(body, s.control, s.kin.dimension)
         energy += motion.kinetic_energy(body)
     s.control.energy[0].of_bodies = energy
 
@@ -328,7 +338,8 @@ class FreeBodies(NamedTuple):
     """Bodies, and rows before and after contact, and around the velocity that deforms points."""
 
     bodies: tuple[motion.FreeBody, ...]
-    held: np.ndarray  # (N, d) bool: nodes whose velocity is prescribed
+    held: np.ndarray  # (N, d) 1 + slot of the reaction where the velocity is prescribed, else 0
+    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
     links: rigid_links.NoLinks | rigid_links.Links
     rows_first = (Once(_meet),)
     rows_last = Once(_part), each_point(_lead_point, Rigid)

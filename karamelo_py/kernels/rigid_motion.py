@@ -470,11 +470,7 @@ def _velocities_of(body, momentum):
 
 @noinline
 def finish_step(body, control, dimension):
-    """Set the momentum after contact, move the body, and publish its values.
-
-    Return the sum of impulses on other bodies (`Solution.total`, about the centre) times the change
-    of this body's velocity.
-    """
+    """Set the momentum after contact, move the body, and publish its values."""
     state, work, values = body.state[0], body.solution, control.values
     kick, dt, total = control.step[0].kick, values[DT], work.total
     for k in range(3):
@@ -483,9 +479,8 @@ def finish_step(body, control, dimension):
     for a in range(6):
         work.after[a], work.given[a] = work.momentum[a] - total[a], 0.0
     _velocities_of(body, work.after)
-    u, M, old, partly, change = work.u, work.mass, work.slope, False, 0.0
+    u, M, old, partly = work.u, work.mass, work.slope, False
     for k in range(3):
-        change += total[k] * (u[k] - state.v[k]) + total[3 + k] * (u[3 + k] - state.spin[k])
         state.v[k], state.spin[k] = u[k], u[3 + k]
         state.move[k] = u[k]
         state.momentum[k] = M[3 + k, 3] * u[3] + M[3 + k, 4] * u[4] + M[3 + k, 5] * u[5]
@@ -513,7 +508,6 @@ def finish_step(body, control, dimension):
         column = body.slots[k, 1]
         about = _about_origin(body, column - NUMBERS) if column >= NUMBERS else body.numbers[column]
         values[body.slots[k, 0]] = about
-    return change
 
 
 @noinline

@@ -35,14 +35,15 @@ def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
     moving = bodies_of(hub)
     _refuse(hub, moving)
     nodes = sum(lattice.node_count for lattice in lattices)
-    fixed = np.zeros((nodes, hub.domain.dimension), np.bool_)
+    fixed = np.zeros((nodes, hub.domain.dimension), np.int32)
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas) if fix.prescribes_velocity else ():
             if formula is not None:
-                fixed[slice(None) if fix.group.all else fix.nodes, k] = True
+                slot = 1 + hub.values.slot(f"{fix.id}_x")
+                fixed[slice(None) if fix.group.all else fix.nodes, k] = slot
     kind = kernel.FreeBodies if hub.update.method.fields_per_solid else kernel.BodiesAtPoints
     bodies = tuple(_body(hub, fix, len(fixed)) for fix in moving)
-    return kind(bodies, fixed, lower_links(hub, moving))
+    return kind(bodies, fixed, hub.values.torques, lower_links(hub, moving))
 
 
 def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:

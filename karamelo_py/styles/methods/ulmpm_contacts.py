@@ -19,7 +19,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice, numbered
-from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.modify import Fix, moved
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_loads
@@ -180,6 +180,7 @@ class ULMPMContacts(Method):
             partners=np.zeros(count, np.int64),
             change=np.zeros((count, unknown)),
             rigid=np.array([can(law, constrained_velocity) for law in laws]),
+            free=np.array([first[k] in moved(hub) for k in range(count)]),
             torque=slots[:, 1].copy(),
             torques=hub.values.torques,
             memory=np.array([MEMORY if flows(law) else 1 for law in laws]),
