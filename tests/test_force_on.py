@@ -69,7 +69,7 @@ WAYS = {
     "free body": ("contact/friction, box, mate, 0.3", "box", FREE, GRID),
     "surface of a body": ("contact/rigid_body, all, mate, 0.3", "box", FREE),
     "body at a wall": (
-        "velocity_nodes, left, 0, NULL)\nfix(v, contact/rigid_body, all, mate, 0.3", "w, box", FREE),
+        "velocity_nodes, left, 0, NULL)\nfix(v, contact/rigid_body, all, mate", "w, box", FREE),
 }  # fmt: skip
 
 
