@@ -174,6 +174,19 @@ def test_the_settlement_of_a_column(folder):
     assert table.u.to_numpy() == pytest.approx(exact.to_numpy(), rel=0.03)
 
 
+@pytest.mark.parametrize(("c", "t"), [(9e3, 0.36), (11.4e3, 0.34), (13e3, 0.31)])
+def test_slopes_slide_where_their_factor_of_safety_is_below_one(run_script, c, t):
+    """F = c/(rho g H sin(b)) + tan(phi)/tan(b), limit equilibrium of an infinite slope.
+
+    The factors are 0.989, 1.004 and 0.978.
+    """
+    log = run_script(INPUTS / "in.infinite_slope", "-var", "c", str(c), "-var", "t", str(t)).log
+    b = np.radians(25)
+    exact = c / (2000 * 9.81 * 5 * np.sin(b)) + t / np.tan(b)
+    assert log["F"][-1] == pytest.approx(exact, rel=1e-6)
+    assert (log["v_x"][-1] > 0.001) == (exact < 1)
+
+
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_each_value_of_another_variable_is_a_sample(folder, capsys):
     """v = a + 2 b: means differ by 2 between b = 0 and 1; nothing is pooled."""
