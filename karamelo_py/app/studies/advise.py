@@ -176,9 +176,11 @@ class Adviser:
         self.choices = choices
         self.accuracy, self.cost, self.target = accuracy, cost, target
 
-    def go_on(self, choice: ChoiceRuns) -> None:
-        choice.rows += self.study.run([self._next(choice)])
-        choice.look(self.study.folder.parent)
+    def go_on(self, *choices: ChoiceRuns) -> None:
+        rows = self.study.run([self._next(choice) for choice in choices])
+        for choice, row in zip(choices, rows, strict=True):
+            choice.rows.append(row)
+            choice.look(self.study.folder.parent)
 
     def _next(self, choice: ChoiceRuns) -> dict[str, str]:
         case = {**choice.values, self.name: self.values[len(choice.rows)]}
@@ -186,9 +188,7 @@ class Adviser:
 
     def pilot(self, count: int) -> None:
         for _ in range(min(count, len(self.values))):
-            for choice in self.choices:
-                if not self._met(choice):
-                    self.go_on(choice)
+            self.go_on(*(choice for choice in self.choices if not self._met(choice)))
         for choice in self.choices:
             while len(choice.rows) < len(self.values) and self.study.knows(self._next(choice)):
                 self.go_on(choice)

@@ -128,7 +128,8 @@ def run(options: Namespace) -> int:
         study.page.judge(chart.judged, COLOURS)
     apart = [name in worded for name in axes] + [False] * (2 - len(axes))
     try:
-        _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart)
+        width = study.elsewhere.size if study.elsewhere else study.jobs
+        _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart, width)
     finally:
         if chart.results:
             records.write(table, chart.rows())
@@ -450,13 +451,15 @@ def explore(
     classify: Callable[[Sequence[Cell]], Sequence[Hashable]],
     stride: int = 6,
     apart: Sequence[bool] = (False, False),
+    width: int = 1,
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
     """Return the classes of the cells that were run, and those inferred for the others.
 
     Cells on a grid about `stride` cells wide are run first. Cells between two of one class in a row
     or column get that class, shortest gaps first; between two classes the middle cell is run,
     longest gaps first. Along an edge, at least one in three cells is run to follow its curve.
-    Islands between runs are missed. Along an axis of words (`apart`), nothing is inferred.
+    Islands between runs are missed. Along an axis of words (`apart`), nothing is inferred. While
+    fewer than `width` cells are due at once, cells of the next rounds are run with them.
     """
     classes: list[Hashable] = []
     plane = np.full(shape, UNKNOWN)
@@ -469,7 +472,14 @@ def explore(
             plane[cell] = classes.index(kind)
         filled = _filled(plane, stride, apart)
         halves = [*_halves(filled, apart)]
-        cells = _spaced(halves or ([] if any(apart) else [*_unproved(plane, filled)]))
+        cells = more = _spaced(halves or ([] if any(apart) else [*_unproved(plane, filled)]))
+        guess = plane.copy()
+        while more and len(cells) < width:
+            for cell in more:
+                guess[cell] = guess.max() + 1  # unlike its neighbours
+            further = _spaced([*_halves(_filled(guess, stride, apart), apart)])
+            more = further[: width - len(cells)]
+            cells = cells + more
     asked = {cell: classes[k] for cell, k in np.ndenumerate(plane) if k != UNKNOWN}
     return asked, {cell: classes[k] for cell, k in np.ndenumerate(filled) if cell not in asked}
 
