@@ -294,6 +294,26 @@ def test_a_map_of_400_cells_takes_about_100_runs(name):
         assert found == int(kind(i / 19, j / 19))
 
 
+@pytest.mark.parametrize("name", EDGES)
+def test_many_workers_take_fewer_rounds(name):
+    """32 workers: the map of one, in at most half the rounds, with at most half as many more runs."""
+    kind, most = EDGES[name]
+    rounds = {1: [], 32: []}
+
+    def classify(cells):
+        rounds[width].append(len(cells))
+        return [int(kind(i / 19, j / 19)) for i, j in cells]
+
+    maps = {}
+    for width in rounds:
+        known, inferred = explore((20, 20), classify, 6, width=width)
+        assert sum(rounds[width]) == len(known)
+        maps[width] = {**known, **inferred}
+    assert maps[1] == maps[32]
+    assert len(rounds[32]) <= (len(rounds[1]) + 1) / 2
+    assert sum(rounds[32]) <= 1.5 * most
+
+
 @pytest.mark.parametrize("width", [4, 5])
 def test_islands_between_runs_are_not_seen(width):
     """Strips of 4 cells pass between the first cells (0, 5, 10, 14, 19) with no run; 5 do not."""
