@@ -296,7 +296,7 @@ def test_a_map_of_400_cells_takes_about_100_runs(name):
 
 @pytest.mark.parametrize("name", EDGES)
 def test_many_workers_take_fewer_rounds(name):
-    """32 workers: the map of one, in at most half the rounds, with at most half as many more runs."""
+    """The map of one worker, in at most half the rounds, with at most half as many more runs."""
     kind, most = EDGES[name]
     rounds = {1: [], 32: []}
 
