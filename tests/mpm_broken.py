@@ -67,20 +67,20 @@ class Group(Fix):
         self.formulas = (Expression(1.0),)
 
 
-def uncompilable(mass, v, x_old, x, value, before, dt, kick):
-    return v * len(f"{value:.3e}"), x, 0.0
+def uncompilable(pt):
+    return pt.v * len(f"{pt.value:.3e}"), pt.x, 0.0
 
 
-def at_point(mass, v, x_old, x, value, before, dt, kick):
-    return v, x, 1.0
+def at_point(pt):
+    return pt.v, pt.x, 1.0
 
 
-def at_node(mass, v, v_star, force, value, before, kick, share):
-    return v, v_star, force, 1.0
+def at_node(node):
+    return node.v, node.v_star, node.force, 1.0
 
 
-def too_few(mass, v, v_star, force, value, before, dt):
-    return v, v_star, force, 0.0
+def too_few():
+    return 0.0, 0.0, 0.0, 0.0
 
 
 def whole(v, values, dt):
@@ -108,9 +108,7 @@ named(
     Cold={"supply_heat": point_hook(at_point)},
     Hot={"initial_integrate": heat_hook(at_point)},
     Many={"post_particles_to_grid": node_hook(too_few)},
-    Few={
-        "initial_integrate": point_hook(lambda mass, v, x_old, x, value, before, dt, kick: (v, x))
-    },
+    Few={"initial_integrate": point_hook(lambda pt: (pt.v, pt.x))},
     Wholly={"initial_integrate": vector_hook(whole, reads=V, writes=V)},
     Heavily={"initial_integrate": vector_hook(laid, reads=("weight",), writes=V)},
     Unnamed={"initial_integrate": vector_hook(lambda v, values, dt: v, reads=V, writes=V)},

@@ -85,7 +85,7 @@ def test_init(hub):
         ("swapped", "final_integrate is a stage of points, but its hook was made for nodes"),
         ("cold", "supply_heat is a stage of heated points, but its hook was made for points"),
         ("hot", "initial_integrate is a stage of points, but its hook was made for heated"),
-        ("many", "post_particles_to_grid: too_few has to take the 8 arguments of a hook on nodes"),
+        ("many", "post_particles_to_grid: too_few has to take the one argument of a hook on nodes"),
         ("few", "initial_integrate: <lambda> has to return 3 numbers, not (1.0, 1.0)"),
         ("heavily",
          "initial_integrate reads 'weight': 'mass', 'velocity', 'position', 'volume', a"),

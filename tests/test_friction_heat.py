@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.linear import LinearConstants
 from karamelo_py.styles.methods.ulmpm_contacts import heat_shares
 
 pytestmark = pytest.mark.xdist_group("friction heat")
@@ -69,8 +69,8 @@ def test_heat_is_the_work_of_friction(run_script, run_interpreted, method, groun
 
 def test_heat_is_shared_by_effusivity():
     """sqrt(kappa rho cp) of steel and glass, 4 : 1 here; all to the one that has a temperature."""
-    steel, glass = (LinearElastic.given(1000, 1e6, 0.3, 500, kappa) for kappa in (16, 1))
-    cold = LinearElastic.given(1000, 1e6, 0.3)
+    steel, glass = (LinearConstants(1000, 1e6, 0.3, 500, kappa).checked() for kappa in (16, 1))
+    cold = LinearConstants(1000, 1e6, 0.3).checked()
     shares = heat_shares([steel, glass, cold], conducting=True)
     assert shares[0] == pytest.approx([0.5, 0.8, 1])
     assert shares[2] == pytest.approx([0, 0, 0.5])

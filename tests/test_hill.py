@@ -25,14 +25,14 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.hill import Hill, of_lankford
-from karamelo_py.points.laws.jointed import Jointed
-from karamelo_py.points.laws.linear import LinearElastic
+from karamelo_py.points.laws.jointed import JointedConstants
+from karamelo_py.points.laws.linear import LinearConstants
 from karamelo_py.points.laws.orthotropic import Orthotropic
 from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic
 from karamelo_py.points.laws.strengths.metals import Swift
 
 E, NU, Y = 200e9, 0.3, 300e6
-STEEL = LinearElastic.given(7850, E, NU)
+STEEL = LinearConstants(7850, E, NU).checked()
 SPRUCE = Orthotropic(7850, E, 0.7 * E, 0.5 * E, 0.3, 0.25, 0.2, 0.3 * E, 0.25 * E, 0.2 * E)
 R = (1.8, 1.2, 2.3)
 SPACE = Space()
@@ -41,7 +41,7 @@ SPACE = Space()
 def sheet(*angles, elastic=STEEL, strength=None, **surface):
     strength = strength or Plastic(STEEL.G, Y)
     part = SimpleNamespace(laws={"strength": strength}, id="hard")
-    return Hill.given(SimpleNamespace(whole=elastic), part, *angles, **surface or {"R": R})
+    return Hill(SimpleNamespace(whole=elastic), part, *angles, **surface or {"R": R}).checked()
 
 
 def full(law, kin, state, function=cauchy_stress):
@@ -265,7 +265,7 @@ def test_surfaces_that_no_sheet_has(run_interpreted, line, says):
 
 
 def rock(angle):
-    return Jointed.given(2700, E, NU, 1e6, 10.0, angle, 90.0, psi=5.0)
+    return JointedConstants(2700, E, NU, 1e6, 10.0, angle, 90.0, psi=5.0).checked()
 
 
 @pytest.mark.parametrize(

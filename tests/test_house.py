@@ -80,16 +80,9 @@ def lambdas() -> int:
 
 
 def long_signatures() -> int:
-    """Functions of kernels and points that take more than five arguments by their places.
-
-    Not ``given`` of a style, whose parameters are the arguments of a script.
-    """
+    """Functions of kernels and points that take more than five arguments by their places."""
     found = nodes(ast.FunctionDef, ast.Lambda)
-    own = (
-        node.args
-        for path, node in found
-        if room_of(path) in ("kernels", "points") and getattr(node, "name", "") != "given"
-    )
+    own = (node.args for path, node in found if room_of(path) in ("kernels", "points"))
     return sum(len(one.posonlyargs) + len(one.args) > 5 for one in own)
 
 

@@ -18,7 +18,7 @@ from karamelo_py.points.laws import (
     initial_state,
     with_stress,
 )
-from karamelo_py.points.laws.jointed import Jointed
+from karamelo_py.points.laws.jointed import JointedConstants
 
 RHO, E, NU, C, PHI = 2700, 20e9, 0.25, 1e6, 30.0
 SPACE = Space()
@@ -26,7 +26,7 @@ SPACE = Space()
 
 def rock(beta, **more):
     """Joints whose normal is at `beta` degrees to y, in the xy plane."""
-    return Jointed.given(RHO, E, NU, C, PHI, beta, 90.0, **more)
+    return JointedConstants(RHO, E, NU, C, PHI, beta, 90.0, **more).checked()
 
 
 def jaeger(beta, s3=0.0, c=C, phi=PHI):
@@ -90,8 +90,8 @@ def test_the_rock_yields_where_the_joints_do_not_slip():
 def test_tractions_stay_within_both_limits(kin):
     """Whatever the step, joints sustain no more, gain no energy, and resist pressure."""
     random = np.random.default_rng(3)
-    law = Jointed.given(RHO, E, NU, C, PHI, 35.0, 90.0 if kin.dimension > 1 else 0.0,
-                        psi=10.0, tension=0.5e6)  # fmt: skip
+    law = JointedConstants(RHO, E, NU, C, PHI, 35.0, 90.0 if kin.dimension > 1 else 0.0,
+                        psi=10.0, tension=0.5e6).checked()  # fmt: skip
     n = np.array([law.nx, law.ny, law.nz])
     for _ in range(40):
         dl = random.normal(0, 2e-4, (3, 3))

@@ -8,10 +8,10 @@ import pytest
 from conftest import INPUTS
 
 from karamelo_py.points.laws.eos import VolumeStep, bulk_modulus, compressed, ignited, pressure
-from karamelo_py.points.laws.eos.fluid import Burning, Jwl
+from karamelo_py.points.laws.eos.fluid import Burning, JwlConstants
 
 RHO, A, B, R1, R2, W, E0, D = 1630, 371.2e9, 3.231e9, 4.15, 0.95, 0.30, 7e9, 6930
-TNT = Jwl.given(RHO, A, B, R1, R2, W, E0, D)["eos"]._replace(cell_size=1e-3)
+TNT = JwlConstants(RHO, A, B, R1, R2, W, E0, D).checked()["eos"]._replace(cell_size=1e-3)
 BURNT = Burning(E0, 1.0)
 
 

@@ -72,7 +72,7 @@ from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
 from karamelo_py.points.laws.strengths.hardening import LinearHardening
 from karamelo_py.points.laws.strengths.linear import Viscous
-from karamelo_py.points.laws.strengths.metals import JohnsonCook, ZerilliArmstrong
+from karamelo_py.points.laws.strengths.metals import JohnsonCookConstants, ZerilliArmstrong
 from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.points.laws.temperatures import PlasticWork
 from karamelo_py.points.laws.viscosity import ArtificialViscosity
@@ -229,7 +229,7 @@ def _advance_in_lanes(law, kin, state, dl, dt, n):
 
 
 COPPER = Shock(1 / 8940, 1.38e11, 1.5, 0.0, 298.0, tension=1e9)
-COOK = JohnsonCook.given(43.9e9, 65e6, 356e6, 0.37, 1.0, 0.02, 1.1, 298.0, 1356.0)
+COOK = JohnsonCookConstants(43.9e9, 65e6, 356e6, 0.37, 1.0, 0.02, 1.1, 298.0, 1356.0).checked()
 WEAR = JohnsonCookDamage(0.002, 0.1, -3.0, 0.014, 1.12, 1.0, 298.0, 1356.0)
 LAWS = [
     LinearElastic(1e-3, 500.0, 400.0),
@@ -246,7 +246,7 @@ LAWS = [
     ),
     EosStrength(
         LinearPressure(1e-3, 1e3),
-        ZerilliArmstrong.given(400.0, 0.1, 1.0, 0.5, 0.003, 1e-4, 0.2, 0.3),
+        ZerilliArmstrong(400.0, 0.1, 1.0, 0.5, 0.003, 1e-4, 0.2, 0.3),
     ),
     EosStrength(
         LinearPressure(1e-3, 1e3),

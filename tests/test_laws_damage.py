@@ -26,7 +26,7 @@ from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths.hardening import Plastic
-from karamelo_py.points.laws.strengths.metals import JohnsonCook
+from karamelo_py.points.laws.strengths.metals import JohnsonCookConstants
 from karamelo_py.points.laws.temperatures import PlasticWork
 
 K, G, Y = 160.0, 80.0, 0.4
@@ -35,7 +35,7 @@ WEAR = JohnsonCookDamage(D1, D2, D3, D4, D5, 1.0, TR, TM)
 HEAT = PlasticWork(0.0, 0.5, 0.0, 0.0, TR, TM)
 INTACT = EosStrength(LinearPressure(0.125, K), Plastic(G, Y))
 BREAKING = INTACT._replace(damage=WEAR)
-COOK = JohnsonCook.given(G, 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, TR, TM)
+COOK = JohnsonCookConstants(G, 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, TR, TM).checked()
 ALL_PARTS = EosStrength(
     Shock(0.125, K, 1.5, 0.05, TR), COOK, damage=WEAR, temperature=HEAT._replace(chi=0.9)
 )

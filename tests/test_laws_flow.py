@@ -29,8 +29,8 @@ HEAT = PlasticWork(0.0, 0.5, 0.0, 0.0, 400.0, 2000.0)  # 400 K, and no work beco
 # ---- Zerilli and Armstrong ----------------------------------------------------------------------
 
 # Constants of their paper for OFHC copper (fcc) and Armco iron (bcc), in GPa.
-COPPER = ZerilliArmstrong.given(G, 0.065, 0, 0.89, 0.0028, 0.000115, 0, 1)
-IRON = ZerilliArmstrong.given(G, 0.065, 1.033, 0, 0.00698, 0.000415, 0.266, 0.289)
+COPPER = ZerilliArmstrong(G, 0.065, 0, 0.89, 0.0028, 0.000115, 0, 1)
+IRON = ZerilliArmstrong(G, 0.065, 1.033, 0, 0.00698, 0.000415, 0.266, 0.289)
 
 
 def published(strength, ep, rate, T):

@@ -42,7 +42,7 @@ from karamelo_py.points.laws.strengths.ceramics import Concrete, JohnsonHolmquis
 from karamelo_py.points.laws.strengths.hardening import Plastic
 from karamelo_py.points.laws.strengths.linear import Elastic
 from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
-from karamelo_py.points.laws.strengths.porous import CrushableFoam, Gurson
+from karamelo_py.points.laws.strengths.porous import CrushableFoam, CrushableFoamConstants, Gurson
 from karamelo_py.points.laws.temperatures import PlasticWork
 
 SPACE = Space()
@@ -229,7 +229,7 @@ def test_crushed_pores_break_concrete():
     assert memory.damage >= np.log(1.1 / alpha) / (0.04 * (p + 0.004) / 0.048)
 
 
-FOAM = CrushableFoam.given(0.4, 1.7e-3, 0.1, 1e-3, 5e-3, 1.8, 4.0)
+FOAM = CrushableFoamConstants(0.4, 1.7e-3, 0.1, 1e-3, 5e-3, 1.8, 4.0).checked()
 
 
 @pytest.mark.parametrize("steps", [1, 50])
@@ -338,7 +338,7 @@ HOT = MieGrueneisen.given(8.94, 3.933, 1.5, 2.0)["eos"]
     ("eos", "strength", "way"),
     [
         (HOT, Gurson(45.0, 0.2, 5e-3, 0.1, 0.05), np.diag([1e-3, 0, 0])),
-        (HOT, CrushableFoam.given(45.0, 0.2, 0.1), np.diag([-1e-3, 0, 0])),
+        (HOT, CrushableFoamConstants(45.0, 0.2, 0.1).checked(), np.diag([-1e-3, 0, 0])),
         (HOT, MohrCoulomb.given(45.0, 0.2, 30.0, 10.0), np.diag([-1e-3, 1.2e-3, 0])),
         (ROCK.eos, Gurson(8.0, 0.2, 5e-3, 0.1, 0.01), np.diag([-5e-4, 0, 0])),
     ],

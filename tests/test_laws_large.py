@@ -11,7 +11,7 @@ from tensors import every_kinematics, flat, rotation
 from comparisons.results import read_log
 from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain, Space, large, sym
 from karamelo_py.points.laws import advance, energy_density, initial_state, jacobian, with_stress
-from karamelo_py.points.laws.cam_clay import CamClay
+from karamelo_py.points.laws.cam_clay import CamClayConstants
 from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.hencky import Hencky
@@ -148,7 +148,7 @@ def test_a_closed_loop_gives_back_its_work():
 
 # --- modified Cam-clay ----------------------------------------------------------------------------
 
-CLAY = CamClay.given(1800.0, 4e6, 1.2, 0.1, 0.02, 100e3)
+CLAY = CamClayConstants(1800.0, 4e6, 1.2, 0.1, 0.02, 100e3).checked()
 UNDRAINED = np.diag([-1.0, 0.5, 0.5])
 
 
@@ -251,7 +251,7 @@ SQUEEZED = """
 def test_clay_in_load_steps(run_interpreted):
     """Oedometer: the force is that of the law at one point, P = tau/F, found in few corrections."""
     log_of = run_interpreted(SQUEEZED).log
-    law = CamClay.given(1.0, 40.0, 1.2, 0.1, 0.02, 1.0, pc=2.0)
+    law = CamClayConstants(1.0, 40.0, 1.2, 0.1, 0.02, 1.0, pc=2.0).checked()
     kin, F = PlaneStrain(), 1.0
     state = initial_state(law, kin, 1.0)
     for step in range(1, 6):

@@ -43,14 +43,14 @@ from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.strengths import initial_memory
 from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic, plastic_increment
-from karamelo_py.points.laws.strengths.metals import JohnsonCook, Swift
+from karamelo_py.points.laws.strengths.metals import JohnsonCook, JohnsonCookConstants, Swift
 from karamelo_py.points.laws.strengths.rates import Mts, Norton, Perzyna, SteinbergGuinan
 from karamelo_py.points.laws.temperatures import PlasticWork
 
 RHO, K, G = 8.0, 160.0, 80.0
 EOS = LinearPressure(1 / RHO, K)
 A, B, N, RATE0, C, M, TR, TM = 0.4, 0.3, 0.3, 1.0, 0.05, 1.1, 300.0, 1300.0
-COOK = JohnsonCook.given(G, A, B, N, RATE0, C, M, TR, TM)
+COOK = JohnsonCookConstants(G, A, B, N, RATE0, C, M, TR, TM).checked()
 HARDENING = LinearHardening(G, 0.4, 2.0)
 SWIFT = Swift(G, 0.4, 0.5, 0.002, 0.5)
 HEAT = PlasticWork(0.9, 0.5, 0.0, 0.0, TR, TM)
@@ -148,7 +148,7 @@ def test_factor_of_the_temperature():
         flow.append(mises(law, kin, state) / static_flow(COOK, ep))
         assert temperature(law, kin, state) == T
     assert flow == pytest.approx([1, 1, 1 - 0.5**M, 0, 0], rel=1e-12, abs=1e-12)
-    assert JohnsonCook.given(G, A, B, N, RATE0, C, 0.0, TR, TM).softening == Absent()
+    assert JohnsonCookConstants(G, A, B, N, RATE0, C, 0.0, TR, TM).checked().softening == Absent()
     never = EosStrength(EOS, COOK._replace(softening=Absent()), temperature=HEAT)
     state = with_temperature(never, kin, start(never, kin), 800.0)
     state = stretched(never, kin, state, isochoric(1e-2), 1, 1e3)
@@ -257,7 +257,7 @@ def test_the_return_finds_the_strain_to_round_off(ep, x, n, plateau):
     What is left are some roundings of the stress, in strain: 2.3 at most of 30 000 random cases.
     """
     if plateau is None:
-        strength = JohnsonCook.given(G, A, B, n, 0.0, 0.0, 0.0, TR, TM)
+        strength = JohnsonCookConstants(G, A, B, n, 0.0, 0.0, 0.0, TR, TM).checked()
     else:
         strength = Swift(G, A, B, plateau, n)
     q = 3 * G * x + static_flow(strength, ep + x)
@@ -340,7 +340,7 @@ def test_single_precision():
 
 def test_strength_of_steinberg_and_guinan():
     """Y0 (1 + beta ep)^n (1 + A p J^(1/3) - B (T - 300)), bounded by Ymax (1980)."""
-    part = SteinbergGuinan.given(48.0, 0.12, 36.0, 0.45, 0.2, 0.028, 3.77e-4, T=400.0)
+    part = SteinbergGuinan(48.0, 0.12, 36.0, 0.45, 0.2, 0.028, 3.77e-4, initial_temperature=400.0)
     law = EosStrength(EOS, part)
     for steps in (20, 1):
         state = stretched(law, Space(), start(law, Space()), np.diag([-0.01, 0, 0]), steps)
@@ -353,7 +353,7 @@ def test_strength_of_steinberg_and_guinan():
 
 def test_shear_modulus_of_steinberg_and_guinan():
     """G = G0 (1 + A p J^(1/3) - B (T - 300)), also in waves, and energy is conserved."""
-    part = SteinbergGuinan.given(48.0, 1.2, 36.0, 0.45, 6.0, 0.028, 3.77e-4, T=400.0)
+    part = SteinbergGuinan(48.0, 1.2, 36.0, 0.45, 6.0, 0.028, 3.77e-4, initial_temperature=400.0)
     law, kin = EosStrength(EOS, part), Space()
     state, work = worked(law, kin, start(law, kin), -1e-3 * np.eye(3), 50)
     p, J = pressure_of(law, kin, state), state.J
@@ -416,7 +416,7 @@ def test_steady_creep_and_flow():
 
 def test_threshold_of_copper():
     """The differential equation of Follansbee & Kocks (1988) at a constant rate."""
-    part = Mts.given(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01)
+    part = Mts(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01)
     law, rate, T = EosStrength(EOS, part), 1e3, 293.0
     state = stretched(law, Space(), start(law, Space()), isochoric(1e-3), 200, 1e-3 / rate)
     ep = plastic_strain(law, Space(), state)
@@ -430,10 +430,10 @@ def test_threshold_of_copper():
 @pytest.mark.parametrize(
     "strength",
     [
-        SteinbergGuinan.given(48.0, 0.12, 36.0, 0.45, 0.64, 0.028),
+        SteinbergGuinan(48.0, 0.12, 36.0, 0.45, 0.64, 0.028),
         Norton.given(G, 0.2, 4.0),
         Perzyna(G, 0.4, 0.5, 0.03, 5.0),
-        Mts.given(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01),
+        Mts(45.8, 0.04, 0.823e-3, 1.6, 1e7, 2 / 3, 1.0, 2.39, 0.9, 0.35, 1e8, 0.01),
     ],
     ids=lambda s: type(s).__name__,
 )

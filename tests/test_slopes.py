@@ -13,7 +13,7 @@ from karamelo_py.compiler import kernel, on_numbers, shared
 from karamelo_py.compiler.slopes import Dual, NoSlope, seeded, slopes_of
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space, large
 from karamelo_py.points.laws import advance, initial_state, kirchhoff_stress
-from karamelo_py.points.laws.cam_clay import CamClay
+from karamelo_py.points.laws.cam_clay import CamClayConstants
 from karamelo_py.points.laws.eos import LinearPressure
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.hencky import Hencky
@@ -23,7 +23,7 @@ from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.parameters import lame_parameters
 from karamelo_py.points.laws.strengths.drucker_prager import DruckerPrager
 from karamelo_py.points.laws.strengths.hardening import LinearHardening, Plastic
-from karamelo_py.points.laws.strengths.metals import JohnsonCook
+from karamelo_py.points.laws.strengths.metals import JohnsonCookConstants
 from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
 
 
@@ -37,19 +37,22 @@ E, NU = 1e6, 0.3
 MODULI = lame_parameters(E, NU)
 K, G = E / 3 / (1 - 2 * NU), E / 2 / (1 + NU)
 EOS = LinearPressure.given(1000.0, K)
+COOK = JohnsonCookConstants(G, 2e4, 3e4, 0.3, 1.0, 0.02, 0.0, 0.0, 1.0).checked()
 LAWS = {
     "linear": (LinearElastic(1e-3, *MODULI), 0.05),
     "neo-hookean": (NeoHookean(1e-3, *MODULI), 0.05),
     "plastic": (EosStrength(EOS, Plastic(G, 2e4)), 0.03),
     "hardening": (EosStrength(EOS, LinearHardening(G, 2e4, 1e5)), 0.03),
     "johnson_cook": (
-        EosStrength(EOS, JohnsonCook.given(G, 2e4, 3e4, 0.3, 1.0, 0.02, 0.0, 0.0, 1.0)),
+        EosStrength(
+            EOS, JohnsonCookConstants(G, 2e4, 3e4, 0.3, 1.0, 0.02, 0.0, 0.0, 1.0).checked()
+        ),
         0.03,
     ),
     "drucker_prager": (EosStrength(EOS, DruckerPrager.given(G, 1e4, 30.0, 10.0)), 0.02),
     "mohr_coulomb": (EosStrength(EOS, MohrCoulomb.given(G, 1e4, 30.0, 10.0)), 0.02),
     "hencky": (Hencky(1e-3, *MODULI), 0.05),
-    "cam-clay": (CamClay.given(1000.0, G, 1.0, 0.1, 0.02, 1e4), 0.01),
+    "cam-clay": (CamClayConstants(1000.0, G, 1.0, 0.1, 0.02, 1e4).checked(), 0.01),
     "logarithmic": (EosStrength(EOS, LinearHardening(G, 2e4, 1e5), strain=Logarithmic()), 0.03),
 }
 LAWS |= {f"{name}, far": (Far(LAWS[name][0]), LAWS[name][1]) for name in ("linear", "hardening")}

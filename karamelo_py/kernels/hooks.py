@@ -3,23 +3,23 @@
 A fix is a formula acting on a group, with a tiny function. The loops choose members, evaluate the
 formula block by block and call the function by address, so only new functions are compiled.
 
-Node function ``(mass, v, v_star, force, value, before, kick, share) -> (v, v_star, force, total)``:
-`value` and `before` are the formula at the step's time and one step earlier; `share` is 1 / number
-of members with mass; `kick` is the time forces act, half of the last step plus half of this one.
+Node function ``(node: OneNode) -> (v, v_star, force, total)``: `value` and `before` are the formula
+at the step's time and one step earlier; `share` is 1 / number of members with mass; `kick` is the
+time forces act, half of the last step plus half of this one.
 Totals are summed and published, plus the momentum over kick that a change of v before the update
 adds to points. Of several hooks that hold a node, the last to set v_star to its value decides, and
 gets the others' totals there. Hooks set v of the deforming velocity if it is mapped separately from
 v_star; before the forces (usf, usavg) the hooks of the update do, and those that hold set it to
 their v_star.
 
-Point function ``(mass, v, x_old, x, value, before, dt, kick) -> (v, x, total)``: `dt` is the time
-of the move, `kick` the time forces act.
+Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time of the move, `kick` the time
+forces act.
 
-Heat function ``(capacity, T, face, supply, value, other, dt) -> (share, supply, T)``, of points
-where heat flows: `value` and `other` are the first and second formula, `face` the point's area,
-`supply` its heat per time, `share` the fraction of the nodal temperature change it takes. The total
-is the heat supplied; for a hook that holds, `other` is the target temperature. Node functions of
-heat see capacity, temperature before and after the step, and heat flow.
+Heat function ``(pt: WarmPoint) -> (share, supply, T)``, of points where heat flows: `value` and
+`other` are the first and second formula, `face` the point's area, `supply` its heat per time,
+`share` the fraction of the nodal temperature change it takes. The total is the heat supplied; for a
+hook that holds, `other` is the target temperature. Node functions of heat see capacity, temperature
+before and after the step, and heat flow, in the order of `OneNode`.
 
 Functions of whole points (:func:`vector_hook`) see vectors, fields and the law's state, and are
 compiled into the loop.
@@ -28,6 +28,7 @@ compiled into the loop.
 import sys
 from collections import namedtuple
 from collections.abc import Callable
+from functools import update_wrapper
 from typing import Any, NamedTuple
 
 from numba import types
@@ -39,6 +40,43 @@ from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Index, Tag
 from karamelo_py.kernels.records import put_at
 from karamelo_py.kernels.views import volume_of
+
+
+class OneNode(NamedTuple):
+    """View of node functions, in one direction."""
+
+    mass: float
+    v: float
+    v_star: float
+    force: float
+    value: float
+    before: float
+    kick: float
+    share: float
+
+
+class OnePoint(NamedTuple):
+    """View of point functions, in one direction."""
+
+    mass: float
+    v: float
+    x_old: float
+    x: float
+    value: float
+    before: float
+    dt: float
+    kick: float
+
+
+class WarmPoint(NamedTuple):
+    capacity: float
+    T: float
+    face: float
+    supply: float
+    value: float
+    other: float
+    dt: float
+
 
 _F8 = types.float64
 NODE_FUNCTION = types.UniTuple(_F8, 4)(*[_F8] * 8)
@@ -104,6 +142,17 @@ ACTS_ON = {
 }
 
 
+def of_numbers(view: type, function: Callable) -> Callable:
+    """Return the function of a `view` as one of numbers, which kernels call by its address."""
+    if not hasattr(function, "__name__"):  # the fix is refused
+        return function
+
+    def of_its_numbers(*numbers):
+        return function(view(*numbers))
+
+    return update_wrapper(of_its_numbers, function)
+
+
 def node_hook(
     function: Callable,
     *,
@@ -113,19 +162,22 @@ def node_hook(
     holds: bool = False,
 ) -> CompiledHook:
     """Make a compiled hook on nodes from a node function (see the module)."""
-    return CompiledHook(function, "nodes", publishes, uses_before, shares, holds)
+    seen = of_numbers(OneNode, function)
+    return CompiledHook(seen, "nodes", publishes, uses_before, shares, holds)
 
 
 def point_hook(
     function: Callable, *, publishes: bool = True, uses_before: bool = False
 ) -> CompiledHook:
     """Make a compiled hook on points from a point function (see the module)."""
-    return CompiledHook(function, "points", publishes, uses_before, False, False)
+    seen = of_numbers(OnePoint, function)
+    return CompiledHook(seen, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
     """Make a compiled hook for ``supply_heat`` from a heat function (see the module)."""
-    return CompiledHook(function, "heated points", publishes, False, False, holds)
+    seen = of_numbers(WarmPoint, function)
+    return CompiledHook(seen, "heated points", publishes, False, False, holds)
 
 
 class Member(NamedTuple):

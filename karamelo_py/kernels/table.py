@@ -433,6 +433,10 @@ def at_nodes_with(kind: type, task: Tag) -> Any:
     return lambda s: (NodeTask(task),) if field(s.nodes.fields, kind) is not None else ()
 
 
+def any_node(s):
+    return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
+
+
 def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
@@ -440,7 +444,7 @@ def light_node(s):
     total frame return all of the node's velocity, which any limit would make grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
-        return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
+        return any_node(s)
     step, motion = s.control.step[0], s.control.motion[0]
     courant = motion.rate * s.control.values[arrays.DT] / step.spacing
     masses = min(s.kin.dimension * courant * courant, 1.0)

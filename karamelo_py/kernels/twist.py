@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import point_function, real
+from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays, contact_twist, hook_loop  # noqa: F401
 from karamelo_py.kernels.clock import kick
@@ -11,7 +11,14 @@ from karamelo_py.kernels.equations import twist
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.table import Company, NodeTask, Processor, companies, take
+from karamelo_py.kernels.table import (
+    Company,
+    NodeTask,
+    Processor,
+    any_node,
+    companies,
+    take,
+)
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.transfers import stores_moment
@@ -53,10 +60,6 @@ def _at_rotation(row, s, step):
     at_rotation(step.hooks, row.stage, row.target, s)
 
 
-def update_to_velocity(s):
-    return nodes.UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
-
-
 AGAIN = AtRotation(arrays.POST_ROTATION_TO_GRID, arrays.ON_VELOCITY)
 
 
@@ -65,7 +68,7 @@ def _task(task: Any) -> NodeTask:
 
 
 HELD = AtRotation(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE)
-LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=update_to_velocity)
+LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=any_node)
 COMPANIES = (
     (MassMomentum, Company(then=(twist.RotationToNodes(),))),
     (InternalForce, Company(then=(twist.Torque(),))),

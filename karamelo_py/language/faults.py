@@ -86,7 +86,7 @@ def place_of(function: Callable) -> str:
 def place_in(code: Any, error: BaseException) -> str:
     """Return the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
     try:
-        source = inspect.getsourcefile(code)
+        source = inspect.getsourcefile(inspect.unwrap(code))
     except TypeError:
         source = None
     places = [*places_of(error)]

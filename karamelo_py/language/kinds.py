@@ -9,7 +9,7 @@ from collections.abc import Callable, Container, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NULL, NUMBER, Argument
@@ -25,6 +25,20 @@ _LARGEST_INTEGER = 2**53  # above, floats skip integers
 def _rounding(value: float) -> float:
     """Tolerance for results such as 0.3/0.1 to count as integers."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
+
+
+@dataclass(frozen=True)
+class Keyword:
+    """Annotation of a field that a script gives as ``name=value``, by default under its own name.
+
+    ``initial_temperature: Annotated[float, Keyword("T")] = 293.0``
+    """
+
+    name: str = ""
+
+
+Of = TypeVar("Of")
+ByName = Annotated[Of, Keyword()]
 
 
 @dataclass(frozen=True)
@@ -352,6 +366,7 @@ class Parameter:
     optional: bool = False
     default: Any = None
     description: str = ""
+    field: str = ""  # of a record, under another name
 
     @property
     def shown(self) -> str:

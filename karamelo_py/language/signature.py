@@ -15,17 +15,20 @@ take any number; keyword-only parameters are written ``name=value``.
 import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cache
 from itertools import chain, repeat
-from typing import Any, Literal, get_type_hints
+from typing import Any, Literal, get_args, get_type_hints
 
 from karamelo_py.language import explain, faults, registry
 from karamelo_py.language.arguments import NULL, Argument, with_gap
 from karamelo_py.language.kinds import (
     AtLeast,
+    ByName,
     Constraint,
     In,
     InputFile,
+    Keyword,
     NonNegative,
     OutputFile,
     Parameter,
@@ -40,11 +43,14 @@ from karamelo_py.language.unknown import renamed
 from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 __all__ = [
-    "Argument", "AtLeast", "Constraint", "In", "InputFile", "NonNegative", "OutputFile",
-    "Parameter", "Positive", "TableFile",
+    "Argument", "AtLeast", "ByName", "Constraint", "In", "InputFile", "Keyword", "NonNegative",
+    "OutputFile", "Parameter", "Positive", "TableFile",
 ]  # fmt: skip
 # Other forms of a command, by its first argument.
 FORMS: dict[Callable, dict[str | None, Callable]] = {}
+
+
+EMPTY, KEYWORD = inspect.Parameter.empty, inspect.Parameter.KEYWORD_ONLY
 
 
 @cache
@@ -57,8 +63,8 @@ def parameters(target: Any) -> list[Parameter]:
     try:
         if record and not hasattr(target, "given"):
             hints = get_type_hints(target, include_extras=True)
-            empty, defaults = inspect.Parameter.empty, target._field_defaults
-            return [_parameter(n, hints[n], defaults.get(n, empty)) for n in target._fields]
+            defaults = target._field_defaults
+            return [_of_field(n, hints[n], defaults.get(n, EMPTY)) for n in target._fields]
         function = target.given if record else target
         listed = [*inspect.signature(function, eval_str=True).parameters.values()]
     except TypeError:
@@ -71,19 +77,26 @@ def parameters(target: Any) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """Return True for a NamedTuple, a tag that needs no hub.
 
-    Its arguments are its fields, or the parameters of its classmethod ``given``. A method
-    ``checked`` returns a replacement.
+    Its arguments are its fields, or the parameters of its classmethod ``given``. Fields annotated
+    with `Keyword` are written ``name=value``. A method ``checked`` returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
 
+def _of_field(field: str, annotation: Any, default: Any) -> Parameter:
+    named = next((one for one in get_args(annotation) if isinstance(one, Keyword)), None)
+    if named is None:
+        return _parameter(field, annotation, default)
+    return replace(_parameter(named.name or field, annotation, default, KEYWORD), field=field)
+
+
 def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Parameter:
-    optional = default is not inspect.Parameter.empty
+    optional = default is not EMPTY
     return Parameter(
         name,
         kind_of(annotation),
         variadic=kind is inspect.Parameter.VAR_POSITIONAL,
-        keyword=kind is inspect.Parameter.KEYWORD_ONLY,
+        keyword=kind is KEYWORD,
         optional=optional,
         default=default if optional else None,
     )
@@ -117,7 +130,7 @@ def call(
                     error.hint = explain.swapped(hub, expected, bound, parameter) or error.hint
                     raise
                 if parameter.keyword:
-                    named[parameter.name] = value
+                    named[parameter.field or parameter.name] = value
                 else:
                     values.append(value)
                 if converted is not None:
@@ -177,7 +190,8 @@ def remade(
             values = values | {word: convert(hub, expected[word], value)}
         several = next((p.name for p in expected.values() if p.variadic), None)
         if several is None:
-            return make(target, hub, name, **values), values
+            fields = {expected[n].field or n: value for n, value in values.items()}
+            return make(target, hub, name, **fields), values
         names = [*expected]
         first = [values[n] for n in names[: names.index(several)]]
         last = {n: values[n] for n in names[names.index(several) + 1 :] if n in values}

@@ -108,11 +108,12 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         if hook.where != acts_on and not (whole and at_own):
             yield f"{moment} is a stage of {acts_on}, but its hook was made for {hook.where}"
         function = hook.function
-        takes = len(hook.reads) + 2 if whole else len(hook.signature.args)
+        takes = len(hook.reads) + 2 if whole else 1
         if misfit(function, takes):
             signature = ", ".join(inspect.signature(function).parameters)
+            many = f"{takes} arguments" if whole else "one argument"
             yield (
-                f"{moment}: {function.__name__} has to take the {takes} arguments of a hook on "
+                f"{moment}: {function.__name__} has to take the {many} of a hook on "
                 f"{hook.where}, not {signature}"
             )
         if whole:
@@ -126,7 +127,7 @@ def _wrong_hooks(fix: Fix) -> Iterator[str]:
         gives = len(hook.signature.return_type)
         with faults.as_script_error(f"fix {fix.style}", moment, function, fix.mark):
             try:
-                result = function(*[1.0] * takes)
+                result = function(*[1.0] * len(hook.signature.args))
             except (ArithmeticError, ValueError):
                 continue
         if not isinstance(result, tuple) or len(result) != gives:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from karamelo_py.kernels import arrays, table
 from karamelo_py.kernels.equations.strain import StrainOfLoadStep
-from karamelo_py.language.signature import Constraint, NonNegative, Positive
+from karamelo_py.language.signature import ByName, Constraint, Keyword, NonNegative, Positive
 from karamelo_py.schemes.traits import IMPLICIT, SchemeTraits
 
 # stages: nodal loads from the present stress, constraints, motion of the points
@@ -75,20 +75,8 @@ class QuasiStatic(NamedTuple):
     close = CLOSE
     rows = (*BEGIN, *HOLD, *CLOSE)
 
-    tolerance: float
-    iterations: int
-    solver: str
-    stabilisation: float
-    limit: str
-
-    @classmethod
-    def given(
-        cls,
-        *,
-        tolerance: Annotated[float, Tolerance] = 1e-10,
-        iterations: Annotated[int, Positive] = 20,
-        solver: Literal["auto", "direct", "amg"] = "auto",
-        stabilisation: Annotated[float, NonNegative] = 1 / 30,
-        limit: Literal["error", "stop"] = "error",
-    ):
-        return cls(tolerance, iterations, solver, stabilisation, limit)
+    tolerance: Annotated[float, Tolerance, Keyword()] = 1e-10
+    iterations: Annotated[int, Positive, Keyword()] = 20
+    solver: ByName[Literal["auto", "direct", "amg"]] = "auto"
+    stabilisation: Annotated[float, NonNegative, Keyword()] = 1 / 30
+    limit: ByName[Literal["error", "stop"]] = "error"

@@ -2,11 +2,10 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler import real
-from karamelo_py.kernels import arrays, table
+from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.node_updates import SquaredMass, UpdateToVelocity
 from karamelo_py.kernels.equations.strain import Strain
-from karamelo_py.kernels.table import NodeTask, light_node
+from karamelo_py.kernels.table import NodeTask, any_node, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
 from karamelo_py.schemes.musl import MUSL
@@ -73,10 +72,6 @@ known_failure(
     "shorter step: bodies gain energy and break within some thousand steps",
     cure="dt_factor({scene.fraction_of_uneven:.2g}), cpgimp or quadratic-spline",
 )
-
-
-def any_node(s):
-    return UpdateToVelocity(real(0, s.nodes.sums[0, arrays.MASS]))
 
 
 class USLUnlimited(NamedTuple):

@@ -150,13 +150,15 @@ def averaged(pt, dl, ratio):
 
 @node_task
 class TakeMean(NamedTuple):
+    of = NodalMean
     goes_through = ("nodal mean", "nodal mean")
 
     def at_node(task, kin, nodes, n, dt):
-        sums = field(nodes.fields, NodalStress if isinstance(task, TakeMeanStress) else NodalMean)
+        sums = field(nodes.fields, task.of)
         if sums[n, 1] > 0:
             sums[n, 0] /= sums[n, 1]
 
 
 class TakeMeanStress(TakeMean):
+    of = NodalStress
     goes_through = ("nodal stress", "nodal stress")

@@ -14,6 +14,7 @@ from karamelo_py.points.kinematics import I, det, large, outer, zero
 
 class Strain(Task):
     not_at_corners = ("moments",)
+    of_last_step = of_load_step = in_move = again = False
     records = "velocity"
     says = "stress"
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
@@ -21,7 +22,7 @@ class Strain(Task):
 
     def empty(task, w, x):
         gradient = zero(w.kin, x[0])
-        if _is_known(task, w):
+        if task.in_move and not isinstance(w.averaging, fbar.FBar):
             gradient = transfers.straining(w.transfer, w.kin, gradient)
         return gradient, fbar.no_ratio(w, x[0])
 
@@ -34,12 +35,12 @@ class Strain(Task):
         if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
         dl = increment_at(w.kin, pt, gradient)
-        if isinstance(task, StrainOfLastStep):
+        if task.of_last_step:
             dl = frames.of_places_before(w.frame, w.kin, dl)
         dl = fbar.averaged(pt, dl, ratio)
         law, old, f = pt.law_state_F
         growth = frames.spatial_increment(w.frame, w.kin, dl, f)
-        load_step = isinstance(task, StrainOfLoadStep) and laws.by_rates(law)
+        load_step = task.of_load_step and laws.by_rates(law)
         strained = large(growth) if load_step else growth  # domains grow by the whole gradient
         extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
         state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
@@ -59,8 +60,11 @@ class Strain(Task):
 class StrainOfLastStep(Strain):
     """`Strain` with the velocity of the last step, at the new positions."""
 
+    of_last_step = True
+
 
 class SecondStrain(Strain):
+    again = True
     records = ""
     says = "second half of the stress"
 
@@ -68,12 +72,14 @@ class SecondStrain(Strain):
 class StrainOfLoadStep(Strain):
     """`Strain` for large rotations (implicit; :func:`~karamelo_py.points.kinematics.large`)."""
 
+    of_load_step = True
     records = ""
 
 
 class StrainInMove(Strain):
     """`Strain` after `Move` in the same visit, perhaps with its gradient."""
 
+    in_move = True
     records = ""
 
 
@@ -92,7 +98,7 @@ class TrialStrain(Strain):
 
     def updated(task, pt, total, totals, fastest):
         dl = increment_at(pt.kin, pt, total)
-        if isinstance(task, TrialStrainOfLastStep):
+        if task.of_last_step:
             dl = frames.of_places_before(pt.w.frame, pt.kin, dl)
         _, _, f = pt.law_state_F
         dl = frames.spatial_increment(pt.w.frame, pt.kin, dl, f)
@@ -101,11 +107,7 @@ class TrialStrain(Strain):
 
 
 class TrialStrainOfLastStep(TrialStrain):
-    pass
-
-
-def _is_known(task, w):
-    return isinstance(task, StrainInMove) and not isinstance(w.averaging, fbar.FBar)
+    of_last_step = True
 
 
 @point_function(otherwise=True)
@@ -131,7 +133,7 @@ def increment_at(kin, pt, grad_v):
 
 def _deform_domain(task, pt, growth):
     w = pt.w
-    x = w.locations.y if isinstance(task, SecondStrain) else w.locations.x
+    x = w.locations.y if task.again else w.locations.x
     before = location_at(w.basis, w.kin, x, pt.p)
     after = deformed(w.basis, w.kin, before, growth)
     store_from(w.locations.y, pt.p, w.kin.dimension, after)

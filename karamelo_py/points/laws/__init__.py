@@ -74,6 +74,29 @@ def _elastic_law_within(law):
     return elastic_law(law.elastic)
 
 
+def answers(law: type, values: dict[Callable, Any]) -> None:
+    """Answer point functions of a law by a field of their last argument, its state, or a constant.
+
+    A text names the field: ``answers(CamClay, {elastic_strain: "e", by_rates: False})``.
+    """
+    for function, value in values.items():
+        function.on(law)(_by_field(value) if isinstance(value, str) else _by_constant(value))
+
+
+def _by_field(name: str) -> Callable:
+    def of_field(*arguments):
+        return getattr(arguments[-1], name)
+
+    return of_field
+
+
+def _by_constant(value: Any) -> Callable:
+    def of_constant(*arguments):
+        return value
+
+    return of_constant
+
+
 def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
     """Decorate the implementation for a law that wraps another, which must have the function."""
 
@@ -120,11 +143,15 @@ def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = N
 _columns: dict[type, dict[str, NamedTuple]] = {}
 
 
-def column(component: type, name: str, source: Callable | NamedTuple) -> None:
-    """Declare an output column by a `number` or a tag of `shown`.
+def column(component: type, name: str, source: Callable | NamedTuple | None = None) -> None:
+    """Declare an output column by a `number` or a tag of `shown`; by default, a field of the state.
 
     Derived classes have it, unless they declare columns themselves.
     """
+    if source is None:
+        source = _by_field(name)
+        source.__name__, source.__module__ = name, component.__module__
+        source = number(source)
     _columns.setdefault(component, {})[name] = source if isinstance(source, tuple) else source.tag
 
 

@@ -51,7 +51,7 @@ class ByEnergy(OfDeformation):
 
 @warmed_elastic.on(ByEnergy)
 def _warmed_elastic_by_energy(law, T):
-    return law._replace(T=T) if hasattr(law, "T") else law
+    return law._replace(T=T) if "T" in law._fields else law
 
 
 class OfInvariants(ByEnergy):

@@ -20,11 +20,11 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.logarithmic import Logarithmic, elastic_trial
-from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.script.errors import ScriptError
 
 
-class CamClay(NamedTuple):
+class CamClayConstants(NamedTuple):
     """Modified Cam-clay with consolidation, an elliptic yield surface and a critical state.
 
     Parameters
@@ -74,29 +74,16 @@ class CamClay(NamedTuple):
     hencky, strength drucker-prager, strength mohr-coulomb, fix initial_stress, fix edge_traction
     """
 
-    in_lanes = True
-    traits = LawTraits(flows=True, rings=False)
+    rho: AboveZero
+    G: AboveZero
+    M: AboveZero
+    lam: AboveZero
+    kappa: AboveZero
+    p0: AboveZero
+    pc: ByName[AboveZero | None] = None
 
-    specific_volume: float
-    G: float
-    M: float
-    lam: float
-    kappa: float
-    p0: float
-    pc: float
-
-    @classmethod
-    def given(
-        cls,
-        rho: AboveZero,
-        G: AboveZero,
-        M: AboveZero,
-        lam: AboveZero,
-        kappa: AboveZero,
-        p0: AboveZero,
-        *,
-        pc: AboveZero | None = None,
-    ):
+    def checked(self):
+        rho, G, M, lam, kappa, p0, pc = self
         if kappa >= lam:
             raise ScriptError(
                 f"swelling is as soft as virgin consolidation: kappa {kappa:g}, lam {lam:g}",
@@ -109,7 +96,20 @@ class CamClay(NamedTuple):
                 argument="pc",
                 expected=f"a pressure of at least p0 = {p0:g}",
             )
-        return cls(1 / rho, G, M, lam, kappa, p0, p0 if pc is None else pc)
+        return CamClay(1 / rho, G, M, lam, kappa, p0, p0 if pc is None else pc)
+
+
+class CamClay(NamedTuple):
+    in_lanes = True
+    traits = LawTraits(flows=True, rings=False)
+
+    specific_volume: float
+    G: float
+    M: float
+    lam: float
+    kappa: float
+    p0: float
+    pc: float
 
 
 class State(NamedTuple):
@@ -246,33 +246,19 @@ def _cauchy_stress_cam_clay(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / state.J
 
 
-@laws.elastic_strain.on(CamClay)
-def _elastic_strain_cam_clay(law, kin, state):
-    return state.e
-
-
-@laws.plastic_strain.on(CamClay)
-def _plastic_strain_cam_clay(law, kin, state):
-    return state.ep
-
-
-@laws.dissipated_energy.on(CamClay)
-def _dissipated_energy_cam_clay(law, kin, state):
-    return state.loss
-
-
-@laws.by_rates.on(CamClay)
-def _by_rates_cam_clay(law):
-    return False
-
-
-@laws.number
-def preconsolidation(law, kin, state):
-    return state.pc
+laws.answers(
+    CamClay,
+    {
+        laws.elastic_strain: "e",
+        laws.plastic_strain: "ep",
+        laws.dissipated_energy: "loss",
+        laws.by_rates: False,
+    },
+)
 
 
 laws.column(CamClay, "ep", laws.plastic_strain)
-laws.column(CamClay, "pc", preconsolidation)
+laws.column(CamClay, "pc")
 laws.column(CamClay, "dissipated", laws.dissipated_energy)
 
 

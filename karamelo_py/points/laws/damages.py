@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import any_lane, point_function, where
 from karamelo_py.compiler.powers import exponential, logarithm
-from karamelo_py.points.laws import column, damage, damage_initiation
+from karamelo_py.points.laws import answers, column, damage, damage_initiation
 from karamelo_py.points.laws.parameters import FromZero, check_temperatures, reference_rate
 from karamelo_py.points.laws.temperatures import homologous
 from karamelo_py.script.errors import ScriptError
@@ -121,9 +121,7 @@ def _initial_damage_johnson_cook_damage(damage, template):
     return Accumulated(0.0)
 
 
-@initiation.on(JohnsonCookDamage)
-def _initiation_johnson_cook_damage(damage, memory):
-    return memory.w
+answers(JohnsonCookDamage, {initiation: "w"})
 
 
 @damage_after.on(JohnsonCookDamage)

@@ -18,6 +18,7 @@ from karamelo_py.points.laws.eos import bulk_modulus
 from karamelo_py.points.laws.eos_strength import EosStrength
 from karamelo_py.points.laws.placed import Placed
 from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
+from karamelo_py.points.laws.temperatures import PlasticWork
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
 
 SLOW = 0.01  # wave speed in m/s or mm/ms if density and modulus are exchanged
@@ -34,7 +35,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     """Yield each implausibility of a law, and the likely intention."""
     if can(law, constrained_velocity):
         return
-    if hasattr(parameter(law, "strength"), "cell_size"):
+    if parameter(parameter(law, "strength"), "cell_size", None) is not None:
         # The cell size is set later, and viscosity damps waves by it.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
@@ -128,7 +129,7 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
 
 def reference_temperatures(law: Any) -> dict[str, float]:
     heat, softening = parameter(law, "temperature"), parameter(law, "strength")
-    if not hasattr(heat, "T0"):
+    if not isinstance(heat, PlasticWork):
         return {}
     temperatures = {"T0 of the temperature": heat.T0}
     for name, component, counts in (
@@ -136,8 +137,9 @@ def reference_temperatures(law: Any) -> dict[str, float]:
         ("Tr of the damage", law.damage, parameter(law.damage, "d5")),
         ("Tr of the eos", law.eos, parameter(law.eos, "thermal")),
     ):
-        if hasattr(component, "Tr") and counts:
-            temperatures[name] = component.Tr
+        Tr = parameter(component, "Tr", None)
+        if Tr is not None and counts:
+            temperatures[name] = Tr
     return temperatures
 
 
@@ -153,7 +155,7 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
         yield from _doubts_of_expansion(
             heat.alpha / (3 * K), f"alpha is 3 K = {3 * K:.3g} times the coefficient of expansion"
         )
-    if hasattr(heat, "chi") and heat.Tm < inf:
+    if isinstance(heat, PlasticWork) and heat.Tm < inf:
         warmer = heat.chi * flow * specific_volume(law) / heat.cp
         if MELTS * warmer > heat.Tm - heat.T0:
             yield (

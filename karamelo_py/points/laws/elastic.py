@@ -17,17 +17,24 @@ class ElasticLaw(NamedTuple):
     lam: float  # Lame's first parameter
     G: float
 
-    @classmethod
-    def given(
-        cls,
-        rho: AboveZero,
-        E: AboveZero,
-        nu: float,
-        cp: AboveZero | None = None,
-        kappa: FromZero | None = None,
-        alpha: float = 0.0,
-    ):
-        return expanding(cls(1 / rho, *lame_parameters(E, nu)), cp, kappa, alpha)
+
+class IsotropicConstants(NamedTuple):
+    law = ElasticLaw
+
+    rho: AboveZero
+    E: AboveZero
+    nu: float
+    cp: AboveZero | None = None
+    kappa: FromZero | None = None
+    alpha: float = 0.0
+
+    def checked(self):
+        return isotropic(self.law, self)
+
+
+def isotropic(law: type, constants: tuple) -> Any:
+    rho, E, nu, *heat = constants
+    return expanding(law(1 / rho, *lame_parameters(E, nu)), *heat)
 
 
 warn_of_locking(ElasticLaw)
@@ -50,14 +57,7 @@ def _initial_state_of_deformation(law, kin, template):
     return State(unit(kin))
 
 
-@laws.by_rates.on(OfDeformation)
-def _by_rates_of_deformation(law):
-    return False
-
-
-@laws.deformation.on(OfDeformation)
-def _deformation_of_deformation(law, kin, state):
-    return state.F
+laws.answers(OfDeformation, {laws.by_rates: False, laws.deformation: "F"})
 
 
 @laws.jacobian.on(OfDeformation)

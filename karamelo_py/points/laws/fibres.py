@@ -139,6 +139,4 @@ for _axis, _letter in enumerate("xyz"):
     laws.column(PlacedFibres, f"fibre2_{_letter}", DirectionShown(3 + _axis))
 
 
-@laws.is_round.on(OfFibres)
-def _is_round_of_fibres(law):
-    return False
+laws.answers(OfFibres, {laws.is_round: False})

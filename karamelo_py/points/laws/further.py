@@ -110,7 +110,7 @@ def last_memory(memories):
 
 
 def has_rate(law: NamedTuple) -> bool:
-    return hasattr(law, "further") and "ep" in laws.columns_of(law)
+    return "further" in law._fields and "ep" in laws.columns_of(law)
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:

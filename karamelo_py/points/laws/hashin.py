@@ -18,7 +18,7 @@ from karamelo_py.points.laws.orthotropic import (
     rotated,
     stress_of,
 )
-from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.points.laws.tsai_hill import (
     COLUMNS,
     DirectionalBase,
@@ -76,18 +76,23 @@ class Hashin(NamedTuple):
     tsai-hill, orthotropic, transverse, fix erosion
     """
 
-    elastic: Any
-    X: float
+    elastic: DirectionalBase
+    X: AboveZero
+    Xc: AboveZero
+    Y: AboveZero
+    Yc: AboveZero
+    S: AboveZero
+    St: AboveZero
+    angle: float = 0.0
+    tilt: float = 0.0
+    spin: float = 0.0
+    residual: ByName[AboveZero] = 0.01
 
     syntax = "elastic, X, Xc, Y, Yc, S, St[, angle][, tilt][, spin][, residual=0.01]"
 
-    @classmethod
-    def given(
-        cls, elastic: DirectionalBase, X: AboveZero, Xc: AboveZero, Y: AboveZero, Yc: AboveZero,
-        S: AboveZero, St: AboveZero, angle: float = 0.0, tilt: float = 0.0, spin: float = 0.0, *,
-        residual: AboveZero = 0.01,
-    ) -> Any:  # fmt: skip
-        if not St > Y / 2:
+    def checked(self):
+        elastic, *strengths, angle, tilt, spin, residual = self
+        if not (St := self.St) > (Y := self.Y) / 2:
             raise ScriptError(
                 f"with Y = {Y:g} and St = {St:g} equal tension across would never break the matrix",
                 argument="St",
@@ -95,10 +100,9 @@ class Hashin(NamedTuple):
             )
         refuse_whole(residual)
         R = axes(angle, tilt, spin)
-        strengths = X, Xc, Y, Yc, S, St, residual
         law = without_axes(elastic.whole)
         cracked, turn = with_cracks(law, R, residual), Turn(*map(float, R.ravel()))
-        return with_axes_of(elastic.whole, BreakingApart(law, cracked, *strengths, turn))
+        return with_axes_of(elastic.whole, BreakingApart(law, cracked, *strengths, residual, turn))
 
 
 def with_cracks(law: Directional, R: np.ndarray, residual: float) -> Directional:
@@ -211,26 +215,7 @@ def _damage_initiation_hashin(law, kin, state):
     )
 
 
-@laws.number
-def fibre_t(law, kin, state):
-    return state.fibre_t
-
-
-@laws.number
-def fibre_c(law, kin, state):
-    return state.fibre_c
-
-
-@laws.number
-def matrix_t(law, kin, state):
-    return state.matrix_t
-
-
-@laws.number
-def matrix_c(law, kin, state):
-    return state.matrix_c
-
-
-_MODES = fibre_t, fibre_c, matrix_t, matrix_c
-for _name, _source in (COLUMNS | {mode.__name__: mode for mode in _MODES}).items():
+for _name, _source in COLUMNS.items():
     laws.column(BreakingApart, _name, _source)
+for _mode in ("fibre_t", "fibre_c", "matrix_t", "matrix_c"):
+    laws.column(BreakingApart, _mode)

@@ -4,10 +4,14 @@ from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner
 from karamelo_py.points.kinematics.principal import logarithm_of
-from karamelo_py.points.laws.elastic import Hyperelastic
+from karamelo_py.points.laws.elastic import Hyperelastic, IsotropicConstants
 
 
 class Hencky(Hyperelastic):
+    __slots__ = ()
+
+
+class HenckyConstants(IsotropicConstants):
     """Elastic solid with stress linear in logarithmic strain, for any strain and rotation.
 
     Parameters
@@ -44,6 +48,7 @@ class Hencky(Hyperelastic):
     """
 
     __slots__ = ()
+    law = Hencky
     scalarised = ("kirchhoff_stress", "elastic_strain")
 
 

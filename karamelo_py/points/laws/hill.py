@@ -38,6 +38,7 @@ from karamelo_py.points.laws.orthotropic import (
     rotated,
 )
 from karamelo_py.points.laws.orthotropic import axes as rotation
+from karamelo_py.points.laws.parameters import ByName
 from karamelo_py.points.laws.strengths import initial_memory
 from karamelo_py.points.laws.strengths.hardening import (
     LinearHardening,
@@ -219,27 +220,19 @@ class Hill(NamedTuple):
     orthotropic, transverse, strength plastic, plane_stress
     """
 
-    elastic: Any
-    strength: Any
+    elastic: ElasticBase
+    strength: Strength
     angle: float = 0.0
     tilt: float = 0.0
     spin: float = 0.0
+    R: ByName[Lankford | None] = None
+    yields: ByName[YieldRatios | None] = None
+    axes: ByName[Axes | None] = None
 
     syntax = "elastic, strength[, angle][, tilt][, spin], R=(R0, R45, R90)"
 
-    @classmethod
-    def given(
-        cls,
-        elastic: ElasticBase,
-        strength: Strength,
-        angle: float = 0.0,
-        tilt: float = 0.0,
-        spin: float = 0.0,
-        *,
-        R: Lankford | None = None,
-        yields: YieldRatios | None = None,
-        axes: Axes | None = None,
-    ):
+    def checked(self):
+        elastic, strength, *angles, R, yields, axes = self
         if (R is None) == (yields is None):
             raise ScriptError(
                 "the yield surface needs either R-values or yield stresses",
@@ -267,7 +260,7 @@ class Hill(NamedTuple):
                 "1/r33^4",
             )
         law = elastic.whole
-        P = turned(surface(constants), rotation(angle, tilt, spin))
+        P = turned(surface(constants), rotation(*angles))
         return oriented(built(law, hard, P), axes)
 
 
@@ -386,9 +379,15 @@ def as_tensor(kin, s):
     return kin.Tensor._make([a[place] for place in kin.Tensor.places])
 
 
-@laws.by_rates.on(YieldingByHill)
-def _by_rates_hill(law):
-    return False
+laws.answers(
+    YieldingByHill,
+    {
+        laws.by_rates: False,
+        laws.deformation: "F",
+        laws.elastic_strain: "e",
+        laws.dissipated_energy: "loss",
+    },
+)
 
 
 def stretching(kin, state, dl, U):
@@ -491,11 +490,6 @@ def _plastic_strain_slopes(law, squares, memory, dt):
     return (total(changes) + by_limit * limit).chain(x, where(yields, -1 / slope, 0))
 
 
-@laws.deformation.on(YieldingByHill)
-def _deformation_hill(law, kin, state):
-    return state.F
-
-
 @laws.jacobian.on(YieldingByHill)
 def _jacobian_hill(law, kin, state):
     return det(state.F)
@@ -515,19 +509,9 @@ def _cauchy_stress_hill(law, kin, state):
     return laws.kirchhoff_stress(law, kin, state) / det(state.F)
 
 
-@laws.elastic_strain.on(YieldingByHill)
-def _elastic_strain_hill(law, kin, state):
-    return state.e
-
-
 @laws.energy_density.on(YieldingByHill)
 def _energy_density_hill(law, kin, state):
     return 0.5 * total([x * x for x in coordinates(law, state.e)])
-
-
-@laws.dissipated_energy.on(YieldingByHill)
-def _dissipated_energy_hill(law, kin, state):
-    return state.loss
 
 
 @laws.plastic_strain.on(YieldingByHill)

@@ -2,7 +2,7 @@
 
 from collections import namedtuple
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
@@ -16,7 +16,7 @@ from karamelo_py.points.laws.by_energy import (
 )
 from karamelo_py.points.laws.fibres import Fibres, OfFibres, PlacedFibre, PlacedFibres
 from karamelo_py.points.laws.formulas import FormulaOf, with_numbers
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.placed import Direction, Vector, nominal, placed
 from karamelo_py.points.laws.thermoelastic import expanding
 from karamelo_py.script.errors import ScriptError
@@ -137,16 +137,11 @@ def of_energy(
     return placed(law, PlacedFibre if fibres[0] is fibres[1] else PlacedFibres, *fibres)
 
 
-def ready(
-    rho: float,
-    formula: str,
-    fibres: Sequence[Vector | Direction] = (),
-    argument: str | None = None,
-    **numbers: float,
-) -> Any:
+def ready(formula: str, argument: str | None = None, *, rho: float, **constants: Any) -> Any:
     """Return the law of a ready formula; `argument` is the one to blame for unstable constants."""
+    fibres = [constants.pop(name) for name in ("fibre", "fibre2") if name in constants]
     try:
-        return of_energy(rho, with_numbers(formula, **numbers), fibres)
+        return of_energy(rho, with_numbers(formula, **constants), fibres)
     except ScriptError as error:
         error.argument = argument
         raise
@@ -156,7 +151,7 @@ VOLUME = "K/2*(J - 1)^2"
 LANGEVIN = "1/2", "1/20", "11/1050", "19/7000", "519/673750"
 
 
-class MooneyRivlin(OfInvariants, Fields):
+class MooneyRivlin(NamedTuple):
     """Rubber of Mooney (1940) and Rivlin (1948), slightly compressible.
 
     Parameters
@@ -181,16 +176,17 @@ class MooneyRivlin(OfInvariants, Fields):
     hyperelastic, yeoh, ogden
     """
 
-    __slots__ = ()
-    syntax = "rho, C10, C01, K"
+    rho: AboveZero
+    C10: float
+    C01: float
+    K: AboveZero
 
-    @classmethod
-    def given(cls, rho: AboveZero, C10: float, C01: float, K: AboveZero) -> Any:
+    def checked(self):
         formula = f"C10*(I1*J^(-2/3) - 3) + C01*(I2*J^(-4/3) - 3) + {VOLUME}"
-        return ready(rho, formula, argument="C10", C10=C10, C01=C01, K=K)
+        return ready(formula, "C10", **self._asdict())
 
 
-class Yeoh(OfInvariants, Fields):
+class Yeoh(NamedTuple):
     """Rubber of Yeoh (1993), slightly compressible: filled rubber that stiffens.
 
     Parameters
@@ -199,8 +195,8 @@ class Yeoh(OfInvariants, Fields):
         Density before deformation.
     K
         Bulk modulus.
-    constants
-        C10, C20 and C30, the last ones optional. The shear modulus is 2 C10.
+    C10, C20, C30
+        Constants of the terms. The shear modulus is 2 C10.
 
     Example
     -------
@@ -215,21 +211,19 @@ class Yeoh(OfInvariants, Fields):
     hyperelastic, mooney-rivlin, gent
     """
 
-    __slots__ = ()
-    syntax = "rho, K, C10[, C20[, C30]]"
+    rho: AboveZero
+    K: AboveZero
+    C10: float
+    C20: float = 0.0
+    C30: float = 0.0
 
-    @classmethod
-    def given(cls, rho: AboveZero, K: AboveZero, *constants: float) -> Any:
-        if not 1 <= len(constants) <= 3:
-            raise ScriptError(
-                "the energy has one to three terms", argument="constants", expected=cls.syntax
-            )
-        numbers = {f"C{k}0": C for k, C in enumerate(constants, 1)}
-        parts = [f"C{k}0*(I1*J^(-2/3) - 3)^{k}" for k in range(1, len(constants) + 1)]
-        return ready(rho, " + ".join([*parts, VOLUME]), argument="constants", K=K, **numbers)
+    def checked(self):
+        count = 3 if self.C30 else 2 if self.C20 else 1
+        parts = [f"C{k}0*(I1*J^(-2/3) - 3)^{k}" for k in range(1, count + 1)]
+        return ready(" + ".join([*parts, VOLUME]), "C10", **self._asdict())
 
 
-class Gent(OfInvariants, Fields):
+class Gent(NamedTuple):
     """Rubber of Gent (1996) with limited chain extension, slightly compressible.
 
     Parameters
@@ -256,16 +250,17 @@ class Gent(OfInvariants, Fields):
     hyperelastic, yeoh, arruda-boyce
     """
 
-    __slots__ = ()
-    syntax = "rho, G, Jm, K"
+    rho: AboveZero
+    G: AboveZero
+    Jm: AboveZero
+    K: AboveZero
 
-    @classmethod
-    def given(cls, rho: AboveZero, G: AboveZero, Jm: AboveZero, K: AboveZero) -> Any:
+    def checked(self):
         formula = f"-G*Jm/2*log(1 - (I1*J^(-2/3) - 3)/Jm) + {VOLUME}"
-        return ready(rho, formula, G=G, Jm=Jm, K=K)
+        return ready(formula, **self._asdict())
 
 
-class ArrudaBoyce(OfInvariants, Fields):
+class ArrudaBoyce(NamedTuple):
     """Rubber as a network of eight chains with limited extension, slightly compressible.
 
     Parameters
@@ -294,24 +289,25 @@ class ArrudaBoyce(OfInvariants, Fields):
     hyperelastic, gent, ogden
     """
 
-    __slots__ = ()
-    syntax = "rho, mu, limit, K"
+    rho: AboveZero
+    mu: AboveZero
+    limit: AboveZero
+    K: AboveZero
 
-    @classmethod
-    def given(cls, rho: AboveZero, mu: AboveZero, limit: AboveZero, K: AboveZero) -> Any:
-        if not limit > 1:
+    def checked(self):
+        if not self.limit > 1:
             raise ScriptError(
-                f"chains straight at a stretch of {limit:g} have no rest",
+                f"chains straight at a stretch of {self.limit:g} have no rest",
                 argument="limit",
                 expected="a stretch above 1",
             )
         terms = [
-            f"{C}/L^{2 * k - 2}*((I1*J^(-2/3))^{k} - 3^{k})" for k, C in enumerate(LANGEVIN, 1)
+            f"{C}/limit^{2 * k - 2}*((I1*J^(-2/3))^{k} - 3^{k})" for k, C in enumerate(LANGEVIN, 1)
         ]
-        return ready(rho, f"mu*({' + '.join(terms)}) + {VOLUME}", mu=mu, L=limit, K=K)
+        return ready(f"mu*({' + '.join(terms)}) + {VOLUME}", **self._asdict())
 
 
-class SaintVenantKirchhoff(OfInvariants, Fields):
+class SaintVenantKirchhoff(NamedTuple):
     """Hooke's law between second Piola-Kirchhoff stress and Green-Lagrange strain.
 
     Parameters
@@ -335,13 +331,13 @@ class SaintVenantKirchhoff(OfInvariants, Fields):
     hyperelastic, hencky, neo-hookean
     """
 
-    __slots__ = ()
-    syntax = "rho, lam, G"
+    rho: AboveZero
+    lam: float
+    G: AboveZero
 
-    @classmethod
-    def given(cls, rho: AboveZero, lam: float, G: AboveZero) -> Any:
+    def checked(self):
         formula = "lam/8*(I1 - 3)^2 + G/4*(I1^2 - 2*I2 - 2*I1 + 3)"
-        return ready(rho, formula, argument="G", lam=lam, G=G)
+        return ready(formula, "G", **self._asdict())
 
 
 class Ogden(OfInvariants, Fields):
@@ -386,10 +382,10 @@ class Ogden(OfInvariants, Fields):
             powers = f"l1^a{k} + l2^a{k} + l3^a{k}"
             parts.append(f"m{k}/a{k}*(({powers})*J^(-a{k}/3) - 3)")
             numbers |= {f"m{k}": mu, f"a{k}": alpha}
-        return ready(rho, " + ".join(parts), argument="pairs", **numbers)
+        return ready(" + ".join(parts), "pairs", rho=rho, **numbers)
 
 
-class Holzapfel(OfFibres, Fields):
+class Holzapfel(NamedTuple):
     """Soft tissue such as arteries, with two families of fibres (Holzapfel, Gasser, Ogden).
 
     Parameters
@@ -424,15 +420,19 @@ class Holzapfel(OfFibres, Fields):
     hyperelastic, transverse
     """
 
-    __slots__ = ()
+    rho: AboveZero
+    G: AboveZero
+    k1: FromZero
+    k2: AboveZero
+    K: AboveZero
+    fibre: ByName[Direction]
+    fibre2: ByName[Direction | None] = None
+
     syntax = "rho, G, k1, k2, K, fibre=(x, y, z)[, fibre2=(x, y, z)]"
 
-    @classmethod
-    def given(
-        cls, rho: AboveZero, G: AboveZero, k1: FromZero, k2: AboveZero, K: AboveZero, *,
-        fibre: Direction, fibre2: Direction | None = None,
-    ) -> Any:  # fmt: skip
+    def checked(self):
+        *_, fibre, fibre2 = self
         families = ("I4", "I6") if fibre2 else ("I4",)
         fibres = [f"exp(k2*max({name} - 1, 0)^2) - 1" for name in families]
         formula = f"G/2*(I1*J^(-2/3) - 3) + {VOLUME} + k1/(2*k2)*({' + '.join(fibres)})"
-        return ready(rho, formula, (fibre, fibre2 or fibre), G=G, k1=k1, k2=k2, K=K)
+        return ready(formula, **self._asdict() | {"fibre2": fibre2 or fibre})

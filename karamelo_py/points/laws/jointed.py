@@ -23,6 +23,7 @@ from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.orthotropic import axes as rotation
 from karamelo_py.points.laws.parameters import (
     AboveZero,
+    ByName,
     FromZero,
     lame_parameters,
     warn_of_locking,
@@ -42,7 +43,7 @@ class RockBetweenJoints(MohrCoulomb):
     __slots__ = ()
 
 
-class Jointed(NamedTuple):
+class JointedConstants(NamedTuple):
     """Rock with one set of parallel joints, on which it slips and opens.
 
     Parameters
@@ -91,38 +92,23 @@ class Jointed(NamedTuple):
     transverse, strength mohr-coulomb, fix initial_stress
     """
 
-    in_lanes = True
+    rho: AboveZero
+    E: AboveZero
+    nu: float
+    cohesion: FromZero
+    phi: FromZero
+    angle: float = 0.0
+    tilt: float = 0.0
+    psi: ByName[FromZero] = 0.0
+    tension: ByName[FromZero] = 0.0
+    matrix_cohesion: ByName[FromZero | None] = None
+    matrix_phi: ByName[FromZero | None] = None
+    matrix_psi: ByName[FromZero | None] = None
+    axes: ByName[Axes | None] = None
 
-    specific_volume: float
-    lam: float
-    G: float
-    cohesion: float
-    friction: float  # tan(phi)
-    dilation: float  # tan(psi)
-    tension: float
-    nx: float  # the normal before deformation
-    ny: float
-    nz: float
-    matrix: Any
-
-    @classmethod
-    def given(
-        cls,
-        rho: AboveZero,
-        E: AboveZero,
-        nu: float,
-        cohesion: FromZero,
-        phi: FromZero,
-        angle: float = 0.0,
-        tilt: float = 0.0,
-        *,
-        psi: FromZero = 0.0,
-        tension: FromZero = 0.0,
-        matrix_cohesion: FromZero | None = None,
-        matrix_phi: FromZero | None = None,
-        matrix_psi: FromZero | None = None,
-        axes: Axes | None = None,
-    ):
+    def checked(self):
+        rho, E, nu, cohesion, phi, *angles, psi, tension = self[:9]
+        matrix_cohesion, matrix_phi, matrix_psi, axes = self[9:]
         if not phi < 90:
             raise ScriptError(
                 f"the friction angle phi = {phi:g} is impossible",
@@ -157,10 +143,26 @@ class Jointed(NamedTuple):
                 argument="matrix_psi",
                 expected="matrix_cohesion=... and matrix_phi=... as well",
             )
-        normal = map(float, rotation(angle, tilt, 0.0)[:, 2])
-        kind = cls if isinstance(matrix, Absent) else YieldingBetween
+        normal = map(float, rotation(*angles, 0.0)[:, 2])
+        kind = Jointed if isinstance(matrix, Absent) else YieldingBetween
         joints = cohesion, friction, tan(radians(psi)), tension
         return oriented(kind(1 / rho, lam, G, *joints, *normal, matrix), axes)
+
+
+class Jointed(NamedTuple):
+    in_lanes = True
+
+    specific_volume: float
+    lam: float
+    G: float
+    cohesion: float
+    friction: float  # tan(phi)
+    dilation: float  # tan(psi)
+    tension: float
+    nx: float  # the normal before deformation
+    ny: float
+    nz: float
+    matrix: Any
 
 
 class YieldingBetween(Jointed):
@@ -202,9 +204,15 @@ def _is_round_jointed(law):
     return max(abs(law.ny), abs(law.nz)) <= ALIGNED
 
 
-@has_short_trials.on(Jointed)
-def _has_short_trials_jointed(law):
-    return True
+laws.answers(
+    Jointed,
+    {
+        has_short_trials: True,
+        laws.deformation: "F",
+        laws.cauchy_stress: "sigma",
+        laws.dissipated_energy: "loss",
+    },
+)
 
 
 @laws.initial_state.on(Jointed)
@@ -306,19 +314,9 @@ def _advance_jointed(law, kin, state, dl, dt):
     return State(F, sigma, state.slip + slip, state.opening + opening, ep, state.loss + work)
 
 
-@laws.deformation.on(Jointed)
-def _deformation_jointed(law, kin, state):
-    return state.F
-
-
 @laws.jacobian.on(Jointed)
 def _jacobian_jointed(law, kin, state):
     return det(state.F)
-
-
-@laws.cauchy_stress.on(Jointed)
-def _cauchy_stress_jointed(law, kin, state):
-    return state.sigma
 
 
 @laws.kirchhoff_stress.on(Jointed)
@@ -346,11 +344,6 @@ def _energy_density_jointed(law, kin, state):
     return 0.5 * det(state.F) * inner(state.sigma, strain_of(law, state.sigma))
 
 
-@laws.dissipated_energy.on(Jointed)
-def _dissipated_energy_jointed(law, kin, state):
-    return state.loss
-
-
 @laws.plastic_strain.on(YieldingBetween)
 def _plastic_strain_jointed(law, kin, state):
     return sum(state.ep)
@@ -361,19 +354,9 @@ def _with_stress_jointed(law, kin, state, stress):
     return state._replace(sigma=symmetric_tensor(kin, stress))
 
 
-@laws.number
-def slip(law, kin, state):
-    return state.slip
-
-
-@laws.number
-def opening(law, kin, state):
-    return state.opening
-
-
 for _kind in (Jointed, YieldingBetween):
-    laws.column(_kind, "slip", slip)
-    laws.column(_kind, "opening", opening)
+    laws.column(_kind, "slip")
+    laws.column(_kind, "opening")
     laws.column(_kind, "dissipated", laws.dissipated_energy)
 laws.column(YieldingBetween, "ep", laws.plastic_strain)
 laws.no_columns(RockBetweenJoints)

@@ -6,11 +6,24 @@ from karamelo_py.language.rules import gain
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inner, nothing, sym, symmetric_tensor, tr
 from karamelo_py.points.laws import LawTraits
-from karamelo_py.points.laws.elastic import ElasticLaw
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.elastic import ElasticLaw, isotropic
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 
 
 class LinearElastic(ElasticLaw):
+    __slots__ = ()
+    turns = True
+
+
+class FixedFrame(LinearElastic):
+    """Hooke's law whose stress does not rotate with the point, as in Karamelo."""
+
+    __slots__ = ()
+    traits = LawTraits()
+    turns = False
+
+
+class LinearConstants(NamedTuple):
     """Hooke's law in rate form, for large rotations.
 
     Parameters
@@ -49,31 +62,17 @@ class LinearElastic(ElasticLaw):
     material, neo-hookean
     """
 
-    __slots__ = ()
-    turns = True
+    rho: AboveZero
+    E: AboveZero
+    nu: float
+    cp: AboveZero | None = None
+    kappa: FromZero | None = None
+    alpha: float = 0.0
+    rate: ByName[Literal["jaumann", "none"]] = "jaumann"
 
-    @classmethod
-    def given(
-        cls,
-        rho: AboveZero,
-        E: AboveZero,
-        nu: float,
-        cp: AboveZero | None = None,
-        kappa: FromZero | None = None,
-        alpha: float = 0.0,
-        *,
-        rate: Literal["jaumann", "none"] = "jaumann",
-    ):
-        law = cls if rate == "jaumann" else FixedFrame
-        return super(LinearElastic, law).given(rho, E, nu, cp, kappa, alpha)
-
-
-class FixedFrame(LinearElastic):
-    """Hooke's law whose stress does not rotate with the point, as in Karamelo."""
-
-    __slots__ = ()
-    traits = LawTraits()
-    turns = False
+    def checked(self):
+        *constants, rate = self
+        return isotropic(LinearElastic if rate == "jaumann" else FixedFrame, constants)
 
 
 class State(NamedTuple):
@@ -95,9 +94,7 @@ def _initial_state_linear_elastic(law, kin, template):
     return State(1, nothing(kin))
 
 
-@laws.cauchy_stress.on(LinearElastic)
-def _cauchy_stress_linear_elastic(law, kin, state):
-    return state.sigma
+laws.answers(LinearElastic, {laws.cauchy_stress: "sigma"})
 
 
 @laws.advance.on(LinearElastic)

@@ -5,10 +5,14 @@ from math import exp
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, tr
-from karamelo_py.points.laws.elastic import Hyperelastic
+from karamelo_py.points.laws.elastic import Hyperelastic, IsotropicConstants
 
 
 class NeoHookean(Hyperelastic):
+    __slots__ = ()
+
+
+class NeoHookeanConstants(IsotropicConstants):
     """Compressible neo-Hookean solid, valid for any strain and rotation.
 
     Parameters
@@ -44,6 +48,7 @@ class NeoHookean(Hyperelastic):
     """
 
     __slots__ = ()
+    law = NeoHookean
 
 
 @laws.kirchhoff_stress.on(NeoHookean)

@@ -13,7 +13,7 @@ from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import total
-from karamelo_py.points.laws.placed import Oriented, State, formulas_of_place
+from karamelo_py.points.laws.placed import ELASTIC, Oriented, State, formulas_of_place
 from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.script.expressions import Expression
@@ -104,24 +104,10 @@ def _initial_state_oriented(law, kin, template):
 
 
 # Without laws.deformation: F of the law within is another one.
-laws.wraps(
-    Oriented, "elastic", "elastic", (
-        laws.advance, laws.jacobian, laws.by_rates, laws.specific_volume, laws.kirchhoff_stress,
-        laws.cauchy_stress, laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part,
-        laws.energy_density, laws.elastic_strain, laws.dissipated_energy, laws.damage,
-        laws.damage_initiation, laws.plastic_strain, laws.with_stress,
-    ),
-)  # fmt: skip
+laws.wraps(Oriented, "elastic", "elastic", (*ELASTIC, laws.with_stress))
 
 
-@has_short_trials.on(Oriented)
-def _has_short_trials_oriented(law):
-    return True
-
-
-@laws.is_round.on(Oriented)
-def _is_round_oriented(law):
-    return False
+laws.answers(Oriented, {has_short_trials: True, laws.is_round: False})
 
 
 def axis(state, i):

@@ -13,7 +13,7 @@ from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.leaning import warn_of_leaning
 from karamelo_py.points.laws.oriented import Axes, oriented
-from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.script.errors import ScriptError
 
 # Voigt's order
@@ -88,17 +88,7 @@ class Orthotropic(NamedTuple):
     angle: float = 0.0
     tilt: float = 0.0
     spin: float = 0.0
-
-    @classmethod
-    def given(
-        cls, rho: AboveZero, E1: AboveZero, E2: AboveZero, E3: AboveZero,
-        nu12: float, nu13: float, nu23: float,
-        G12: AboveZero, G13: AboveZero, G23: AboveZero,
-        angle: float = 0.0, tilt: float = 0.0, spin: float = 0.0, *, axes: Axes | None = None,
-    ):  # fmt: skip
-        moduli, shear = (E1, E2, E3), (G12, G13, G23)
-        made = cls(rho, *moduli, nu12, nu13, nu23, *shear, angle, tilt, spin)
-        return oriented(made.checked(), axes)
+    axes: ByName[Axes | None] = None
 
     def checked(self):
         """Refuse constants with which some strain would release energy."""
@@ -116,7 +106,7 @@ class Orthotropic(NamedTuple):
                 hint="nu12 = nu21 E1/E2: the ratio belongs to a pull along the first axis",
             )
         C = rotated(np.linalg.inv(compliance), axes(self.angle, self.tilt, self.spin))
-        return of_stiffness(1 / self.rho, C)
+        return oriented(of_stiffness(1 / self.rho, C), self.axes)
 
 
 def of_stiffness(specific_volume: float, C: np.ndarray) -> Directional:
@@ -165,13 +155,7 @@ class Transverse(NamedTuple):
     G3: AboveZero
     angle: float = 0.0
     tilt: float = 0.0
-
-    @classmethod
-    def given(
-        cls, rho: AboveZero, E: AboveZero, nu: float, E3: AboveZero, nu3: float, G3: AboveZero,
-        angle: float = 0.0, tilt: float = 0.0, *, axes: Axes | None = None,
-    ):  # fmt: skip
-        return oriented(cls(rho, E, nu, E3, nu3, G3, angle, tilt).checked(), axes)
+    axes: ByName[Axes | None] = None
 
     def checked(self):
         if not -1 < self.nu < 1 or not self.nu3**2 < self.E3 / self.E * (1 - self.nu) / 2:
@@ -183,7 +167,8 @@ class Transverse(NamedTuple):
         across = self.nu3 * self.E / self.E3  # contraction along 3 over the stretch across
         shear = 0.5 * self.E / (1 + self.nu), self.G3, self.G3
         moduli, ratios = (self.E, self.E, self.E3), (self.nu, across, across)
-        return Orthotropic(self.rho, *moduli, *ratios, *shear, self.angle, self.tilt).checked()
+        turns = self.angle, self.tilt, 0.0
+        return Orthotropic(self.rho, *moduli, *ratios, *shear, *turns, self.axes).checked()
 
 
 def axes(angle: float, tilt: float, spin: float) -> np.ndarray:

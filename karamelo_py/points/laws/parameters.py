@@ -1,14 +1,17 @@
 """Checks and conversions of parameters."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.language.signature import NonNegative, Positive
+from karamelo_py.language.signature import ByName as ByName
+from karamelo_py.language.signature import Keyword, NonNegative, Positive
 from karamelo_py.script.errors import ScriptError
 
 AboveZero = Annotated[float, Positive]
 FromZero = Annotated[float, NonNegative]
+Type = TypeVar("Type")
+Temperature = Annotated[Type, Keyword("T")]  # of a field initial_temperature
 
 LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 

@@ -211,14 +211,13 @@ def _law_here_placed(law, within, state):
     return within._replace(directions=state.here)
 
 
-laws.wraps(
-    Placed, "elastic", "elastic", (
-        laws.advance, laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
-        laws.kirchhoff_stress, laws.cauchy_stress, laws.wave_speed_squared, laws.wave_speed_bound,
-        laws.shear_part, laws.energy_density, laws.elastic_strain, laws.dissipated_energy,
-        laws.damage, laws.damage_initiation, laws.plastic_strain,
-    ),
+ELASTIC = (
+    laws.advance, laws.jacobian, laws.by_rates, laws.specific_volume, laws.kirchhoff_stress,
+    laws.cauchy_stress, laws.wave_speed_squared, laws.wave_speed_bound, laws.shear_part,
+    laws.energy_density, laws.elastic_strain, laws.dissipated_energy, laws.damage,
+    laws.damage_initiation, laws.plastic_strain,
 )  # fmt: skip
+laws.wraps(Placed, "elastic", "elastic", (*ELASTIC, laws.deformation))
 
 
 class DirectionShown(NamedTuple):
@@ -232,9 +231,7 @@ def _shown_direction(tag, law, kin, state):
     return state.here[tag.index]
 
 
-@laws.is_round.on(Placed)
-def _is_round_placed(law):
-    return False
+laws.answers(Placed, {laws.is_round: False})
 
 
 @warmed_elastic.on(Placed)

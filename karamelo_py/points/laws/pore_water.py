@@ -83,36 +83,20 @@ def _wave_speed_bound_saturated(law, kin, state):
 
 
 @laws.number
-@laws.point_function()
 def pore_pressure(law, kin, state):
-    pass
-
-
-@pore_pressure.on(Saturated)
-def _pore_pressure_saturated(law, kin, state):
     ratio = state.content / state.pores
     return where(ratio < 1, law.suction, law.K) * logarithm(ratio)
 
 
 @laws.number
-@laws.point_function()
 def porosity(law, kin, state):
     """Return the porosity over the present volume."""
-
-
-@porosity.on(Saturated)
-def _porosity_saturated(law, kin, state):
     return state.pores / (state.pores + (1 - law.n))
 
 
 @laws.number
-@laws.point_function()
 def water_content(law, kin, state):
     """Return the mass of the water per volume before deformation."""
-
-
-@water_content.on(Saturated)
-def _water_content_saturated(law, kin, state):
     return law.rho * state.content
 
 
@@ -127,9 +111,5 @@ def drag_per_volume(law, kin, state):
     return law.drag * n * n / (1 + law.kozeny * (k - 1))
 
 
-for _name, _function in (
-    ("pore_pressure", pore_pressure),
-    ("porosity", porosity),
-    ("water_content", water_content),
-):
-    laws.column(Saturated, _name, _function)
+for _function in (pore_pressure, porosity, water_content):
+    laws.column(Saturated, _function.__name__, _function)

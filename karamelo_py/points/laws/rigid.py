@@ -46,14 +46,16 @@ class Rigid(NamedTuple):
         return cls(1 / rho)
 
 
-@laws.initial_state.on(Rigid)
-def _initial_state_rigid(law, kin, template):
-    return ()
-
-
-@laws.advance.on(Rigid)
-def _advance_rigid(law, kin, state, dl, dt):
-    return ()
+laws.answers(
+    Rigid,
+    {
+        laws.initial_state: (),
+        laws.advance: (),
+        laws.jacobian: 1,
+        laws.wave_speed_squared: 0,
+        laws.energy_density: 0,
+    },
+)
 
 
 @laws.constrained_velocity.on(Rigid)
@@ -61,19 +63,8 @@ def _constrained_velocity_rigid(law, v, v_grid):
     return v
 
 
-@laws.jacobian.on(Rigid)
-def _jacobian_rigid(law, kin, state):
-    return 1
-
-
 @laws.cauchy_stress.on(Rigid)
 @laws.kirchhoff_stress.on(Rigid)
 @laws.elastic_strain.on(Rigid)
 def _no_stress(law, kin, state):
     return nothing(kin)
-
-
-@laws.wave_speed_squared.on(Rigid)
-@laws.energy_density.on(Rigid)
-def _zero(law, kin, state):
-    return 0

@@ -8,7 +8,7 @@ from karamelo_py.compiler import real, where
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import dev, tr, von_mises
 from karamelo_py.points.kinematics.principal import principal
-from karamelo_py.points.laws import column, damage, damage_initiation
+from karamelo_py.points.laws import answers, column, damage, damage_initiation
 from karamelo_py.points.laws.damages import damage_after, initial_damage, initiation, integrity
 from karamelo_py.points.laws.formulas import (
     Code,
@@ -80,9 +80,7 @@ def _damage_after_tuler_butcher(damage, memory, step):
     return Pulled(memory.w + rate * step.dt / damage.K)
 
 
-@initiation.on(TulerButcher)
-def _initiation_tuler_butcher(damage, memory):
-    return memory.w
+answers(TulerButcher, {initiation: "w"})
 
 
 @integrity.on(TulerButcher)
@@ -158,14 +156,7 @@ def cracked(w):
     return 1 - where(some, power(where(some, w, 1), 2 / 3), 0)
 
 
-@initiation.on(CochranBanner)
-def _initiation_cochran_banner(damage, memory):
-    return memory.w
-
-
-@integrity.on(CochranBanner)
-def _integrity_cochran_banner(damage, memory):
-    return memory.left
+answers(CochranBanner, {initiation: "w", integrity: "left"})
 
 
 class RateFormula(FormulaOf):
@@ -264,9 +255,7 @@ def _damage_after_by_rate(damage, memory, step):
     return Pulled(memory.w + max(evaluated(damage.rate, damage, at), 0) * step.dt)
 
 
-@initiation.on(ByRate)
-def _initiation_by_rate(damage, memory):
-    return memory.w
+answers(ByRate, {initiation: "w"})
 
 
 @integrity.on(ByRate)

@@ -93,9 +93,7 @@ def is_warm(law):
     return False
 
 
-@is_warm.on(Thermoelastic)
-def _is_warm_thermoelastic(law):
-    return True
+laws.answers(Thermoelastic, {is_warm: True, laws.temperature: "T"})
 
 
 def heated_by(law, kin, state, loss):
@@ -106,18 +104,18 @@ def heated_by(law, kin, state, loss):
     return laws.with_temperature(law, kin, state, laws.temperature(law, kin, state) + warmer)
 
 
-def of_elastic(function, law, kin, state, *more):
-    return function(warmed_elastic(law.elastic, state.T), kin, state.elastic, *more)
+def of_elastic(function, law, kin, state):
+    return function(warmed_elastic(law.elastic, state.T), kin, state.elastic)
+
+
+@laws.law_here.on(Thermoelastic)
+def _law_here_thermoelastic(law, within, state):
+    return warmed_elastic(within, state.T)
 
 
 @laws.initial_state.on(Thermoelastic)
 def _initial_state_thermoelastic(law, kin, template):
     return State(laws.initial_state(law.elastic, kin, template), initial_heat(law.heat, template).T)
-
-
-@laws.advance.on(Thermoelastic)
-def _advance_thermoelastic(law, kin, state, dl, dt):
-    return State(of_elastic(laws.advance, law, kin, state, dl, dt), state.T)
 
 
 @laws.cauchy_stress.on(Thermoelastic)
@@ -133,19 +131,10 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
 
 laws.hand_on(
     Thermoelastic, "elastic", "elastic", (
-        laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
+        laws.advance, laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
+        laws.wave_speed_squared, laws.wave_speed_bound,
     ),
 )  # fmt: skip
-
-
-@laws.wave_speed_squared.on(Thermoelastic)
-def _wave_speed_squared_thermoelastic(law, kin, state):
-    return of_elastic(laws.wave_speed_squared, law, kin, state)
-
-
-@laws.wave_speed_bound.on(Thermoelastic)
-def _wave_speed_bound_thermoelastic(law, kin, state):
-    return of_elastic(laws.wave_speed_bound, law, kin, state)
 
 
 @laws.energy_density.on(Thermoelastic)
@@ -165,11 +154,6 @@ def _elastic_strain_thermoelastic(law, kin, state):
 def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)
-
-
-@laws.temperature.on(Thermoelastic)
-def _temperature_thermoelastic(law, kin, state):
-    return state.T
 
 
 @laws.heat_capacity.on(Thermoelastic)

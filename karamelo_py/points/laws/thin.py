@@ -139,19 +139,10 @@ def _with_stress_thin(law, kin, state, stress):
 
 
 @laws.number
-@laws.point_function()
 def thickness(law, kin, state):
     """Return the thickness over the initial thickness."""
-
-
-@thickness.on(Thin)
-def _thickness_thin(law, kin, state):
     return state.across
 
 
-@laws.stretch_across.on(Thin)
-def _stretch_across_thin(law, state):
-    return state.across
-
-
+laws.answers(Thin, {laws.stretch_across: "across"})
 laws.column(Thin, "thickness", thickness)

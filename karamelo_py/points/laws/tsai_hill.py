@@ -11,7 +11,7 @@ from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.elastic import State as Deformed
 from karamelo_py.points.laws.oriented import with_axes_of, without_axes
 from karamelo_py.points.laws.orthotropic import Directional, axes, stress_of
-from karamelo_py.points.laws.parameters import AboveZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.script.errors import ScriptError
 
 
@@ -75,19 +75,21 @@ class TsaiHill(NamedTuple):
     hashin, orthotropic, transverse, hill, fix erosion
     """
 
-    elastic: Any
-    X: float
-    Y: float
-    S: float
+    elastic: DirectionalBase
+    X: AboveZero
+    Y: AboveZero
+    S: AboveZero
+    angle: float = 0.0
+    tilt: float = 0.0
+    spin: float = 0.0
+    Xc: ByName[AboveZero | None] = None
+    Yc: ByName[AboveZero | None] = None
+    residual: ByName[AboveZero] = 0.01
 
     syntax = "elastic, X, Y, S[, angle][, tilt][, spin][, Xc=X][, Yc=Y][, residual=0.01]"
 
-    @classmethod
-    def given(
-        cls, elastic: DirectionalBase, X: AboveZero, Y: AboveZero, S: AboveZero,
-        angle: float = 0.0, tilt: float = 0.0, spin: float = 0.0, *,
-        Xc: AboveZero | None = None, Yc: AboveZero | None = None, residual: AboveZero = 0.01,
-    ) -> Any:  # fmt: skip
+    def checked(self):
+        elastic, X, Y, S, *angles, Xc, Yc, residual = self
         strengths = (X, Y), (X, Yc or Y), (Xc or X, Y), (Xc or X, Yc or Y)
         for along, across in strengths:
             if across >= 2 * along:
@@ -98,7 +100,7 @@ class TsaiHill(NamedTuple):
                     expected="a strength across below twice the strength along axis 1",
                 )
         refuse_whole(residual)
-        turn = map(float, axes(angle, tilt, spin).ravel())
+        turn = map(float, axes(*angles).ravel())
         law = without_axes(elastic.whole)
         made = Failing(law, X, Xc or X, Y, Yc or Y, S, residual, Turn(*turn))
         return with_axes_of(elastic.whole, made)
@@ -215,14 +217,10 @@ def _energy_density_failing(law, kin, state):
     return fraction_left(law, state.index) * whole
 
 
-@laws.damage_initiation.on(Failing)
-def _damage_initiation_failing(law, kin, state):
-    return state.index
+laws.answers(Failing, {laws.damage_initiation: "index"})
 
 
-@laws.dissipated_energy.on(Ply)
-def _dissipated_energy_ply(law, kin, state):
-    return state.loss
+laws.answers(Ply, {laws.dissipated_energy: "loss"})
 
 
 @laws.damage.on(Ply)

@@ -32,8 +32,8 @@ ACCELERATION = Powers(1, 0, -2)
 TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to above osmium; rare in other systems
 
 
-def accelerate(mass, v, v_star, force, value, before, kick, share):
-    return v, v_star, force + mass * value, mass * value
+def accelerate(node):
+    return node.v, node.v_star, node.force + node.mass * node.value, node.mass * node.value
 
 
 class BodyForce(Fix):
@@ -100,8 +100,8 @@ known_failure(
 )
 
 
-def share_out(mass, v, v_star, force, value, before, kick, share):
-    return v, v_star, force + value * share, value * share
+def share_out(node):
+    return node.v, node.v_star, node.force + node.value * node.share, node.value * node.share
 
 
 class ForceNodes(Fix):
@@ -216,18 +216,18 @@ class ForceParticles(PointForces):
         return share[:, None] * vector(self.force, self.hub, x, lambda: points.reference_position)
 
 
-def brake(mass, v, v_star, force, value, before, kick, share):
+def brake(node):
     """Reduce the change of v* by forces, opposite to v, by a fraction; the total is the force.
 
     No effect if the step reverses the node's motion, or a wall has stopped it.
     """
     against = 0.0
-    if v * v_star > 0:
-        change = min(abs(v_star - v), abs(force) * kick / mass)
-        against = min(value * change, abs(v_star))
-        if v > 0:
+    if node.v * node.v_star > 0:
+        change = min(abs(node.v_star - node.v), abs(node.force) * node.kick / node.mass)
+        against = min(node.value * change, abs(node.v_star))
+        if node.v > 0:
             against = -against
-    return v, v_star + against, force, mass * against / kick
+    return node.v, node.v_star + against, node.force, node.mass * against / node.kick
 
 
 class LocalDamping(Fix):

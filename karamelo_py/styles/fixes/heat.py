@@ -58,8 +58,9 @@ def check_coefficient(h: Expression) -> None:
 MANY = 1_000_000  # points of a solid; larger ones skip the check
 
 
-def hold_node(capacity, T, T_star, flow, value, before, dt, share):
+def hold_node(node):
     """Set T to the value; the total is the heat per time needed."""
+    capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
 
@@ -99,9 +100,9 @@ class TemperatureNodes(HeatFix):
             self.group.refuse_past_domain()
 
 
-def hold_point(capacity, T, face, supply, value, other, dt):
+def hold_point(pt):
     """Set T to the value, whatever the heat flow."""
-    return 0.0, supply, value
+    return 0.0, pt.supply, pt.value
 
 
 class TemperatureParticles(HeatFix):
@@ -133,9 +134,9 @@ class TemperatureParticles(HeatFix):
         self._compare(T)
 
 
-def heat(capacity, T, face, supply, value, other, dt):
+def heat(pt):
     """Supply heat through one face of the point."""
-    return 1.0, supply + face * value, T
+    return 1.0, pt.supply + pt.face * pt.value, pt.T
 
 
 class FacesOfPoints(HeatFix):
@@ -195,15 +196,15 @@ class HeatFluxParticles(FacesOfPoints):
         super().__init__(hub, group, q)
 
 
-def exchange(capacity, T, face, supply, value, other, dt):
+def exchange(pt):
     """Apply Newton's law of cooling through one face, at the point's temperature after the step.
 
     With the temperature before, a large coefficient would cool the point below the fluid.
     """
-    if not capacity > 0:
-        return 1.0, supply, T
-    rate = face * value
-    return 1.0, supply + rate * (other - T) / (1 + rate * dt / capacity), T
+    if not pt.capacity > 0:
+        return 1.0, pt.supply, pt.T
+    rate = pt.face * pt.value
+    return 1.0, pt.supply + rate * (pt.other - pt.T) / (1 + rate * pt.dt / pt.capacity), pt.T
 
 
 class ConvectionParticles(FacesOfPoints):

@@ -10,9 +10,9 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.absorbing import dashpot
 
 
-def damp(mass, v, v_star, force, value, before, kick, share):
-    added = dashpot(value, mass, v, force, kick)
-    return v, v_star, force + added, added
+def damp(node):
+    added = dashpot(node.value, node.mass, node.v, node.force, node.kick)
+    return node.v, node.v_star, node.force + added, added
 
 
 class MassDamping(Fix):

@@ -9,13 +9,13 @@ from karamelo_py.scene.modify import FIRST, USUAL, Fix, node_hook, per_direction
 from karamelo_py.script.expressions import Expression
 
 
-def force_of_nodes(mass, v, v_star, force, value, before, kick, share):
-    return v, v_star, force, force
+def force_of_nodes(node):
+    return node.v, node.v_star, node.force, node.force
 
 
-def momentum_rate(mass, v, x_old, x, value, before, dt, kick):
+def momentum_rate(pt):
     """Return the momentum over the time that forces act."""
-    return v, x, mass * v / kick
+    return pt.v, pt.x, pt.mass * pt.v / pt.kick
 
 
 # Quantities at nodes or points, and when they are measured in a step.

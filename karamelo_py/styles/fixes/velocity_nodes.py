@@ -15,41 +15,41 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import AXES, judge_friction, unlike
 
 
-def prescribe(mass, v, v_star, force, value, before, kick, share):
+def prescribe(node):
     """Set v to the value one step earlier, as at a symmetry plane; the total is the reaction."""
-    return before, value, force, mass * (value - v_star) / kick
+    return node.before, node.value, node.force, node.mass * (node.value - node.v_star) / node.kick
 
 
-def prescribe_motion(mass, v, v_star, force, value, before, kick, share):
+def prescribe_motion(node):
     """Leave v, so that FLIP points acquire the value."""
-    return v, value, force, mass * (value - v_star) / kick
+    return node.v, node.value, node.force, node.mass * (node.value - node.v_star) / node.kick
 
 
-def prescribe_mapped(mass, v, v_star, force, value, before, kick, share):
-    return value, value, force, 0.0
+def prescribe_mapped(node):
+    return node.value, node.value, node.force, 0.0
 
 
-def prescribe_at_most(mass, v, v_star, force, value, before, kick, share):
+def prescribe_at_most(node):
     """Bound v* from above; the total is the reaction, which pushes backwards."""
-    allowed = min(v_star, value)
-    return v, allowed, force, mass * (allowed - v_star) / kick
+    allowed = min(node.v_star, node.value)
+    return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
 
-def prescribe_mapped_at_most(mass, v, v_star, force, value, before, kick, share):
+def prescribe_mapped_at_most(node):
     """Bound v, too: otherwise stress does spurious work, and a rebound gains half of the energy."""
-    allowed = value if v_star == value else min(v, value)
-    return allowed, allowed, force, 0.0
+    allowed = node.value if node.v_star == node.value else min(node.v, node.value)
+    return allowed, allowed, node.force, 0.0
 
 
-def prescribe_at_least(mass, v, v_star, force, value, before, kick, share):
+def prescribe_at_least(node):
     """Bound v* from below; the total is the reaction, which pushes forwards."""
-    allowed = max(v_star, value)
-    return v, allowed, force, mass * (allowed - v_star) / kick
+    allowed = max(node.v_star, node.value)
+    return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
 
-def prescribe_mapped_at_least(mass, v, v_star, force, value, before, kick, share):
-    allowed = value if v_star == value else max(v, value)
-    return allowed, allowed, force, 0.0
+def prescribe_mapped_at_least(node):
+    allowed = node.value if node.v_star == node.value else max(node.v, node.value)
+    return allowed, allowed, node.force, 0.0
 
 
 # By bound: hooks after the momentum update, and after velocities are mapped again.

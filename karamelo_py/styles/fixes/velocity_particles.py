@@ -22,12 +22,12 @@ ALIKE = 1e-6  # of a velocity, or of the wave speed; smaller differences are ign
 DIFFERENT = " how they move, the other how they deform"
 
 
-def start(mass, v, x_old, x, value, before, dt, kick):
-    return before, x, 0.0
+def start(pt):
+    return pt.before, pt.x, 0.0
 
 
-def carry(mass, v, x_old, x, value, before, dt, kick):
-    return value, x_old + dt * value, mass * (value - v) / kick
+def carry(pt):
+    return pt.value, pt.x_old + pt.dt * pt.value, pt.mass * (pt.value - pt.v) / pt.kick
 
 
 class VelocityOfPoints(Fix):

@@ -19,7 +19,7 @@ from karamelo_py.points.laws.eos import (
     stored_heat,
     taken_heat,
 )  # fmt: skip
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
@@ -279,7 +279,7 @@ def _at_pressure_ideal_gas(eos, j, memory, p, heat):
     return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))
 
 
-class Jwl(NamedTuple):
+class JwlConstants(NamedTuple):
     """Pressure of an explosive and its detonation products (Jones, Wilkins, Lee).
 
     Parameters
@@ -316,6 +316,23 @@ class Jwl(NamedTuple):
     fix detonation, ideal-gas, strength fluid, material eos-strength
     """
 
+    rho0: AboveZero
+    A: AboveZero
+    B: FromZero
+    R1: AboveZero
+    R2: AboveZero
+    omega: AboveZero
+    E0: AboveZero
+    D: AboveZero
+    Q1: ByName[FromZero] = 0.0
+    Q2: ByName[FromZero] = 0.0
+
+    def checked(self):
+        rho0, *constants, Q1, Q2 = self
+        return {"eos": Jwl(1 / rho0, *constants, 0.0), **artificial_viscosity(Q1, Q2)}
+
+
+class Jwl(NamedTuple):
     in_lanes = True
     traits = LawTraits(any_speed=True)
 
@@ -328,14 +345,6 @@ class Jwl(NamedTuple):
     energy: float  # initial E, per reference volume
     D: float
     cell_size: float  # set when the scene is lowered
-
-    @classmethod
-    def given(
-        cls, rho0: AboveZero, A: AboveZero, B: FromZero, R1: AboveZero, R2: AboveZero,
-        omega: AboveZero, E0: AboveZero, D: AboveZero, *, Q1: FromZero = 0.0, Q2: FromZero = 0.0,
-    ):  # fmt: skip
-        made = cls(1 / rho0, A, B, R1, R2, omega, E0, D, 0.0)
-        return {"eos": made, **artificial_viscosity(Q1, Q2)}
 
 
 known_failure(

@@ -24,7 +24,7 @@ from karamelo_py.script.errors import ScriptError
 MOST_PASSES = 60  # of Newton's method safeguarded by bisection; small steps take two or three
 
 
-class PAlpha(NamedTuple):
+class PAlphaConstants(NamedTuple):
     """Porous solid that can be crushed: foam, powder, concrete, rubble.
 
     Parameters
@@ -60,17 +60,14 @@ class PAlpha(NamedTuple):
     linear, shock, material eos-strength
     """
 
-    in_lanes = True
-
-    specific_volume: float
-    solid: Any
+    solid: Eos
     alpha0: float
-    pe: float
+    pe: AboveZero
     ps: float
-    n: float
+    n: AboveZero = 2.0
 
-    @classmethod
-    def given(cls, solid: Eos, alpha0: float, pe: AboveZero, ps: float, n: AboveZero = 2.0):
+    def checked(self):
+        solid, alpha0, pe, ps, _ = self
         if not alpha0 > 1:
             raise ScriptError(
                 f"a distension of {alpha0:g} leaves no pores",
@@ -90,8 +87,19 @@ class PAlpha(NamedTuple):
                 argument="solid",
                 expected="an eos linear, shock or fluid",
             )
-        made = cls(specific_volume(inner) * alpha0, inner, alpha0, pe, ps, n)
+        made = PAlpha(specific_volume(inner) * alpha0, inner, *self[1:])
         return {**solid.laws, "eos": made}
+
+
+class PAlpha(NamedTuple):
+    in_lanes = True
+
+    specific_volume: float
+    solid: Any
+    alpha0: float
+    pe: float
+    ps: float
+    n: float
 
 
 class Pores(NamedTuple):

@@ -12,7 +12,7 @@ from karamelo_py.points.laws.eos import (
     pressure,
     ratio_at_pressure,
 )
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
@@ -20,7 +20,7 @@ from karamelo_py.script.errors import ScriptError
 _STEEPEST = 0.9
 
 
-class Shock(NamedTuple):
+class ShockConstants(NamedTuple):
     """Pressure of shocked metals: Hugoniot curve, thermal pressure and artificial viscosity.
 
     Parameters
@@ -70,6 +70,32 @@ class Shock(NamedTuple):
     linear, ideal-gas, strength johnson_cook, material eos-strength
     """
 
+    rho0: AboveZero
+    K: AboveZero
+    c0: AboveZero
+    S: FromZero
+    Gamma: FromZero
+    cv: FromZero
+    Tr: float
+    Q1: FromZero
+    Q2: FromZero
+    tension: ByName[FromZero] = inf
+
+    def checked(self):
+        rho0, K, c0, S, Gamma, cv, Tr, *viscous, tension = self
+        # K could only replace c0, so rho0 c0^2 replaces K.
+        if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
+            raise ScriptError(
+                f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
+                argument="K",
+                expected="the bulk modulus K, then the speed of sound c0",
+                hint=f"eos(ID, shock, {rho0:g}, {c0:g}, {K:g}, ...)",
+            )
+        eos = Shock(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr, tension)
+        return {"eos": eos, **artificial_viscosity(*viscous)}
+
+
+class Shock(NamedTuple):
     in_lanes = True
     scalarised = ("ratio_at_pressure",)
 
@@ -79,32 +105,6 @@ class Shock(NamedTuple):
     thermal: float  # Gamma rho0 cv, per kelvin above Tr
     Tr: float
     tension: float = inf  # largest
-
-    @classmethod
-    def given(
-        cls,
-        rho0: AboveZero,
-        K: AboveZero,
-        c0: AboveZero,
-        S: FromZero,
-        Gamma: FromZero,
-        cv: FromZero,
-        Tr: float,
-        Q1: FromZero,
-        Q2: FromZero,
-        *,
-        tension: FromZero = inf,
-    ):
-        # K could only replace c0, so rho0 c0^2 replaces K.
-        if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
-            raise ScriptError(
-                f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
-                argument="K",
-                expected="the bulk modulus K, then the speed of sound c0",
-                hint=f"eos(ID, shock, {rho0:g}, {c0:g}, {K:g}, ...)",
-            )
-        eos = cls(1 / rho0, rho0 * c0**2, S, Gamma * rho0 * cv, Tr, tension)
-        return {"eos": eos, **artificial_viscosity(Q1, Q2)}
 
 
 known_failure(

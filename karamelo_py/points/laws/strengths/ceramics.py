@@ -6,6 +6,7 @@ from typing import NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.powers import logarithm, power
 from karamelo_py.points.kinematics import dev, inner, von_mises
+from karamelo_py.points.laws import answers
 from karamelo_py.points.laws.eos import (
     VolumeStep,
     at_pressure,
@@ -189,9 +190,7 @@ def _inelastic_ratio_johnson_holmquist(strength, memory):
     return (memory.opened,)
 
 
-@added_pressure.on(JohnsonHolmquist2)
-def _added_pressure_johnson_holmquist(strength, memory):
-    return memory.bulking
+answers(JohnsonHolmquist2, {added_pressure: "bulking"})
 
 
 @added_energy.on(JohnsonHolmquist2)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.kinematics import dev, inner, nothing
-from karamelo_py.points.laws import LawTraits, parameter, specific_volume, strengths
+from karamelo_py.points.laws import LawTraits, answers, parameter, specific_volume, strengths
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.viscosity import damped
@@ -140,19 +140,12 @@ known_failure(
 strengths.initial_loss.on(Viscous)(strengths.no_loss_yet)
 
 
-@strengths.shear_modulus.on(Viscous)
-def _shear_modulus_viscous(strength):
-    return 0
+answers(Viscous, {strengths.shear_modulus: 0, strengths.shear_energy: 0})
 
 
 @strengths.shear_strain.on(Viscous)
 def _shear_strain_viscous(strength, kin, s):
     return nothing(kin)
-
-
-@strengths.shear_energy.on(Viscous)
-def _shear_energy_viscous(strength, kin, s):
-    return 0
 
 
 @strengths.shear_response.on(Viscous)

@@ -8,7 +8,9 @@ from karamelo_py.language.rules import suggestion
 from karamelo_py.points.laws import Absent
 from karamelo_py.points.laws.parameters import (
     AboveZero,
+    ByName,
     FromZero,
+    Temperature,
     check_temperatures,
     reference_rate,
 )
@@ -22,7 +24,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 from karamelo_py.points.laws.temperatures import homologous, temperature_or
 
 
-class JohnsonCook(NamedTuple):
+class JohnsonCookConstants(NamedTuple):
     """Flow stress of metals by plastic strain, strain rate and temperature.
 
     Parameters
@@ -60,6 +62,26 @@ class JohnsonCook(NamedTuple):
     plastic, swift, eos shock, damage damage_johnson_cook, temperature plastic_work
     """
 
+    G: AboveZero
+    A: AboveZero
+    B: FromZero
+    n: FromZero
+    epsdot0: FromZero
+    C: FromZero
+    m: FromZero
+    Tr: float
+    Tm: float
+
+    def checked(self):
+        """Omit factors of 1, each of which costs a logarithm or a power."""
+        *hardening, epsdot0, C, m, Tr, Tm = self
+        check_temperatures(Tr, Tm)
+        epsdot0 = reference_rate(epsdot0, C, "C")
+        rate = RateFactor(epsdot0, C) if C > 0 else Absent()
+        return JohnsonCook(*hardening, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
+
+
+class JohnsonCook(NamedTuple):
     in_lanes = True
 
     G: float
@@ -68,25 +90,6 @@ class JohnsonCook(NamedTuple):
     n: float
     rate: Any
     softening: Any
-
-    @classmethod
-    def given(
-        cls,
-        G: AboveZero,
-        A: AboveZero,
-        B: FromZero,
-        n: FromZero,
-        epsdot0: FromZero,
-        C: FromZero,
-        m: FromZero,
-        Tr: float,
-        Tm: float,
-    ):
-        """Omit factors of 1, each of which costs a logarithm or a power."""
-        check_temperatures(Tr, Tm)
-        epsdot0 = reference_rate(epsdot0, C, "C")
-        rate = RateFactor(epsdot0, C) if C > 0 else Absent()
-        return cls(G, A, B, n, rate, Softening(m, Tr, Tm) if m > 0 else Absent())
 
 
 suggestion(
@@ -291,33 +294,16 @@ class ZerilliArmstrong(NamedTuple):
 
     in_lanes = True
 
-    G: float
-    C0: float
-    C1: float
-    C2: float
-    C3: float
-    C4: float
-    C5: float
-    n: float
-    epsdot0: float
-    initial_temperature: float
-
-    @classmethod
-    def given(
-        cls,
-        G: AboveZero,
-        C0: FromZero,
-        C1: FromZero,
-        C2: FromZero,
-        C3: FromZero,
-        C4: FromZero,
-        C5: FromZero,
-        n: FromZero,
-        *,
-        epsdot0: AboveZero = 1.0,
-        T: FromZero = 293.0,
-    ):
-        return cls(G, C0, C1, C2, C3, C4, C5, n, epsdot0, T)
+    G: AboveZero
+    C0: FromZero
+    C1: FromZero
+    C2: FromZero
+    C3: FromZero
+    C4: FromZero
+    C5: FromZero
+    n: FromZero
+    epsdot0: ByName[AboveZero] = 1.0
+    initial_temperature: Temperature[FromZero] = 293.0
 
 
 remembers(ZerilliArmstrong, ep=0.0)

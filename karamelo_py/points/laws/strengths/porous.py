@@ -24,7 +24,7 @@ DENSE = 0.999999  # of the strain of densification
 NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
 
-class CrushableFoam(NamedTuple):
+class CrushableFoamConstants(NamedTuple):
     """Metal or polymer foam, crushed by pressure and shear.
 
     Parameters
@@ -59,6 +59,23 @@ class CrushableFoam(NamedTuple):
     eos p-alpha, gurson, plastic
     """
 
+    G: AboveZero
+    Y: AboveZero
+    nu: FromZero = 0.0
+    H: FromZero = 0.0
+    a: FromZero = 0.0
+    e: AboveZero = 1.0
+    beta: AboveZero = 1.0
+
+    def checked(self):
+        G, Y, nu, *hardening = self
+        if not nu < 0.5:
+            message = f"with nu = {nu:g} the plastic volume cannot change"
+            raise ScriptError(message, argument="nu", expected="below 0.5, or strength plastic")
+        return CrushableFoam(G, Y, 4.5 * (1 - 2 * nu) / (1 + nu), *hardening)
+
+
+class CrushableFoam(NamedTuple):
     in_lanes = True
 
     G: float
@@ -68,16 +85,6 @@ class CrushableFoam(NamedTuple):
     a: float
     e: float
     beta: float
-
-    @classmethod
-    def given(
-        cls, G: AboveZero, Y: AboveZero, nu: FromZero = 0.0, H: FromZero = 0.0, a: FromZero = 0.0,
-        e: AboveZero = 1.0, beta: AboveZero = 1.0,
-    ):  # fmt: skip
-        if not nu < 0.5:
-            message = f"with nu = {nu:g} the plastic volume cannot change"
-            raise ScriptError(message, argument="nu", expected="below 0.5, or strength plastic")
-        return cls(G, Y, 4.5 * (1 - 2 * nu) / (1 + nu), H, a, e, beta)
 
 
 class Gurson(NamedTuple):

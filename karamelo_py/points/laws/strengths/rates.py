@@ -6,7 +6,7 @@ from typing import NamedTuple
 from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import exponential, logarithm, power
 from karamelo_py.points.kinematics import von_mises
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero, Temperature
 from karamelo_py.points.laws.strengths import (
     present,
     remembers,
@@ -78,15 +78,11 @@ class SteinbergGuinan(NamedTuple):
     Ymax: AboveZero
     A: FromZero = 0.0
     B: FromZero = 0.0
-    Tm: AboveZero = inf
-    initial_temperature: float = 300.0
+    Tm: ByName[AboveZero] = inf
+    initial_temperature: Temperature[FromZero] = 300.0
 
-    @classmethod
-    def given(
-        cls, G: AboveZero, Y0: AboveZero, beta: FromZero, n: FromZero, Ymax: AboveZero,
-        A: FromZero = 0.0, B: FromZero = 0.0, *, Tm: AboveZero = inf, T: FromZero = 300.0,
-    ):  # fmt: skip
-        return cls(G, Y0, beta, n, Ymax, A, B, min(Tm, 1e30), T)
+    def checked(self):
+        return self._replace(Tm=min(self.Tm, 1e30))
 
 
 remembers(SteinbergGuinan, ep=0.0, stiffness=1.0)
@@ -292,27 +288,19 @@ class Mts(NamedTuple):
 
     in_lanes = True
 
-    G: float
-    sa: float
-    k: float
-    g0: float
-    rate0: float
-    p: float
-    q: float
-    theta: float
-    ss: float
-    gs: float
-    rates: float
-    s0: float
-    initial_temperature: float
-
-    @classmethod
-    def given(
-        cls, G: AboveZero, sa: FromZero, k: AboveZero, g0: AboveZero, rate0: AboveZero,
-        p: AboveZero, q: AboveZero, theta: FromZero, ss: AboveZero, gs: AboveZero, rates: AboveZero,
-        s0: FromZero = 0.0, *, T: AboveZero = 293.0,
-    ):  # fmt: skip
-        return cls(G, sa, k, g0, rate0, p, q, theta, ss, gs, rates, s0, T)
+    G: AboveZero
+    sa: FromZero
+    k: AboveZero
+    g0: AboveZero
+    rate0: AboveZero
+    p: AboveZero
+    q: AboveZero
+    theta: FromZero
+    ss: AboveZero
+    gs: AboveZero
+    rates: AboveZero
+    s0: FromZero = 0.0
+    initial_temperature: Temperature[AboveZero] = 293.0
 
 
 remembers(Mts, ep=0.0, threshold="s0")

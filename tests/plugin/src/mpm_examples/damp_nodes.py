@@ -5,10 +5,10 @@ from karamelo_py.scene.modify import Fix, node_hook, per_direction
 from karamelo_py.script.expressions import Expression
 
 
-def damp(mass, v, v_star, force, value, before, kick, share):
+def damp(node):
     """A force against the velocity; its total is published."""
-    drag = -mass * value * v
-    return v, v_star, force + drag, drag
+    drag = -node.mass * node.value * node.v
+    return node.v, node.v_star, node.force + drag, drag
 
 
 class DampNodes(Fix):
