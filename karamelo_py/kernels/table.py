@@ -471,7 +471,8 @@ def sort_in_time(s: Setup) -> tuple:
 
 SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
 SEAM_AGAIN = SceneTask(
-    seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of nodes a period apart",
+    seams(JoinVelocity, sheared.OF_VELOCITY),
+    "momentum of nodes a period apart",
 )
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
 FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
