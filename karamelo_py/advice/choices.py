@@ -110,10 +110,17 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.shocked and not s.elastic_only,
-        ("method({grid}, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
+        ("method({grid}, APIC, cubic-spline)",),
         "a shock",
-        "a linear basis loses pressure in every cell that stressed material crosses",
-        ("in.plates",),
+        "FLIP rings after it, and other bases lose pressure in cells that stressed points cross",
+        ("in.plates", "in.flyer"),
+    ),
+    Choice(
+        lambda s: not s.elastic_only and s.alone and s.narrow,
+        ("method(tlmpm, APIC, linear)",),
+        "a sheet or rod of metal that flows",
+        "nothing locks in it, and APIC does not ring after waves",
+        ("in.impact", "in.plastic_wave"),
     ),
     Choice(
         lambda s: not s.elastic_only,
