@@ -158,6 +158,7 @@ RUBBER = "material(m, neo-hookean, 1000, 1e6, 0.3)"
 OTHER = "region(b2, block, 0.8, 1.2, 0.2, 0.6)\nsolid(other, region, b2, 2, m, 0.1)\n"
 FAST = "fix(v, initial_velocity_particles, g, 1e3, 0)"
 PAIR = f"{OTHER}group(g, particles, region, box, solid, body)\n{FAST}"
+DIAGONAL = PAIR.replace("1.2, 0.2, 0.6", "1.2, 0.8, 0.95").replace("1e3, 0", "1e3, 1e3")
 
 
 def fluid(eos, strength="fluid, 0"):
@@ -170,6 +171,9 @@ def fluid(eos, strength="fluid, 0"):
         (RUBBER, "", "method(tlmpm, PolyPIC, linear); scheme(usl)"),
         (RUBBER, "scheme(newmark)\nset_dt(1)", "method(tlmpm, FLIP, linear, 1)"),
         (RUBBER, PAIR, "method(ulmpm/contacts, FLIP, linear, 1); scheme(usavg)"),
+        (RUBBER, DIAGONAL, "method(ulmpm/contacts, FLIP, linear, 1); scheme(usavg)"),
+        (RUBBER.replace("neo-hookean", "linear").replace("0.3", "0.3, rate=none"), PAIR,
+         "method(ulmpm/contacts, FLIP, linear, 1); scheme(usavg)"),
         (RUBBER, OTHER, "method(ulmpm, AFLIP, cubic-spline, 1, mass=corrected)"),
         (f"{RUBBER}\nboundary(periodic, x)", "", "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
         ("material(m, linear, 1000, 1e6, 0.3, 500, 50)", "", "linear, thermo-mechanical)"),

@@ -9,6 +9,7 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts, Body
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import law_kind, law_traits, parameter
+from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.noise import drift_limits
 from karamelo_py.run.body_motion import BodyMotion
@@ -51,7 +52,8 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    return not any(law_traits(kind).rebounds for kind in law_kind(law))
+    elastic = (law_traits(kind).rebounds or issubclass(kind, ElasticLaw) for kind in law_kind(law))
+    return not any(elastic)
 
 
 def vibrating(facts: BasicFacts) -> list[Body]:

@@ -47,7 +47,7 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.implicit,
-        ("method(ulmpm, FLIP, quadratic-spline, 1)",),
+        ("method({grid}, FLIP, quadratic-spline, 1)",),
         "load steps of soil that does not dilate, or of several bodies",
         "limit loads are closer than with a linear basis",
         ("in.static_slope",),

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.advice.basics import is_zero
-from karamelo_py.advice.bodies import fixes_at
+from karamelo_py.advice.bodies import fixes_at, yields
 from karamelo_py.advice.choices import CHOICES, PLAIN, RESUMED, Choice
 from karamelo_py.advice.crossing import boxes_of, meetings
 from karamelo_py.advice.facts import SceneFacts
@@ -83,7 +83,7 @@ class Scouted(SceneFacts):
     hot = property(
         lambda s: any(can(law, conductivity) and conductivity(law, 1.0) > 0 for law in s.laws)
     )
-    elastic_only = property(lambda s: all(law_traits(law).rebounds for law in s.laws))
+    elastic_only = property(lambda s: not any(map(yields, s.laws)))
     gas = property(lambda s: any(can(law, taken_heat) for law in s.laws))
     grains = property(lambda s: any(MuI in law_kind(law) for law in s.laws))
 
@@ -224,6 +224,8 @@ def choose(hub: Hub) -> Chosen:
 def _written(choice: Choice, facts: Scouted) -> tuple[str, ...]:
     first, *others = (line.format(grid=facts.grid) for line in choice.lines)
     heat = ", thermo-mechanical" * facts.hot
+    if facts.hub.update.scheme_mark is not None:  # the script has a scheme
+        others = [line for line in others if not line.startswith("scheme(")]
     return f"{first[:-1]}{heat})", *others
 
 

@@ -103,7 +103,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Time until a body meets each box ahead, (n, d); inf if never."""
+    """Time until a body is within a cell of each box ahead, (n, d); inf if never."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)
@@ -114,7 +114,7 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
         boxes.low[n] + other_way - motion.high - way, motion.low + way - boxes.high[n] - other_way
     )
     apart[np.arange(len(n)), k] = 0
-    meets = ~(apart > 0).any(axis=1)
+    meets = ~(apart > 1.001 * h).any(axis=1)
     times[n[meets], k[meets]] = time[meets]
     return times
 
