@@ -172,6 +172,21 @@ def test_a_wave_has_the_speed_of_the_undrained_soil(run_script):
         assert abs(1 / (zeros[-1] - zeros[0]) * (len(zeros) - 1) / c - 1) < 0.008
 
 
+@same_kernels
+@pytest.mark.parametrize("k", ["1e-6", "1e-3", "1e-1"])
+def test_drag_water_and_drains_are_in_the_energy_balance(run_script, k):
+    """A column that vibrates, settles under its weight and drains."""
+    fixes = """
+        fix(v, initial_velocity_particles, all, 1e-2*sin(PI*x0))
+        fix(weight, body_force, all, -9.81)
+        fix(drain, pore_pressure, top, 100)
+        run(1000)
+        """
+    out = run_script(COLUMN.replace("1e-2)", f"{k})") + fixes).out
+    change = float(re.search(r"energy +([-+][\d.]+) % of the largest", out)[1])
+    assert abs(change) < 0.25
+
+
 WAYS = {
     "ulmpm, FLIP, linear, 1": "2, -1, 1, -1, 1, 0.25",
     "ulmpm, FLIP, quadratic-spline, 0.99": "2, -1, 1, -1, 1, 0.25",

@@ -70,7 +70,8 @@ def pore_water(
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
     acts on both. Computes of mass, momentum and energy (linear_momentum, kinetic_energy, ...) count
-    the soil alone.
+    the soil alone; the stored energy includes the compressed water. The energy balance includes
+    the water, its drag, and the water that leaves or enters.
 
     The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
     and never shortens it. With N cells over a drainage path of length L, consolidation to Tv = 1

@@ -505,7 +505,10 @@ def _work_at_nodes(members, call, count):
             # XPIC has replaced the change of v* by then
             moved = 2 * update[n, c] - update[n, change + c]
             if again and counts:
-                moved = velocity[n, c] + sums[n, momentum + c] / sums[n, arrays.MASS]
+                # A fix that holds the node prescribes its velocity before the step, too.
+                v = velocity[n, c]
+                held = v == update[n, c]
+                moved = v + (v if held else sums[n, momentum + c] / sums[n, arrays.MASS])
             terms[q] = 0.5 * dt * load * moved if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 

@@ -16,6 +16,7 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws, matter_of
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
+from karamelo_py.kernels.equations.pore_water import RelativeVelocity, WaterWork
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.records import put_at
@@ -30,6 +31,7 @@ from karamelo_py.points.laws import (
     specific_volume,
     temperature,
 )
+from karamelo_py.points.laws.pore_water import Saturated, water_content
 
 LOOK = 10  # steps between two checks
 FEW = 3  # checks compared before a window is full
@@ -109,6 +111,26 @@ def _take_work(work, control):
     totals.carry(control.totals[totals.WORK])
 
 
+@kernel
+def _add_water(matter, relative, control):
+    """Add the kinetic energy of the water in pores."""
+    (kin, points, laws), relative = at_hand(matter), at_hand(relative)
+    for p in range(points.mass.size):
+        law, state = state_at(kin, points, laws, p)
+        v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
+        mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
+        totals.add_to(control.totals, totals.KINETIC, float(0.5 * mass * dot(v, v)))
+
+
+@kernel
+def _take_work_at_nodes(spans, work, control):
+    for r in range(1, 1 + spans[0, 0]):
+        for n in range(spans[r, 0], spans[r, 1]):
+            totals.add_to(control.totals, totals.WORK, float(work[n, 0]))
+            work[n, 0] = 0
+    totals.carry(control.totals[totals.WORK])
+
+
 def sum_energies(s, mode):
     """Sum kinetic, stored plus dissipated energy, and work in the clock, without rigid bodies."""
     s.control.totals[: totals.WORK] = 0
@@ -121,6 +143,12 @@ def sum_energies(s, mode):
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)
+        if isinstance(block.laws, Saturated):
+            relative = field(block.points.fields, RelativeVelocity)
+            _add_water(matter_of(s.kin, block), relative, s.control)
+    of_water = field(s.nodes.fields, WaterWork)
+    if of_water is not None:
+        _take_work_at_nodes(s.spans, of_water, s.control)
     take_energies(s)
 
 

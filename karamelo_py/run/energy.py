@@ -47,8 +47,6 @@ def unknown_work(hub: Hub) -> str:
     for solid in hub.solids.values():
         if solid.rigid and apart and solid not in moved(hub):
             return f"rigid solid '{solid.id}'"
-        if solid.material.fluid is not None:
-            return f"the water in solid '{solid.id}'"
         if hub.update.thermal and can(solid.material.law, initial_heat):
             return "heat"
     return ""

@@ -28,6 +28,7 @@ from karamelo_py.compiler.fields import (
     StepField,
     SummedField,
     field,
+    increase,
     numbers,
     pair,
     store,
@@ -35,6 +36,7 @@ from karamelo_py.compiler.fields import (
 )
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.equations.strain import increment
 from karamelo_py.kernels.records import put_at, row
@@ -42,7 +44,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.basis.product import digits
 from karamelo_py.points.frames import force_stress, spatial_increment
-from karamelo_py.points.kinematics import I, det, nothing, outer, zero
+from karamelo_py.points.kinematics import I, det, dot, nothing, outer, zero
 from karamelo_py.points.kinematics import total as sum_of
 from karamelo_py.points.laws.pore_water import (
     Saturated,
@@ -134,9 +136,13 @@ class GivenFlux(StepField):
     shape = numbers(2, 2)
 
 
-POINT_FIELDS = RelativeVelocity, UnseenPressure
+class WaterWork(Field):
+    """Work on the water at a node since the last look at the energy, less the work of drag."""
+
+
+POINT_FIELDS = RelativeVelocity, UnseenPressure, WorkOfForces
 NODE_FIELDS = (
-    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure,
+    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure, WaterWork,
 )  # fmt: skip
 
 
@@ -314,6 +320,18 @@ def _is_closed(nodes, kin, n, rim):
     return not _is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
 
 
+def _by_pressure(nodes, kin, n, rim):
+    """Return the fraction of pores, and the force of the pressure on the water (d,)."""
+    sums, force = field(nodes.fields, PoreSums), field(nodes.fields, PoreForce)
+    p, d = real(0, sums[n, 0]), kin.dimension
+    if _is_open(nodes, n):
+        p = field(nodes.fields, GivenPressure)[n, 0]
+    elif _is_rim(nodes, kin, n, rim):
+        p = sums[n, 2] / sums[n, 0]
+    share = sums[n, 1] / sums[n, 0]
+    return [share * (force[n, k] - force[n, d + k] * p) for k in range(d)], p
+
+
 def _mass_given(nodes, kin, n, V):
     """Return the mass of water that a node gets per time; store it by `WAYS`."""
     given, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
@@ -353,13 +371,9 @@ class ShareForces(NamedTuple):
         water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
         force, d = field(nodes.fields, PoreForce), kin.dimension
         _close_if_dry(nodes, kin, n)
-        m, m_s = water[n, arrays.MASS], nodes.sums[n, arrays.MASS]
-        V, D = sums[n, 0], sums[n, 4]
-        p = along = real(0, m)
-        if _is_open(nodes, n):
-            p = field(nodes.fields, GivenPressure)[n, 0]
-        elif _is_closed(nodes, kin, n, task.rim):
-            p = sums[n, 2] / V
+        m, m_s, D = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], sums[n, 4]
+        along = real(0, m)
+        pushed, _ = _by_pressure(nodes, kin, n, task.rim)
         if _is_closed(nodes, kin, n, task.surface):
             # A wall carries the weight of its water, which is not in the mean pressure.
             squared = real(0, m)
@@ -367,12 +381,11 @@ class ShareForces(NamedTuple):
                 along += water[n, arrays.of_force(kin) + k] * force[n, d + k]
                 squared += force[n, d + k] * force[n, d + k]
             along /= squared
-        share = sums[n, 1] / V
         _, taken = _taken_up(dt * D / m)
         whole = m_s + m * (1 - taken)
         for k in range(d):
             of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
-            by_pressure = share * (force[n, k] - force[n, d + k] * p)
+            by_pressure = pushed[k]
             carried = along * force[n, d + k]
             on_water = water[n, of_force] - carried + by_pressure
             v = nodes.sums[n, of_momentum] / m_s
@@ -443,6 +456,20 @@ class MakeFlux(NamedTuple):
         stays = across + supply if closed else supply
         flux[n, d] = real(0, dt) if drained else stays / V
         flux[n, d + 1] = across + supply if drained else real(0, dt)
+        # With the mean of old and new relative velocity, what is left of the momentum's work is
+        # the work of weight, less the work of drag; water that comes and goes has its pressure's.
+        water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
+        pushed, p = _by_pressure(nodes, kin, n, task.rim)
+        work = dt * (supply - flux[n, d + 1]) * p * field(nodes.fields, PoreSums)[n, 1] / m
+        for k in range(d):
+            of_momentum = arrays.of_momentum(kin) + k
+            v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
+            # where a fix holds the soil, its velocity is prescribed all the time
+            before = v if nodes.update[n, k] == v else nodes.update[n, k] - dv
+            w = 0.5 * ((water[n, of_momentum] + again[n, k]) / m - before - v)
+            dv += out[n, d + k]
+            work += w * (m * dv - dt * pushed[k])
+        field(nodes.fields, WaterWork)[n, 0] += work
 
 
 # --- nodes to points ------------------------------------------------------------------------------
@@ -452,8 +479,8 @@ class MoveWater(eq.Task):
     """Gathers w* and its change after `Move`; updates the water's velocity."""
 
     says = "velocity of the water"
-    reads = ("x", "v", "state", "material", "relative velocity")
-    writes = ("relative velocity", "v")
+    reads = ("x", "v", "mass", "state", "material", "relative velocity", "work of forces")
+    writes = ("relative velocity", "v", "work of forces")
 
     def empty(task, w, x):
         return x - x, x - x
@@ -480,6 +507,9 @@ class MoveWater(eq.Task):
         unseen = (b / (1 + b)) * (new - at_nodes)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
         store(pt.w.points.v, pt.p, pt.v + (m / (1 + m)) * unseen)
+        # Work of this impulse; the nodes count the velocity after it as the end of their step.
+        way = dot(unseen, change) - new.squared() + (new - unseen).squared()
+        increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * (m / (1 + m)) * way,))
         return eq.Report(real(0, pt.dt), fastest)
 
 

@@ -55,10 +55,20 @@ def _advance_in_run(law, kin, state, step):
 laws.wraps(
     Saturated, "law", "skeleton", (
         laws.jacobian, laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain,
-        laws.energy_density, laws.dissipated_energy, laws.damage, laws.damage_initiation,
+        laws.dissipated_energy, laws.damage, laws.damage_initiation,
         laws.plastic_strain, laws.specific_volume, laws.shear_part, laws.by_rates, laws.with_stress,
     ),
 )  # fmt: skip
+
+
+@laws.energy_density.on(Saturated)
+def _energy_density_saturated(law, kin, state):
+    """Return the energy of skeleton and water; d/d pores of the latter is -p."""
+    x = state.content / state.pores - 1
+    series = x * x * (0.5 - x * (1 / 3 - x * (0.25 - 0.2 * x)))
+    compressed = where(abs(x) < 0.01, series, x - logarithm(1 + x))
+    stiff = where(x < 0, law.suction, law.K)
+    return laws.energy_density(law.law, kin, state.skeleton) + stiff * state.pores * compressed
 
 
 def _terms(law, kin, state, of_skeleton):
