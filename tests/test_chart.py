@@ -335,6 +335,19 @@ def test_orders_have_their_sign_by_the_work_of_runs_not_by_noise_of_their_times(
     assert not line.rises
 
 
+def test_times_of_several_machines_are_not_compared(table, capsys):
+    table = table / "sweep.csv"
+    lines = table.read_text("utf-8").splitlines()
+    named = [f"{line},node-{k % 2}" for k, line in enumerate(lines[1:])]
+    table.write_text("\n".join([f"{lines[0]},machine", *named]) + "\n", "utf-8")
+    assert main(["chart", str(table), "-accuracy", "err"]) == 1
+    said = capsys.readouterr().err
+    assert "on 2 machines: node-0, node-1" in said and "-cost node_visits" in said
+    where = ["-where", re.search("-where '(.*)'", said)[1]]
+    assert main(["chart", str(table), "-accuracy", "err", *where]) == 0
+    assert main(["chart", str(table), "-accuracy", "err", "-x", "N"]) == 0
+
+
 def test_lines_that_end_together_share_a_name():
     """Four of one colour have one; another colour, and another place, have their own."""
     axes = blank_figure(8.4, 5.2).subplots()

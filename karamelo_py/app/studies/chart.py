@@ -107,6 +107,8 @@ def run(options: Namespace) -> int:
         return uncertainty.draw(options, table)
     if options.y:
         return results.draw(options, table, by)
+    if costs:
+        require_one_machine(table, options.cost)
     family = Family(table, options.accuracy, options.cost, by=by, along=options.x)
     if len(family.without) == len(table.rows):
         raise ScriptError(f"no run has a value of '{options.accuracy}' above 0")
@@ -145,12 +147,23 @@ def read(path: Path, where: Sequence[str]) -> Table:
             expected=f"{path.with_suffix('.json')}, which sweep writes next to it",
         )
     variables = list(made.get("variables") or list(rows[0])[: list(rows[0]).index("seconds")])
-    words = {row[name] for row in rows for name in variables}
+    tested = [*variables, *(["machine"] if "machine" in rows[0] else [])]
+    words = {row[name] for row in rows for name in tested}
     for condition in where:
-        rows = [r for r in rows if holds(condition, {n: r[n] for n in variables}, words)]
+        rows = [r for r in rows if holds(condition, {n: r[n] for n in tested}, words)]
     if not rows:
         raise ScriptError("no row fulfils -where " + " and ".join(where))
     return Table(rows, variables, path, made)
+
+
+def require_one_machine(table: Table, cost: str) -> None:
+    machines = sorted({row["machine"] for row in table.rows if row.get("machine")})
+    if cost in TIMES and len(machines) > 1:
+        raise ScriptError(
+            f"these runs took their times on {len(machines)} machines: {', '.join(machines)}",
+            expected="a cost that all machines have in common, or the runs of one machine",
+            hint=f"-cost node_visits, or -where 'machine == \"{machines[0]}\"'",
+        )
 
 
 def side_by_side(options: Namespace) -> int:
@@ -267,6 +280,7 @@ def tell(family: Family, *, costs: bool) -> None:
         )
 
 
+TIMES = ("seconds", "cpu_seconds", "wall_s", "particle_steps_per_s")
 _WIDEST = 480
 _MOST = 60
 
