@@ -79,7 +79,140 @@ def test_a_projectile_goes_through_a_plate(run_script, refine):
         assert np.ptp(result.log.momentum) < 1e-8 * abs(result.log.momentum[0])
         lost = float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])
         assert abs(lost) < 2
-    assert remains[0] == pytest.approx(181.1, rel=0.06 if refine > 1 else 0.15)
+    assert remains[0] == pytest.approx(181.1, rel=0.06 if refine > 1 else 0.2)
     part = 0.197 / (0.197 + plug)
     limit = 285.4**2 - (remains[0] / part) ** 2
     assert remains[1] == pytest.approx(part * np.sqrt(350**2 - limit), rel=0.05)
+
+
+# --- nothing passes ---------------------------------------------------------------------------
+
+HEAD = """
+method(ulmpm/contacts, FLIP, linear, 0.99)
+dimension(2, 0, 3, -1, 1.5, 0.1)
+eos(bulk, linear, 1500, 5e5)
+strength(grains, drucker-prager, 3e5, 0, 30, 0)
+material(sand, eos-strength, bulk, grains)
+material(steel, rigid, 7800)
+region(floor, block, INF, INF, INF, -1)
+region(l0, block, INF, 0, INF, INF)
+region(r0, block, 3, INF, INF, INF)
+region(sides, union, l0, r0)
+group(floor, nodes, region, floor, all)
+group(sides, nodes, region, sides, all)
+fix(floor, velocity_nodes, floor, 0, 0)
+fix(sides, velocity_nodes, sides, 0, NULL)
+fix(g, body_force, all, 0, -9.81)
+dump(d, all, particle, 100, d.*.LAMMPS, x, y)
+"""
+# Walls of one cell that lean by 45 degrees, with an outlet of 6 cells at y = 0.
+HOPPER = (
+    HEAD
+    + """
+c = 0.1*sqrt(2)
+region(band, block, INF, INF, 0, 1)
+region(l1, plane, 1.2, 0, -1, -1)
+region(l2, plane, 1.2 - c, 0, 1, 1)
+region(r1, plane, 1.8, 0, 1, -1)
+region(r2, plane, 1.8 + c, 0, -1, 1)
+region(left, intersection, l1, l2, band)
+region(right, intersection, r1, r2, band)
+region(i1, plane, 1.2, 0, 1, 1)
+region(i2, plane, 1.8, 0, -1, 1)
+region(fill, block, INF, INF, 0.1, 0.8)
+region(pile, intersection, i1, i2, fill)
+solid(pile, region, pile, 2, sand, 0.1)
+solid(left, region, left, 2, steel, 0.1)
+solid(right, region, right, 2, steel, 0.1)
+fix(f, contact/friction, pile, left, 0.3)
+run_time(1)
+"""
+)
+CUP = (
+    HEAD
+    + """
+region(outer, block, 1, 2, 0, 1)
+region(inner, block, 1.1, 1.9, 0.1, 2)
+region(cup, difference, outer, inner)
+region(pile, block, 1.1, 1.9, 0.1, 0.6)
+solid(pile, region, pile, 2, sand, 0.1)
+solid(cup, region, cup, 2, steel, 0.1)
+fix(c, rigid_body, cup, motion=(2*cos(10*time), 0.5*sin(20*time)), turning=cos(5*time))
+fix(f, contact/friction, pile, cup, 0.3)
+log_modify(custom, time, c_x, c_y, c_rz)
+run_time(1)
+"""
+)
+BALL = """
+h = 0.1
+method({method}, FLIP, linear, 0.99)
+dimension(2, 0, 2, 0, 2, h)
+region(ball, cylinder, 0.85, 1, 0.5*h)
+region(wall, block, 1, 1 + h, 0.4, 1.6)
+material(steel, rigid, 8000)
+material(rubber, neo-hookean, 1000, 1e5, 0.3)
+solid(ball, region, ball, 4, {ball}, h)
+solid(wall, region, wall, 4, {wall}, h)
+region(low, block, INF, INF, INF, 0.5)
+region(high, block, INF, INF, 1.5, INF)
+region(ends, union, low, high)
+group(ends, nodes, region, ends, all)
+group(ball, particles, region, ball, solid, ball)
+{lines}
+region(middle, block, 1, 1 + h, 0.9, 1.1)
+group(middle, particles, region, middle, solid, wall)
+compute(m, min_position, middle)
+compute(c, center_of_mass, ball)
+set_output(1)
+log_modify(custom, time, c_x, c_y, m_x)
+run_time(0.4)
+"""
+SPEED = 0.1 * (1e5 * 0.7 / (1.3 * 0.4) / 1000) ** 0.5
+THROWN = f"fix(b, rigid_body, ball, velocity=({SPEED}, 0))\nfix(e, velocity_nodes, ends, 0, 0)"
+
+
+def grains(result):
+    """Positions of the sand in each dump, and those of the other bodies."""
+    paths = sorted(result.folder.glob("d.*.LAMMPS"), key=lambda path: int(path.name.split(".")[1]))
+    for path in paths:
+        table = result.dump(path.name)
+        x, sand = np.stack([table.x, table.y]), table.type == 1
+        yield x[:, sand], x[:, ~sand]
+
+
+def test_a_hopper_with_leaning_walls_does_not_leak(run_script):
+    for (x, y), _ in grains(run_script(HOPPER)):
+        inside = (y > 0) & (y < 1)
+        assert np.maximum(1.2 - x - y, x - y - 1.8)[inside].max() < 0.05 * np.sqrt(2)
+    assert (y < 0).mean() > 0.6  # through the outlet
+
+
+def test_grains_stay_in_a_cup_that_moves_and_tilts(run_script):
+    start = None
+    for sand, cup in grains(run_script(CUP)):
+        arms = cup - cup.mean(axis=1, keepdims=True)
+        start = cup if start is None else start
+        centre = start.mean(axis=1, keepdims=True)
+        turn = arms @ (start - centre).T
+        angle = np.arctan2(turn[1, 0] - turn[0, 1], np.trace(turn))
+        back = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        x, y = back @ (sand - cup.mean(axis=1, keepdims=True)) + centre
+        low = y < 1
+        assert max((1.1 - x[low]).max(), (x[low] - 1.9).max(), 0.1 - y.min()) < 0.05
+
+
+@pytest.mark.parametrize("thrown", ["steel", "rubber"])
+@pytest.mark.parametrize("method", ["ulmpm/contacts", "ulmpm"])
+def test_a_ball_does_not_pass_a_wall_of_one_cell(run_script, method, thrown):
+    """At 0.1 of the speed of sound; the rigid one is 8 times as dense as the wall."""
+    touch = "fix(t, contact/rigid_body, all, {})\n" if method == "ulmpm" else ""
+    if thrown == "steel":
+        lines = f"fix(b, rigid_body, ball, velocity=({SPEED}, 0))\n" + touch.format("ball")
+        lines += "fix(e, velocity_nodes, ends, 0, 0)"
+    else:
+        lines = "fix(w, rigid_body, wall, motion=(0, 0), turning=0)\n" + touch.format("wall")
+        lines += f"fix(v, initial_velocity_particles, ball, {SPEED}, 0)"
+    wall = "rubber" if thrown == "steel" else "steel"
+    log = run_script(BALL.format(method=method, ball=thrown, wall=wall, lines=lines)).log
+    assert (log.m_x - log.c_x).max() < 0.3 and (log.m_x - log.c_x).min() < 0.06
+    assert (log.m_x - log.c_x).min() > 0  # the centre does not reach the wall

@@ -22,6 +22,7 @@ from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
 SOFT = 0.1  # fraction of the penetration removed in a step
+DEEP = 0.125  # cells of penetration, from which on the spring hardens: a heavy body on few points
 
 _call = caller_of(CALL)
 
@@ -102,7 +103,9 @@ def _list_point(body, surface, s, block, p):
         for c in range(d):
             contact.v[c] += weight * s.nodes.update[n, c]
     contact.gap, contact.mass, contact.mu = -within - ball, points.mass[p], surface.mu
-    contact.share = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
+    deep = max((within + ball) / (DEEP * h), 1.0)
+    share = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
+    contact.share = min(deep * deep * share, 1.0)
     contact.most = 0.0
     return True
 

@@ -430,8 +430,9 @@ class ContactRigidBody(Fix):
 
     A point is a ball (in 2D a disk) with half the side of a cube of its volume as its radius. Its
     impulse acts on the nodes of the point, and on the body at the point: a spring of 0.1 m/dt^2
-    stops it, implicit in the velocity of the body at the end of the step. Friction stops the slip,
-    with at most mu times the normal impulse. Nodes held by fix velocity_nodes do not yield.
+    stops it, implicit in the velocity of the body at the end of the step; it hardens from 1/8 of a
+    cell of penetration on. Friction stops the slip, with at most mu times the normal impulse. Nodes
+    held by fix velocity_nodes do not yield.
 
     For ulmpm and tlmpm. A body rolls on its radius plus half a point: with a radius of 3 cells, its
     acceleration on a slope is 3.6 % too large (2 % in 3D). Use ulmpm/contacts for liquids, and for
