@@ -28,11 +28,11 @@ SLOPE = """
     solid(block, region, block, 2, rubber, 0.1, 0, points=cut)
     fix(rub, contact/surface, all, slope, {mu}{way})
     fix(g, body_force, all, 0, -10)
-    compute(v, average_velocity, all)
-    along = v_x*c - v_y*s
+    compute(p, linear_momentum, all)
+    along = (p_x*c - p_y*s + {share}*{mu}*(p_x*s + p_y*c))/max(-g_y/10, 1e-9)
     set_output(time(0.01))
     log_modify(custom, step, time, along)
-    run_time(0.4)
+    run_time(0.2)
 """
 
 
@@ -44,13 +44,14 @@ SLOPE = """
 def test_a_block_slides_down(run_script, mu, way, share):
     """Acceleration g (sin - mu cos), or g (sin + mu cos) on a belt that moves faster downhill.
 
-    The tolerance of 2 % of g sin covers oscillation of the block, whose weight acts at once.
+    The weight acts at once, and the block bounces: mu times its velocity across is added, which
+    friction takes with each push.
     """
-    done = run_script(SLOPE.format(method="tlmpm", mu=mu, way=way))
-    late = done.log.Time > 0.1
+    done = run_script(SLOPE.format(method="tlmpm", mu=mu, way=way, share=share))
+    late = done.log.Time > 0.02
     found = np.polyfit(done.log.Time[late], done.log.along[late], 1)[0]
     exact = 10 * (sin(radians(20)) - share * mu * cos(radians(20)))
-    assert found == pytest.approx(exact, abs=0.02 * 10 * sin(radians(20)))
+    assert found == pytest.approx(exact, abs=0.003 * 10 * sin(radians(20)))
     assert "energy balance: spurious gain" not in done.err
 
 
@@ -166,10 +167,11 @@ def test_sand_slides_on_facets(run_script, tmp_path):
 
 
 def pushed(run_interpreted, d: int, die: str, *lines: str, folder: str) -> list[float]:
-    """Force on a block whose lowest points, just above 0.3, overlap a region below it."""
+    """Force on a block that falls on a region below it, which its lowest points overlap."""
     names = [f"F_{axis}" for axis in "xyz"[:d]]
     text = block(
         d, *lines, die, "fix(F, contact/surface, all, die)",
+        f"fix(falls, initial_velocity_particles, all, {'0, ' * (d - 1)}-1)",
         f"log_modify(custom, step, {', '.join(names)})", "set_dt(0.001)", "run(1)",
     )  # fmt: skip
     log = run_interpreted(text, folder=folder).log
@@ -232,6 +234,24 @@ def test_a_wall_of_one_cell_stops_a_rod(run_interpreted):
     assert min(done.log.a_x) > -0.5 * 0.125
 
 
+@pytest.mark.parametrize("scheme", ["musl", "usavg"])
+def test_bounces_gain_no_energy(run_interpreted, scheme):
+    """A column whose weight acts at once bounces on a wall: damping alone takes its energy.
+
+    A spring that followed the points, not the velocity that strains, gave back a tenth more.
+    """
+    text = ROD.replace("ulmpm,", "tlmpm,").replace("1, 100, 0)", "1000, 1e6, 0)")
+    text = text.replace("0.002, 1.002", "0, 1").replace(
+        "fix(flies, initial_velocity_particles, all", "fix(weight, body_force, all"
+    )
+    text = text.replace("-0.1)", "-10)").replace(
+        "h)\n    region", f"h)\n    scheme({scheme})\n    region", 1
+    )
+    done = run_interpreted(text)
+    change = float(re.search(r"energy +([-+][\d.]+) % of the largest", done.out)[1])
+    assert abs(change) < 0.5 and "energy balance" not in done.err
+
+
 @pytest.mark.parametrize("offset", [0, 0.5])
 def test_a_body_at_rest_has_its_stress_down_to_the_surface(run_interpreted, offset):
     """Columns under their weight: rho g times the height above, wherever cells end.
@@ -255,7 +275,7 @@ def test_a_body_at_rest_has_its_stress_down_to_the_surface(run_interpreted, offs
     """)
     rows = done.dump(next(done.folder.glob("e.*.LAMMPS")).name)
     exact = [1500, 1500, 500, 500] if offset == 0 else [1750, 1000, 1000, 250]  # means of cells
-    assert -rows.s11[np.argsort(rows.x)] == pytest.approx(exact, rel=0.12)
+    assert -rows.s11[np.argsort(rows.x)] == pytest.approx(exact, rel=0.12, abs=45)
 
 
 def test_a_body_that_begins_in_a_region_is_told(run_interpreted):

@@ -484,10 +484,19 @@ STEEL = "linear, {rho}, {E}, 0.3"
         ("units(mm, t, s)", STEEL.format(rho=7.85e-9, E=210e3), ""),
         ("", STEEL.format(rho=7850, E=1e3), ""),
         ("units(mm, g, ms)", STEEL.format(rho=7850, E=210e9), "density is 7.85e+09 kg/m^3"),
-        ("units(mm, g, ms)", STEEL.format(rho=7850, E=210e9), "density 0.001; 1 GPa is 1e+03 MPa"),
+        (
+            "units(mm, g, ms)",
+            STEEL.format(rho=7850, E=210e9),
+            "density 0.001; steel the modulus 2e+05 MPa",
+        ),
         # sqrt((K + 4/3 G) / rho) = 5172 m/s sqrt(1.346), and 1000 times that
         ("units(m, kg, s)", STEEL.format(rho=7850, E=210e15), "speed of waves is 6e+06 m/s"),
         ("units(m, kg, s)", STEEL.format(rho=7.85, E=210e6), "density is 7.85 kg/m^3"),
+        (
+            "",
+            STEEL.format(rho=210e9, E=7850),
+            "modulus 1.06e+04, which makes waves of the speed 0.000224",
+        ),
         ("units(m, kg, s)", "eos-strength, thin, thin", ""),  # air
         ("units(m, kg, s)", "rigid, 7850", ""),
     ],

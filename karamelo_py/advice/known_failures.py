@@ -18,7 +18,7 @@ from karamelo_py.kernels.watch import BORNE
 from karamelo_py.language.rules import Advice
 from karamelo_py.output.node_columns import places_of
 from karamelo_py.output.point_table import COMPONENTS, PointTable
-from karamelo_py.output.units import DENSITY, STRESS, VELOCITY
+from karamelo_py.output.units import DENSITY, STRESS, VELOCITY, Units
 from karamelo_py.points.laws import can, constrained_velocity, law_kind, law_traits, specific_volume
 from karamelo_py.run import stable_step
 from karamelo_py.run.no_number import endless_speed
@@ -33,6 +33,8 @@ ENDLESS = 1e8
 MIXED = 300  # step over the stable step, above which wrong units are likelier
 DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases excluded
 IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
+# Least density, and moduli, of solids in m, kg, s and in mm, t, s with the two numbers swapped.
+SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)
 SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to above diamond
 REST = "a scene at rest"
 UNITS = (
@@ -177,28 +179,40 @@ def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
 
 
 def _other_units(s: SceneFacts) -> Iterator[Advice]:
-    units = s.hub.output.units
-    if units is None:
-        return
+    units, doubted = s.hub.output.units, {}
     for solid in s.hub.solids.values():
-        law = solid.material.law
-        density = units.si(DENSITY) / float(specific_volume(law))
-        speed = units.si(VELOCITY) * stable_step.elastic_speed(s.simulation, solid)[0]
-        least = min(law_traits(kind).least_density for kind in law_kind(law))
-        odd = []
-        if not least <= density <= DENSITIES[1]:
-            odd.append(f"density is {density:.3g} kg/m^3")
-        if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 is rigid
-            odd.append(f"speed of waves is {speed:.3g} m/s")
-        if odd:
-            yield Advice(
-                f"units of material '{solid.material.id}'",
-                f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}: no real material "
-                "has such values",
-                f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
-                f"1 GPa is {1e9 / units.si(STRESS):.3g} {units.name(STRESS)}",
-                mark=solid.material.mark,
-            )
+        speed = stable_step.elastic_speed(s.simulation, solid)[0]
+        if words := _odd_in(units, solid.material.law, speed):
+            doubted[solid.material] = words
+    for material, (odd, fix) in list(doubted.items())[:1]:
+        others = [repr(one.id) for one in doubted if one is not material]
+        odd += f"; the same holds for {', '.join(others)}" * bool(others)
+        yield Advice(f"units of material '{material.id}'", odd, fix, mark=material.mark)
+
+
+def _odd_in(units: Units | None, law: object, speed: float) -> tuple[str, str] | None:
+    """Return what no real material has, and what to write."""
+    density = 1 / float(specific_volume(law))
+    modulus = density * speed**2
+    if units is None:
+        if not any(density >= one and low <= modulus <= high for one, low, high in SWAPPED):
+            return None
+        words = f"its density {density:.3g} is far above its modulus {modulus:.3g}, which makes "
+        return f"{words}waves of the speed {speed:.3g}: swapped?", "the density, then the modulus"
+    density, speed = units.si(DENSITY) * density, units.si(VELOCITY) * speed
+    odd, least = [], min(law_traits(kind).least_density for kind in law_kind(law))
+    if not least <= density <= DENSITIES[1]:
+        odd.append(f"density is {density:.3g} kg/m^3")
+    if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 is rigid
+        odd.append(f"speed of waves is {speed:.3g} m/s")
+    if not odd:
+        return None
+    return (
+        f"with units({', '.join(units[:3])}) its {' and its '.join(odd)}: no real material has "
+        "such values",
+        f"in {units.name(DENSITY)} water has the density {1e3 / units.si(DENSITY):.3g}; "
+        f"steel the modulus {2e11 / units.si(STRESS):.3g} {units.name(STRESS)}",
+    )
 
 
 def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> None:

@@ -98,14 +98,15 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     _refuse_wrong_order(kind, ID, style, arguments)
     with signature.in_new_words(kind, ID, style, arguments):
         target = registry.called(kind, ID, style)
-    if ID in others and set(others[ID].published) & set(target.published):
+    other = others[ID].published if ID in others else ()
+    if set(other) & set(target.published):
         message = f"'{ID}' is a {others.kind} already (line {others[ID].mark.line})"
         expected = f"another ID: {ID}_x and similar names would be ambiguous"
         raise ScriptError(message, argument="ID", expected=expected)
     catalogue.refuse_unnameable(ID)
     _check_names(hub, kind, ID, target)
     if kind == "fix" and target.reads_itself and ID not in catalogue:
-        hub.values.publish_vector(ID, target.published)
+        hub.values.publish_vector(ID, target.published, other)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style
     if kind == "fix" and new.by_sizes and hub.domain.thickness != 1:
@@ -121,7 +122,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
         )
     catalogue.add(ID, new, replace=replaces)
     hub.asked.update(new.columns)
-    hub.values.publish_vector(ID, new.published)
+    hub.values.publish_vector(ID, new.published, other)
     group = new.group
     if group is not None and not group.all and len(group) == 0:
         hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")

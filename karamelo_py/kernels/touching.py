@@ -5,13 +5,14 @@ A point is a ball; its force is along the steepest descent of its depth.
 
 from collections.abc import Callable
 from math import sqrt
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba import types
 
-from karamelo_py.compiler import caller_of, importable, noinline, point_function
+from karamelo_py.compiler import caller_of, importable, kernel, noinline, point_function
 from karamelo_py.compiler.fields import field, increase, load_vector, store
 from karamelo_py.kernels import hooks
+from karamelo_py.kernels.arrays import vector_at
 from karamelo_py.kernels.equations.internal_force import ContactLoss, Force
 from karamelo_py.kernels.surfaces import depth, slopes
 from karamelo_py.kernels.views import volume_of
@@ -19,7 +20,7 @@ from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
 STIFF = 0.5  # contact stiffness, over m / dt^2
-DAMPED = 0.2  # contact damping, over m / dt
+DAMPED = 0.02  # contact damping, over m / dt
 STIFFENING = 0.02  # fraction of the depth removed in a step, of a deep contact
 ASIDE = 0.05  # step of depth differences, over the reach
 LEVEL = 1e-3  # change of depth over that step, below which there is no direction
@@ -50,7 +51,17 @@ def direction_of(falls, step):
 
 @point_function()
 def memory_of(tag, members):
-    """Return the arrays of lever and grip (or None) of a fix."""
+    """Return the arrays of lever, grip (or None) and loss of a fix."""
+
+
+def ball_at_first(ball, within, closer):
+    """Return the radius of a point at its first touch, which came `closer` in the last step.
+
+    Points that begin in the region, as at stair-stepped faces, have no energy of that: their balls
+    reach to the surface.
+    """
+    room = max(closer, 0.0) - within
+    return min(ball, room) if room > 0 else ball
 
 
 def spring_rate(before, now, within, reach):
@@ -63,6 +74,86 @@ def spring_rate(before, now, within, reach):
     return min(now, (1 + STIFFENING) * before if within > 0.5 * reach else before)
 
 
+class NearPoint(NamedTuple):
+    """A point near a shape (or n points, in rows): depth of its centre, way out, first radius."""
+
+    x: Any  # (d,) in the frame of the shape
+    within: Any
+    normal: Any  # (d,)
+    whole: Any
+    slip: Any  # (d,) velocity of the shape, seen from the point
+    mass: Any
+
+
+def reach_of(lever, p, whole, d):
+    """Return the radius along the normal, and the depth due to `follow_strain`."""
+    if lever[d + 1, p] > 0:
+        return float(lever[d, p]), float(lever[d + 4, p])
+    return whole, 0.0
+
+
+def leave(memory, p, near):
+    (lever, grip, _), d, none = memory, len(near.x), near.x - near.x
+    if lever[d + 1, p] > 0:
+        ball, aside = reach_of(lever, p, near.whole, d)
+        kept = 1.0 if near.within > -near.whole else 0.0
+        depths = kept * ball, kept * lever[d + 1, p], near.within + ball + aside, 0.0
+        store(lever, p, (*none, *depths, kept * aside, 0.0))
+    if grip is not None and grip[d, p] != 0:
+        store(grip, p, (0.0,) * (2 * d + 2))
+    return none
+
+
+def push(terms, memory, p, near):
+    """Return the force (d,) on a point that touches; update its `memory`.
+
+    `terms`: friction coefficient, largest known depth, dt, contact dt and kick, and kick.
+    """
+    (lever, grip, losses), (x, within, normal, whole, slip, mass) = memory, near
+    mu, reach, dt, contact_dt, contact_kick, kick = terms
+    d, last_dt, closer = len(x), dt, dt * dot(slip, normal)
+    ball, aside = reach_of(lever, p, whole, d)
+    rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, reach)
+    if lever[d + 1, p] > 0:  # from positions, because velocities are noisy
+        closer, last_dt = within + ball + aside - float(lever[d + 2, p]), 2 * kick - dt
+    else:
+        ball = ball_at_first(ball, within, closer)
+    pressed = within + ball + aside
+    spring = mass * rate * pressed
+    load = max(spring + mass * DAMPED / contact_kick * closer / last_dt, 0.0)
+    lost = 0.5 * (load - spring + lever[d + 3, p]) * closer
+    store(lever, p, (*(sqrt(load * ball) * normal), ball, rate, pressed, load - spring))
+    if grip is None:
+        increase(losses, p, (lost,))
+        return load * normal
+    hold = x._make([float(grip[k, p]) for k in range(d)])
+    mean, unused = float(grip[d, p]), float(grip[d + 1, p])
+    slid = x - x
+    if mean > 0:  # from positions, because velocities are noisy
+        slid = x._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
+        slip = 1 / (2 * kick - dt) * slid
+    hold = along(hold + mass * rate * slid, normal)
+    stop = along(mass / contact_kick * slip, normal)
+    rubbed, held = rub(mu, load, FrictionMemory(hold, mean, unused), stop)
+    store(grip, p, (*held.hold, held.mean, held.unused, *x))
+    increase(losses, p, (lost + kick * dot(rubbed, slip),))
+    return load * normal + rubbed
+
+
+@kernel
+def push_points(kin, terms, memory, near, force):
+    """Set the forces (n, d) of a shape that kernels do not know on n points."""
+    d, none = kin.dimension, zero_vector(kin, 0.0)
+    x, within, normal, whole, slip, mass = near
+    for p in range(mass.size):
+        vectors = [vector_at(kin, array, p, 0, none) for array in (x, normal, slip)]
+        one = NearPoint(vectors[0], within[p], vectors[1], whole[p], vectors[2], mass[p])
+        touches = one.within + sum(reach_of(memory[0], p, one.whole, d)) > 0
+        pushed = push(terms, memory, p, one) if touches else leave(memory, p, one)
+        for k in range(d):
+            force[p, k] = pushed[k]
+
+
 @noinline
 def force_of(tag, members, volume, one):
     """Return a shape's force (d,) on a point, a `~.hooks.Member`."""
@@ -70,19 +161,13 @@ def force_of(tag, members, volume, one):
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
     position = none._make([float(x) for x in load_vector(kin, members.x, p)])
-    whole, (lever, grip) = radius(kin, float(volume), position), memory_of(tag, members)
-    ball = float(lever[d, p]) if lever[d, p] > 0 else whole
-    x = position - way
+    whole, memory = radius(kin, float(volume), position), memory_of(tag, members)
+    ball, aside = reach_of(memory[0], p, whole, d)
+    x, mass = position - way, float(members.points.mass[p])
     # most points are far, and a short reach is cheap
-    within = depth(tag.shape, kin, x, 1.001 * max(ball, whole))
-    if within <= -ball:
-        if lever[d, p] != 0:
-            near = 1.0 if within > -whole else 0.0
-            depths = near * ball, near * lever[d + 1, p], within + ball, 0.0
-            store(lever, p, (*none, *depths))
-        if grip is not None and grip[d, p] != 0:
-            store(grip, p, (0.0,) * (2 * d + 2))
-        return none
+    within = depth(tag.shape, kin, x, 1.001 * max(ball + aside, whole))
+    if within + ball + aside <= 0:
+        return leave(memory, p, NearPoint(x, within, none, whole, none, mass))
     if within > ball:
         within = depth(tag.shape, kin, x, tag.reach)
     step = ASIDE * tag.reach
@@ -93,32 +178,8 @@ def force_of(tag, members, volume, one):
         return none
     velocity = (1 / dt) * (none._make(values[d : 2 * d]) - way)
     slip = velocity - none._make([float(v) for v in load_vector(kin, members.points.v, p)])
-    contact_dt, contact_kick, kick = values[2 * d :]
-    mass, closer, last_dt = float(members.points.mass[p]), dt * dot(slip, normal), dt
-    rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, tag.reach)
-    if lever[d + 1, p] > 0:  # from positions, because velocities are noisy
-        closer, last_dt = within + ball - float(lever[d + 2, p]), 2 * kick - dt
-    spring = mass * rate * (within + ball)
-    load = max(spring + mass * DAMPED / contact_kick * closer / last_dt, 0.0)
-    lost = 0.5 * (load - spring + lever[d + 3, p]) * closer
-    losses = field(members.points.fields, ContactLoss)
-    arm = sqrt(load * ball) * normal
-    store(lever, p, (*arm, ball, rate, within + ball, load - spring))
-    if grip is None:
-        increase(losses, p, (lost,))
-        return load * normal
-    hold = none._make([float(grip[k, p]) for k in range(d)])
-    mean, unused = float(grip[d, p]), float(grip[d + 1, p])
-    slid = none
-    if mean > 0:  # from positions, because velocities are noisy
-        slid = none._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
-        slip = 1 / (2 * kick - dt) * slid
-    hold = along(hold + mass * rate * slid, normal)
-    stop = along(mass / contact_kick * slip, normal)
-    rubbed, memory = rub(tag.mu, load, FrictionMemory(hold, mean, unused), stop)
-    store(grip, p, (*memory.hold, memory.mean, memory.unused, *x))
-    increase(losses, p, (lost + kick * dot(rubbed, slip),))
-    return load * normal + rubbed
+    near = NearPoint(x, within, normal, whole, slip, mass)
+    return push((tag.mu, tag.reach, dt, *values[2 * d :]), memory, p, near)
 
 
 def touch_kind(lever: type, grip: type | None) -> type[Touch]:
@@ -130,7 +191,8 @@ def touch_kind(lever: type, grip: type | None) -> type[Touch]:
         @memory_of.on(kind)
         def _memory_of(tag, members):
             fields = members.points.fields
-            return field(fields, lever), field(fields, grip) if grip else None
+            held = field(fields, grip) if grip else None
+            return field(fields, lever), held, field(fields, ContactLoss)
 
         return kind
 

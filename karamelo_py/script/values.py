@@ -43,11 +43,13 @@ class Values:
         self.array[slot] = value
         return slot
 
-    def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES) -> None:
+    def publish_vector(
+        self, ID: str, suffixes: Sequence[str] = SUFFIXES, others: Sequence[str] = ()
+    ) -> None:
         """Publish ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other
-        suffixes. Earlier names of the ID that `suffixes` lacks are removed.
+        suffixes. Earlier names of the ID that `suffixes` and `others` lack are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
@@ -62,8 +64,9 @@ class Values:
             name = f"{ID}_{suffix}" if suffix else ID
             self._slots[name] = number
             slots[name] = self.publish(name)
+        kept = {f"{ID}_{suffix}" if suffix else ID for suffix in others}
         for name, slot in self._of.get(ID, {}).items():
-            if name not in slots and self._slots.get(name) == slot:
+            if name not in slots.keys() | kept and self._slots.get(name) == slot:
                 del self._slots[name]
         self._of[ID] = slots
 

@@ -3,6 +3,8 @@
 The total frame has reference volume and gradients, and the first Piola-Kirchhoff stress.
 """
 
+from math import sqrt
+
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, StepField, increase, load_vector, vector
 from karamelo_py.compiler.lanes import of_present
@@ -24,10 +26,11 @@ class Lever(Field):
     """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
 
     The force f n at x - r n acts like a force at x and the stress f r n n / V. 0: no contact.
-    The others are stiffness over mass, depth, and the damping part of f.
+    The others are stiffness over mass, depth, the damping part of f, the depth that is due to
+    `follow_strain`, and the last increment of strain along n.
     """
 
-    shape = staticmethod(lambda kin: kin.dimension + 4)
+    shape = staticmethod(lambda kin: kin.dimension + 6)
 
 
 class ContactLoss(Field):
@@ -57,14 +60,34 @@ def _levers(pt):
     return [one.array for one in pt.w.points.fields if isinstance(one, Lever)]
 
 
-def stretch_levers(pt, growth):
-    """Stretch the levers of contacts with a spatial increment dt grad v, and add their work."""
+def stretch_levers(pt, growth, mean):
+    """Stretch the levers of contacts with a spatial increment dt grad v, and add their work.
+
+    `mean`: forces act between two increments; else within this one.
+    """
     for lever in _levers(pt):
         arm = load_vector(pt.kin, lever, pt.p)
-        d, strained, square = len(arm), dot(arm, growth.planar() @ arm), arm.squared()
-        increase(pt.of(WorkOfForces), pt.p, (-strained,))
-        rate = where(square > 0, strained, 0) / where(square > 0, square, 1)
+        d, square = len(arm), arm.squared()
+        rate = dot(arm, growth.planar() @ arm) / where(square > 0, square, 1)
+        acting = 0.5 * (rate + lever[d + 5, pt.p]) if mean else rate
+        increase(pt.of(WorkOfForces), pt.p, (-square * acting,))
         lever[d, pt.p] = lever[d, pt.p] * (1 + rate)
+        lever[d + 5, pt.p] = rate
+
+
+def follow_strain(pt, v, dt):
+    """Let contact and the work of forces follow the velocity v (d,) that strains, mapped again.
+
+    Points moved by v*, which differs from v by a part of dt f / m. A spring that followed it would
+    give back more energy than it takes.
+    """
+    further = dt * v - (pt.y - pt.x)
+    work = 0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further)
+    increase(pt.of(WorkOfForces), pt.p, (work,))
+    for lever in _levers(pt):
+        arm = load_vector(pt.kin, lever, pt.p)
+        d, size = len(arm), sqrt(arm.squared())
+        lever[d + 4, pt.p] -= dot(arm, further) / where(size > 0, size, 1)
 
 
 @point_function(otherwise=True)

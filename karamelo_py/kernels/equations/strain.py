@@ -3,9 +3,9 @@
 from math import inf, sqrt
 
 from karamelo_py.compiler import all_lanes, point_function, real, where
-from karamelo_py.compiler.fields import store, store_from
+from karamelo_py.compiler.fields import field, store, store_from
 from karamelo_py.kernels.equations import Report, Task, fbar
-from karamelo_py.kernels.equations.internal_force import stretch_levers
+from karamelo_py.kernels.equations.internal_force import Force, follow_strain, stretch_levers
 from karamelo_py.kernels.views import location_at
 from karamelo_py.points import frames, laws, transfers
 from karamelo_py.points.basis import carried, deformed, extent
@@ -17,6 +17,7 @@ class Strain(Task):
     of_last_step = of_load_step = in_move = again = False
     records = "velocity"
     says = "stress"
+    follows = 1.0  # fraction of a step after its move
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
 
@@ -24,14 +25,17 @@ class Strain(Task):
         gradient = zero(w.kin, x[0])
         if task.in_move and not isinstance(w.averaging, fbar.FBar):
             gradient = transfers.straining(w.transfer, w.kin, gradient)
-        return gradient, fbar.no_ratio(w, x[0])
+        mapped = x - x if task.follows and _pushed(w) else ()
+        return gradient, fbar.no_ratio(w, x[0]), mapped
 
     def gathered(task, node, total):
-        return add_gradient(node, total[0]), fbar.gathered_ratio(node, total[1])
+        gradient, ratio, mapped = total
+        mapped = mapped + node.N * node.v if len(mapped) else ()
+        return add_gradient(node, gradient), fbar.gathered_ratio(node, ratio), mapped
 
     def updated(task, pt, total, totals, fastest):
         """Report the domain's growth in cells, and the rate."""
-        w, (gradient, ratio) = pt.w, total
+        w, (gradient, ratio, mapped) = pt.w, total
         if not len(gradient):  # gathered by `Move`
             gradient = totals[0][2]
         dl = increment_at(w.kin, pt, gradient)
@@ -45,7 +49,9 @@ class Strain(Task):
         extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
         state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
         store(w.points.state, pt.p, state)
-        stretch_levers(pt, growth)
+        stretch_levers(pt, growth, task.follows == 1 and len(mapped) > 0)
+        if len(mapped):
+            follow_strain(pt, mapped, pt.dt / task.follows)
         now = frames.strained(w.frame, w.kin, f, dl)
         store(pt.of(frames.DeformationGradient), pt.p, now)
         j = laws.jacobian(law, w.kin, state)
@@ -61,12 +67,14 @@ class StrainOfLastStep(Strain):
     """`Strain` with the velocity of the last step, at the new positions."""
 
     of_last_step = True
+    follows = 0.0
 
 
 class SecondStrain(Strain):
     again = True
     records = ""
     says = "second half of the stress"
+    follows = 0.5
 
 
 class StrainOfLoadStep(Strain):
@@ -74,6 +82,7 @@ class StrainOfLoadStep(Strain):
 
     of_load_step = True
     records = ""
+    follows = 0.0
 
 
 class StrainInMove(Strain):
@@ -81,6 +90,7 @@ class StrainInMove(Strain):
 
     in_move = True
     records = ""
+    follows = 0.0
 
 
 class TrialStrain(Strain):
@@ -108,6 +118,10 @@ class TrialStrain(Strain):
 
 class TrialStrainOfLastStep(TrialStrain):
     of_last_step = True
+
+
+def _pushed(w):
+    return field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
 
 
 @point_function(otherwise=True)

@@ -18,6 +18,8 @@ class HeightsDump(Dump):
 
     Parameters
     ----------
+    file
+        File name with a ``*``, which becomes the step number: a raster has one snapshot.
     cell
         Side of a cell of the raster: at least twice the point spacing, or cells inside the deposit
         remain empty.
@@ -33,8 +35,7 @@ class HeightsDump(Dump):
     Notes
     -----
     The raster covers the domain, in 2D with one row. The sum of the depths times the area of a cell
-    is the volume of the points. The file name needs a ``*``, because a raster has one snapshot.
-    QGIS, ArcGIS, GDAL and region heights read the files.
+    is the volume of the points. QGIS, ArcGIS, GDAL and region heights read the files.
 
     See Also
     --------

@@ -30,13 +30,12 @@ class StiffTool(Gripping, ToolFix):
         velocity: Any,
         seen: np.ndarray,
         led: Any = 0.0,
-        fraction: float = 1.0,
     ) -> np.ndarray:
         """Return forces (n, d) that move points by `push` (n,) along `normal` in a step: m push /
         dt^2.
 
         Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops the slip on a
-        tool of this `velocity`, and reverses `fraction` of the slip distance: of the positions (n,
+        tool of this `velocity`, and reverses the slip distance: of the positions (n,
         d) `seen`, minus the displacement `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
@@ -49,7 +48,7 @@ class StiffTool(Gripping, ToolFix):
             before, one = grip[near].astype(float), stiffness[near, None]
             touched = before[:, d, None] > 0
             way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
-            pull = fraction * one * way
+            pull = one * way
             # Velocities of points contain noise that does not move them.
             slip = way / (2 * points.kick - points.dt)
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
