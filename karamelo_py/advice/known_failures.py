@@ -190,7 +190,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
         yield Advice(f"units of material '{material.id}'", odd, fix, mark=material.mark)
 
 
-def _odd_in(units: Units | None, law: object, speed: float) -> tuple[str, str] | None:
+def _odd_in(units: Units | None, law: NamedTuple, speed: float) -> tuple[str, str] | None:
     """Return what no real material has, and what to write."""
     density = 1 / float(specific_volume(law))
     modulus = density * speed**2
