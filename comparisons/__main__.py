@@ -33,6 +33,8 @@ PICTURES = DOCS / "_static" / "comparison"
 INPUTS = HERE.parent / "inputs"
 TOOLS = (
     "__main__",
+    "auto",
+    "field",
     "balance",
     "cost",
     "defaults",

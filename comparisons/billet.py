@@ -45,7 +45,7 @@ def compare(run, axes, full):
     spent, there = 4 * space.lost[-1], 2 * np.pi * flat.lost[-1]
     yield Row("plastic work (J)", there, spent, 0.03, SOURCE)
     yield Row("energy over work of the platen", 1.0, energy(space, 4), 0.03, "balance")
-    yield Row("the same, axisymmetric", 1.0, energy(flat, 2 * np.pi), 0.03, "balance")
+    yield Row("energy over work, axisymmetric", 1.0, energy(flat, 2 * np.pi), 0.03, "balance")
     press = np.linspace(0, 0.6)
     axes.plot(flat.press, flat.load, lw=0.8, label="axisymmetric")
     axes.plot(space.press, space.load, lw=0.8, label="in 3D")

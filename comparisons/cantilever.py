@@ -21,7 +21,7 @@ def compare(run, axes, full):
         early = log.Time < 1.5
         when, lowest = minimum(log.Time[early], -log.tip_s[early])
         yield Row(f"lowest point, {name} (m)", depth, lowest, within, source)
-        yield Row(f"when, {name} (s)", moment, when, within, source)
+        yield Row(f"time of the lowest point, {name} (s)", moment, when, within, source)
         axes.plot(log.Time, -log.tip_s, lw=1, label=name)
         axes.plot(moment, depth, "k+", ms=7, label="published" if name == "CPDI" else None)
     axes.set(xlabel="time (s)", ylabel="height of the lower corner (m)")

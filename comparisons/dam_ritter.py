@@ -26,7 +26,7 @@ def compare(run, axes, full):
     yield Row("mean difference of the depths in h0", 0.0, off, 0.015 * coarse, SOURCE)
     # The front starts from rest, and so is late by a constant time.
     front = last.x.max() / (C * last.TIME)
-    yield Row("place of the front in t sqrt(g h0)", 2.0, front, 0.04 * coarse, SOURCE)
+    yield Row("position of the front in t sqrt(g h0)", 2.0, front, 0.04 * coarse, SOURCE)
     axes.plot(*surface(last, RHO, 2 * DEPTH).T, "C0", label="computed")
     axes.plot(x, exact, "k-", lw=0.7, label="Ritter")
     axes.set(xlabel="x (m)", ylabel="depth (m)")

@@ -37,7 +37,7 @@ def compare(run, axes, full):
     even = np.interp(log.ux[most] / 1e3 / LENGTH, (1 - np.cos(angles)) / angles, angles)
     round_ = 1000 * LENGTH * (1 - np.sin(even) / even)
     yield Row(
-        "rise of its end where it is widest open (mm)", round_, rise, 0.25, "circle of its length"
+        "rise of its end at the widest opening (mm)", round_, rise, 0.25, "circle of its length"
     )
     last = result.snapshots("elastic_gate")
     water = [s.mass[(s.type == 1) & (s.x < 0.1)].sum() / RHO for s in last]
@@ -46,8 +46,8 @@ def compare(run, axes, full):
     name = "speed of 99 of 100 points over Torricelli's"
     yield Row(name, (0.5, 1), np.quantile(speed, 0.99) / fall, 0.1, "Torricelli")
     least = 1 - log.uy.max() / 1e3 * fall * log.Time[-1] / (0.1 * DEPTH)
-    name = "water in the tank at 0.3 s over that at first"
-    yield Row(name, (least, 1), water[-1] / water[0], 0.0, "Torricelli, gate open as widest")
+    name = "water in the tank at 0.3 s over the initial amount"
+    yield Row(name, (least, 1), water[-1] / water[0], 0.0, "Torricelli, at the widest opening")
     axes.plot(log.Time, log.ux, label="end of the gate, sideways")
     axes.plot(log.Time, log.uy, label="upwards")
     lift = np.interp(log.ux / 1e3 / LENGTH, (1 - np.cos(angles)) / angles, angles)

@@ -16,7 +16,7 @@ def touched(result: Result) -> float:
 def faces(bodies: str) -> Case:
     """The case of two bodies."""
     return Case(
-        quantity=f"time that {bodies} touch, meeting at less than a hundredth of the wave speed, "
+        quantity=f"time that {bodies} touch, meeting at less than 1 % of the wave speed, "
         "over 2 L/c",
         exact=1.0,
         measure=touched,

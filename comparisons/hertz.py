@@ -69,7 +69,9 @@ def compare(run, axes, full):
             slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
             of = f"{basis}, {rim}, {sizes[0]} to {sizes[-1]} cells"
             # Steps of the rim leave order 1; where they do not show, the basis has order 2.
-            yield Row(f"order of that error, {of}", (1.0, 2.0), slope, 0.3, "steps of the rim")
+            yield Row(
+                f"order of the stress error, {of}", (1.0, 2.0), slope, 0.3, "steps of the rim"
+            )
     x, deep = np.linspace(0, 1.5, 100), np.linspace(0.01, 0.3, 30)[:, None]
     exact = -hertz_stress(x * HALF, deep * HALF, LOAD, HALF).mean(axis=0) / LARGEST
     axes.plot(x, exact, "k-", lw=1, label="Hertz (exact)")

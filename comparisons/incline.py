@@ -1,4 +1,4 @@
-"""Elastic disk on an incline: it slides, or it rolls."""
+"""Elastic disk that slides or rolls down an incline."""
 
 from math import radians
 

@@ -31,9 +31,11 @@ def compare(run, axes, full):
     # It is free to spread sideways, too, which a plane shock does not know.
     plug = (last.type == 2) & (np.hypot(last.x0, last.y0) < 3e-3)
     speed = -np.average(last.vz[plug], weights=last.mass[plug])
-    yield Row("speed of the plug (m/s)", V, speed, 0.15, "twice that behind the shock")
+    yield Row("speed of the plug (m/s)", V, speed, 0.15, "2 x speed behind the shock")
     ahead = -last.z[last.type == 2].min() / (15e-6 * V)
-    yield Row("place of the front over v t", (0.9, 1.1), ahead, 0.05, "twice that behind the shock")
+    yield Row(
+        "position of the front over v t", (0.9, 1.1), ahead, 0.05, "2 x speed behind the shock"
+    )
     cut = last.y < 1e-3  # a cell beside a plane of symmetry, and its image in the other
     along, across, speed = (1e3 * a[cut] for a in (-last.z, last.x, -last.vz / 1e6))
     along, across, speed = np.tile(along, 2), np.append(across, -across), np.tile(speed, 2)

@@ -45,11 +45,10 @@ def compare(run, axes, full):
         # Nothing of this is published: softening widens the slide, and leaves it where it was.
         soft = run(c_residual=8e3).snapshots("slump")[-1]
         further = soft.x[soft.y > GROUND + 0.6].max() / last.x[slid].max()
-        yield Row(
-            "toe with cohesion that falls to 8 kPa, over that", (1, 1.1), further, 0.0, "softer"
-        )
+        name = "toe with residual cohesion 8 kPa over toe without"
+        yield Row(name, (1, 1.1), further, 0.0, "softer")
         line = slip(soft)
-        name = "distance between the slip surfaces with it (m)"
+        name = "distance between the slip surfaces with softening (m)"
         yield Row(name, 0.0, distance(FAILURE, line), 2.5, SOURCE)
         axes.plot(*line.T, "C2", lw=0.8, label="the same, softening")
     coloured(axes, last.x, last.y, last.ep, "plastic strain", cmap="Greys", limits=(0, 1))

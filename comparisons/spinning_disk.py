@@ -22,9 +22,11 @@ def compare(run, axes, full):
         yield Row(f"angular momentum, {transfer}", pi / 2, log.Lz_z[0], 0.04, "exact")
         kept = log.Lz_z[-1] / log.Lz_z[0]
         source = "exact" if transfer == "APIC" else "bounds"
-        yield Row(f"angular momentum kept, {transfer}", momentum, kept, within, source)
+        yield Row(
+            f"final over initial angular momentum, {transfer}", momentum, kept, within, source
+        )
         energy = log.Ek + log.Es
         kept = energy[-1] / energy[0]
-        yield Row(f"energy kept, {transfer}", energies, kept, 0.001, "bounds")
+        yield Row(f"final over initial energy, {transfer}", energies, kept, 0.001, "bounds")
         axes.plot(log.Time, log.Lz_z / log.Lz_z[0], lw=1, label=transfer)
     axes.set(xlabel="time (s)", ylabel="angular momentum / first")

@@ -26,12 +26,12 @@ def compare(run, axes, full):
         height = np.abs(1e3 * last.y - HEIGHT) < 0.25
         # A point stands half its width within the surface, as at the foot.
         middle = 2e3 * last.x[height].max() + log.diameter[-1] - 2e3 * last.x.max()
-        yield Row(f"diameter at a fifth of the length, {kind} (mm)", MIDDLE, middle, 0.05, SOURCE)
+        yield Row(f"diameter at 0.2 of the length, {kind} (mm)", MIDDLE, middle, 0.05, SOURCE)
         # What is not dissipated is stored in elastic strain, or lost by the transfer (FLIP 0.99),
         # and at the wall by nodes that come to rest there.
         spent, left = log.lost[-1] / log.Ek[0], log.Ek[-1] / log.Ek[0]
         yield Row(f"energy spent on plastic flow, {kind}", (0.88, 1), spent, 0.0, "at rest")
-        yield Row(f"kinetic energy left, {kind}", 0.0, left, 0.01, "at rest")
+        yield Row(f"remaining kinetic energy, {kind}", 0.0, left, 0.01, "at rest")
         found.append((log.length[-1], log.diameter[-1]))
         side = -1 if found[1:] else 1  # one method beside the other
         body(axes, side * 1e3 * last.x, 1e3 * last.y, kind)

@@ -51,7 +51,7 @@ def compare(run, axes, full):
     # A grip that holds the end sideways begins the neck as soon as the force is largest; a perfect
     # bar stretches evenly to 0.2. How the finite elements were held is not told.
     here, there = half(strain, stress), half(fem_strain, fem_stress)
-    yield Row("strain when half of the stress is left", there, here, 0.2, FEM)
+    yield Row("strain at half of the largest stress", there, here, 0.2, FEM)
 
     snapshots = result.snapshots("tensile_bar")
     even = snapshots[1]  # before the neck

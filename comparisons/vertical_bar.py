@@ -12,7 +12,7 @@ def compare(run, axes, full):
     lowest = log.tip_s.argmax()
     source = "finite elements (benchmark, see docs/verification.md)"
     yield Row("lowest point (m)", -1.7146, -log.tip_s[lowest], 0.05, source)
-    yield Row("when (s)", 0.0882, log.Time[lowest], 0.06, source)
+    yield Row("time of the lowest point (s)", 0.0882, log.Time[lowest], 0.06, source)
     yield Row("lowest point, clamped (m)", -1.662, -log.tip_s[lowest], 0.02, "own finite elements")
     axes.plot(log.Time, -log.tip_s, lw=1, label="tlmpm, 8 cells")
     axes.plot(0.0882, -1.7146, "k+", ms=12, label="published")

@@ -55,13 +55,13 @@ KNOWN = {
         "lost=abs((Ek + Es)/(first:Ek + first:Es) - 1)", (0.1,), "damping by the transfer"),
     "sod": Scene(
         "inputs/in.sod", f"-var refine=0.25,0.5,1,2 {TWO}", "err", (0.02, 0.05),
-        "a shock: order one"),
+        "a shock, first order"),
     "slab": Scene(
         "inputs/in.heat_slab", f"-var refine=0.25,0.5,1,2 {TWO}", "off=abs(heat/exact - 1)",
-        (1e-3, 1e-4), "heat that is driven in"),
+        (1e-3, 1e-4), "heat driven by a boundary"),
     "lame": Scene(
         "inputs/in.lame", f"-var refine=0.25,0.5,1 {TWO}", "off=abs(pressure/exact - 1)",
-        (0.01, 2e-3), "a pressure that is driven up and oscillates"),
+        (0.01, 2e-3), "a driven pressure that oscillates"),
     "incline": Scene(
         "inputs/in.incline", f"-var angle=45 -var mu=0.1 -var refine=0.25,0.5,1 {TWO}",
         "off=abs(v_x/exact - 1)", (1e-3,), "weight against friction"),
@@ -76,7 +76,7 @@ KNOWN = {
 FRESH = {
     "oblique": Scene(
         "docs/verdicts/in.oblique", f"-var refine=0.5,1,2,4 {TWO},cubic-spline", "err_history",
-        (0.05, 0.02), "edges across the grid"),
+        (0.05, 0.02), "edges inclined to the grid"),
     "pulse": Scene(
         "docs/verdicts/in.pulse", f"-var refine=0.5,1,2,4,8 -var kind=ulmpm,tlmpm {TWO}", "err",
         (0.05, 5e-3), "driven by its end"),
@@ -126,7 +126,7 @@ UNSEEN = {
         (0.01, 1e-3), "a load step, implicit, about an axis"),
 }  # fmt: skip
 GROUPS = {
-    "seen before": KNOWN, "new, rules mended by them": FRESH, "new after that": AFTER,
+    "seen before": KNOWN, "new, rules changed after them": FRESH, "new after these changes": AFTER,
     "unseen": UNSEEN,
 }  # fmt: skip
 SCENES = KNOWN | FRESH | AFTER | UNSEEN
@@ -299,9 +299,9 @@ def tables(groups: Mapping[str, Mapping[str, Scene]]) -> str:
         for word in WORDS:
             if said := [one for one in wide if one.word == word]:
                 words.append([title, word, str(len(said)), counted(said), within(said)])
-    heads = ["scene", "what is hard", "target", "advice", "its error", "cost over the least"]
+    heads = ["scene", "difficulty", "target", "advice", "its error", "cost over the lowest"]
     heads_of_words = ["scenes", "word", "targets", "verdicts", "below the upper bound"]
-    heads_of_next = ["scenes", "between the bounds", "the same of forecasts that are `not sure`"]
+    heads_of_next = ["scenes", "between the bounds", "of forecasts called `not sure`"]
     parts = ([*heads, "verdict"], rows), (heads_of_words, words), (heads_of_next, next_runs)
     return "\n\n".join(written(*part) for part in parts)
 

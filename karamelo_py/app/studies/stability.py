@@ -147,7 +147,7 @@ def run(options: Namespace) -> int:
 def growth(energy: np.ndarray) -> float:
     """Return the largest running mean over the first; inf for NaN.
 
-    Means are over a tenth of the rows. If the first is 0, the median replaces it.
+    Means are over 10 % of the rows. If the first is 0, the median replaces it.
     """
     if not len(energy):
         return 0.0

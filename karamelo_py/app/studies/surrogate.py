@@ -71,7 +71,7 @@ def indices(
 ) -> tuple[list[list[tuple[Interval, Interval]]], list[tuple[str, float]]]:
     """First and total Sobol' indices for each result and variable, and the fit of each result.
 
-    Intervals are by leaving out a tenth of the runs (delete-group jackknife), and include the error
+    Intervals are by leaving out 10 % of the runs (delete-group jackknife), and include the error
     of the sums over samples; they contain the error of the fit as far as it changes with the runs.
     """
     from scipy.stats import qmc, sobol_indices

@@ -55,7 +55,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
             yield (
                 f"lets '{solid.id}' lose strength: with averaged pressure (F-bar) in its yield "
                 "surface, the passive pressure of sand was 1.8 instead of 3",
-                "anti_volumetric_locking(false), a dilatancy of a third of the friction, or "
+                "anti_volumetric_locking(false), a dilatancy of 1/3 of the friction, or "
                 f"{_EXPLICIT}",
                 solid.mark,
             )

@@ -213,7 +213,7 @@ def _shocks(eos, scene):
     if not scene.moves or ratio < STEP:
         return None
     if scene.linear:
-        loss = f"{scene.transfer_name} with a linear basis loses a third of the pressure or more"
+        loss = f"{scene.transfer_name} with a linear basis loses 33 % of the pressure or more"
     elif ratio < STRONG or scene.scheme.traits.bears_drift:
         return None
     else:
