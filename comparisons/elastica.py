@@ -18,7 +18,7 @@ def compare(run, axes, full):
     }
     runs["explicit, load within 2 and 5 periods"] = [run(**explicit, periods=n) for n in (2, 5)]
     found = chart(axes, runs, lambda result: abs(result.log.down[-1] / down - 1))
-    axes.set(ylabel="relative error of the tip's way down")
+    axes.set(ylabel="relative error of the tip displacement")
     for name, points in found.items():
         source = "Bisshopp & Drucker 1945"
         yield Row(f"error of the longer run, {name}", 0.0, points[-1][1], 0.015, source)

@@ -81,7 +81,7 @@ class Velocity(Expression):
 
 
 class VelocityNodes(Fix):
-    """Prescribe the velocity of nodes: walls, supports, grips, pistons.
+    """Prescribe the velocity of nodes: fixed or moving walls, supports, grips, pistons.
 
     Parameters
     ----------

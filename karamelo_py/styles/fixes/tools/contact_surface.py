@@ -37,7 +37,7 @@ OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
 class ContactSurface(StiffTool):
-    """Contact of points with the surface of a region, which may move, with friction.
+    """Contact of points with a region that is a fixed or moving wall or tool, with friction.
 
     Parameters
     ----------
