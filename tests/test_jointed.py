@@ -207,7 +207,7 @@ def test_joints_that_lean_out_of_the_plane_are_reported(run_interpreted):
         ("1, 2, 0.2, 1, 45, tension=2", "at most cohesion/tan(phi), 1"),
         ("1, 2, 0.2, 1, 30, matrix_psi=3", "does not dilate"),
         ("1, 2, 0.2, 1, 30, matrix_phi=95", "matrix_phi"),
-        ("1, 2, 0.2, 1, 30, axes=(1, 0)", "gives no axes"),
+        ("1, 2, 0.2, 1, 30, axes=(1, 0)", "does not define axes"),
     ],
 )
 def test_joints_that_no_rock_has(run_interpreted, line, says):

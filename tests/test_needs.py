@@ -568,7 +568,7 @@ def test_twist_for_a_rod_in_torsion(advice):
 
 def test_wide_functions_where_no_point_crosses(advice):
     said = advice(plane(method="tlmpm, FLIP, cubic-spline, 1"))
-    assert "cubic-spline sees 16 nodes per point" in said and "with 4 nodes" in said
+    assert "cubic-spline uses 16 nodes per point" in said and "with 4 nodes" in said
     assert advice(plane(method="ulmpm, FLIP, cubic-spline, 1")) == ""
 
 

@@ -43,7 +43,7 @@ NEUTRAL = (
 
 
 CROSSED = 0.1  # cells that stressed material moves through
-FAST = 0.005  # of the speed of waves: shocks, not rebounds
+FAST = 0.005  # fraction of the wave speed above which impacts give shocks
 
 
 class AtFirstRun(Exception):

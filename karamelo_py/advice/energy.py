@@ -13,7 +13,7 @@ from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
-LOSS = 0.05  # of the largest energy at the end of a run (before: WITHIN), above which it warns
+LOSS = 0.05  # lost fraction that gives a warning at the end; WITHIN: before
 LEAST = 5e-4  # fraction of the largest energy: smaller losses by contact are not shown
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 

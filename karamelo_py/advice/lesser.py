@@ -196,7 +196,7 @@ def _round(hub: Hub) -> Words:
     twists, lines = False, []
     for fix in _acting(hub):
         if fix.friction is not None:
-            continue  # of contact: the same around the axis
+            continue  # contact forces are the same around the axis
         act = _given(fix)
         if len(act) < 3 or _depends(act[along], "".join(AXES[axis] for axis in across)):
             return

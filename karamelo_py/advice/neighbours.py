@@ -22,7 +22,7 @@ STEPS = 500  # the first failed after 800
 class Uneven(NamedTuple):
     heavy: str = ""
     light: str = ""
-    ratio: float = 1.0  # of densities
+    ratio: float = 1.0  # ratio of densities
     courant: float = 0.0  # at the light nodes
 
     @property

@@ -22,7 +22,7 @@ except KeyboardInterrupt:
 
 
 STUDY = "KARAMELO_PY_STUDY"  # pid
-_DEATH_SIGNAL = 1  # of prctl: signal at the parent's end
+_DEATH_SIGNAL = 1  # argument of prctl: signal at the parent's end
 
 
 def end_with(study: int) -> None:

@@ -263,7 +263,7 @@ class _Coded:
 class Emulator(_Coded):
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
-    copies = 1  # of totals that threads add to
+    copies = 1  # copies of the totals that threads add to
 
     def __init__(self) -> None:
         super().__init__()
@@ -340,7 +340,7 @@ class Counted(Emulator):
 
 class Card(_Coded):
     on_card = True
-    copies = 64  # of totals: neighbouring threads use different ones
+    copies = 64  # copies of the totals; neighbouring threads use different ones
 
     def __init__(self) -> None:
         try:

@@ -265,7 +265,7 @@ _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
 _SHORT = 8000  # pauses, about 0.3 ms; then sleep, because cores may be needed
 _APART, _LOOKS = 10, 64  # pauses between looks at another range; looks, 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
-_LEFT = (1 << 32) - 1  # of a ticket: the remaining indices; the upper bits are the loop
+_LEFT = (1 << 32) - 1  # mask of a ticket for the remaining indices; the upper bits are the loop
 
 
 def new_team(threads: int) -> np.ndarray:

@@ -312,26 +312,26 @@ ENERGY = np.dtype([
     ("level", np.float64),  # fraction of the present stored energy in the balance
     ("work", np.float64),  # of fixes so far
     ("kinetic", np.float64),  # sum over points
-    ("stored", np.float64),  # with dissipated energy
+    ("stored", np.float64),  # including dissipated energy
     ("born_with", np.float64),  # internal energy of gases before any work
     ("stored_before", np.float64),  # one step earlier
     ("moving_before", np.float64),  # kinetic minus work, then
     ("stored_at", np.int64),  # step of these values
-    ("looks", np.int64),  # looks at the balance so far
+    ("looks", np.int64),  # number of checks of the balance so far
     ("balance", np.float64),  # kinetic + stored + dissipated - work
     ("first_balance", np.float64),
     ("first_work", np.float64),
-    ("sum_of_balance", np.float64),  # over a window of looks
-    ("last_balance", np.float64),  # at the previous look
+    ("sum_of_balance", np.float64),  # over a window of checks
+    ("last_balance", np.float64),  # at the previous check
     ("last_but_one", np.float64),
-    ("first_few", np.float64),  # mean of the first looks
+    ("first_few", np.float64),  # mean of the first checks
     ("first_mean", np.float64),  # mean of the first window
     ("largest_mean", np.float64),
     ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
     ("largest_energy", np.float64),  # of kinetic, stored, work and rigid bodies
     ("largest_own", np.float64),  # without pure drift
     ("of_drift", np.float64),  # kinetic energy of the centres of mass
-    ("elastic", np.float64),  # at the last look
+    ("elastic", np.float64),  # at the last check
     ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
     ("to_and_fro", np.float64),  # time for waves through all bodies and back
     ("time_of_look", np.float64),
@@ -341,7 +341,7 @@ ENERGY = np.dtype([
     ("energy_floor", np.float64),  # round-off of energies
     ("windows", np.int64),  # consecutive windows with a growing balance
     ("growth", np.float64),  # in the last window, relative to the largest energy
-    ("grown", np.float64),  # largest since the first looks
+    ("grown", np.float64),  # largest since the first checks
 ])  # fmt: skip
 # Conduction (`kernels.heat`, hooks, `kernels.watch`): times, temperatures.
 HEAT = np.dtype([
@@ -350,10 +350,10 @@ HEAT = np.dtype([
     ("watch_heat", np.int64),  # whether all sources of heat are known
     ("coldest", np.float64),  # lower bound from initial state, fixes and sources
     ("hottest", np.float64),
-    ("T_low", np.float64),  # of the points at the last look
+    ("T_low", np.float64),  # extremes of the points at the last check
     ("T_high", np.float64),
     ("own_heat", np.float64),  # largest rise of a point by its dissipation
-    ("set_low", np.float64),  # by fixes at nodes
+    ("set_low", np.float64),  # extremes prescribed by fixes at nodes
     ("set_high", np.float64),
     ("rise", np.float64),  # largest heating rate of points by fixes
     ("fall", np.float64),

@@ -38,8 +38,8 @@ def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
     return vector(kin, [real(motion.common[0, k], template) for k in range(kin.dimension)])
 
 
-NEXT_TO_NOTHING = 1e-9  # of a step
-ROUNDING = 1e-6  # of a step: round-off of a million additions
+NEXT_TO_NOTHING = 1e-9  # fraction of a step
+ROUNDING = 1e-6  # fraction of a step: round-off of a million additions
 
 # If dt drops suddenly (set_dt), the dt of the contact stiffness drops by this fraction per step:
 # loaded springs stiffen over several periods.

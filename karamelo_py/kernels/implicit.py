@@ -34,7 +34,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
-PARTS = 64  # of a parallel loop; each has whole groups of lanes
+PARTS = 64  # parts of a parallel loop; each has whole groups of lanes
 GROUP = 8
 
 

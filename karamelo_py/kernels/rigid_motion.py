@@ -64,7 +64,7 @@ CONTACT = np.dtype([
     ("torque", np.int64),  # slot, or 0
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
-SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the square of the residual at the start
+SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # fractions of the squared residual at the start
 # Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
 LED, LOADED, FALLS, FORMULAS = 0, 6, 12, 15
 

@@ -42,7 +42,7 @@ from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
-ROUNDING = 1e-3  # of distances, in cells
+ROUNDING = 1e-3  # rounding error of distances, in cells
 STRETCH = 64  # points whose totals and arrays fit in the nearest cache
 
 

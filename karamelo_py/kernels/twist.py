@@ -104,7 +104,7 @@ def _companies_rotating(tag):
 
 
 def rotating(kin: Any, transfer: Any) -> tuple[Rotating, ...]:
-    """Return the company of a scene that twists, else ()."""
+    """Return the rotation fields of a scene with twist, else ()."""
     if not isinstance(kin, Twisted):
         return ()
     return (RotatingByMoments() if stores_moment(transfer) else Rotating(),)

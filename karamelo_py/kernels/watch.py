@@ -36,15 +36,15 @@ from karamelo_py.points.laws.pore_water import Saturated, water_content
 LOOK = 10  # steps between two checks
 FEW = 3  # checks compared before a window is full
 LOOKS = 10  # checks averaged in a window, 100 steps
-GROWTH = 0.01  # of the largest energy, in a window: more is a warning
-WITHIN = 0.1  # of the unit, since the start: more is a warning
+GROWTH = 0.01  # fraction of the largest energy in a window that gives a warning
+WITHIN = 0.1  # fraction of the unit since the start that gives a warning
 DRIFTING = 1e-3  # fraction of drift energy in the unit: relevant vibrations have more
 BOUND = 10.0  # times initial energy and work of loads: more stops the run
-ROUND_OFF = 1e-14  # of m c^2: energies below are noise
+ROUND_OFF = 1e-14  # fraction of m c^2; smaller energies are noise
 COARSE = 1000.0  # round-off errors: a strain of this size is noise
 ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
-HEAT_NOISE = 1e-4  # of a temperature, tolerated if all are equal
-OVERSHOOT = 0.1  # of the range of temperatures from the sources: more stops the run
+HEAT_NOISE = 1e-4  # fraction of a temperature that is tolerated if all are equal
+OVERSHOOT = 0.1  # fraction of the range of temperatures from the sources that stops the run
 # Tolerated multiple of the stable step of conduction: point temperatures in the null space decay
 # (measured with 2 points per cell: 4 and 5.8 with and without convection).
 BORNE = 4.0

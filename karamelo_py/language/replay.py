@@ -37,7 +37,7 @@ class Replay:
         self.record = record
         self.within = within
         self.file = file
-        self.number = -1  # of the present statement
+        self.number = -1  # number of the present statement
         self._values: list[float] = []
 
     @property

@@ -20,7 +20,7 @@ class Backend(SceneState, Protocol):
     energy_watch: EnergyWatch
     rollback: RollbackPoint | None
     states_every: int  # steps between stored states
-    repeats_steps: bool  # to return to a state
+    repeats_steps: bool  # repeats steps from a stored state
     remedy: str  # changes that may prevent a failed step
 
     def begin(self, end_time: float) -> None: ...

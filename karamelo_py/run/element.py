@@ -79,8 +79,8 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
-DIVISIONS = 8  # of an increment that does not converge
-TOLERANCE = 1e-10  # of the stress, or of its change if elastic
+DIVISIONS = 8  # maximum divisions of an increment that does not converge
+TOLERANCE = 1e-10  # relative to the stress, or to its change if elastic
 UNRESOLVED = 1e-13  # unresolved stress over modulus
 
 

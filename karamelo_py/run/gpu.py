@@ -30,7 +30,7 @@ from karamelo_py.script.formula import GLOBAL, UNIFORM, evaluate_in_table
 
 POLL = 64  # steps between reads of `fate`
 FAR = 1.0  # cells that points move before they are reordered
-PARTS = "begin", "step", "last step", "before", "behind", "order"  # of launches
+PARTS = "begin", "step", "last step", "before", "behind", "order"  # names of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
 NO_HOOKS: Hooks = arrays.NoHooks(), ()
 

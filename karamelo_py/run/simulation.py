@@ -35,7 +35,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import set_columns
 
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # by deleted points
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # energies and mass of deleted points
 
 
 class Simulation(SceneArrays):
@@ -47,7 +47,7 @@ class Simulation(SceneArrays):
 
     states_every = 100  # steps between stored states
     remedy = "a smaller time step (set_dt, dt_factor)"
-    repeats_steps = True  # to return to a state; load steps take too long
+    repeats_steps = True  # repeats steps from a stored state; not load steps, which take too long
     implicit = False
     failure = ""  # why a load step found no equilibrium
     notes_temperatures = True

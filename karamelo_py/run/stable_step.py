@@ -30,7 +30,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 BOX_WEIGHT = 6.0  # weight of a common drift in steps with boxes
-SLOWED = 1.2  # of the speed of waves: with viscosity above it, viscosity limits the step
+SLOWED = 1.2  # fraction of the wave speed above which viscosity limits the step
 LONE = 0.9  # fraction of an isolated point's stable step: expanded points are stiffer
 # Of the stable step with corrected accelerations in the total frame: blocks with one point per cell
 # gain energy at 0.73.

@@ -24,7 +24,7 @@ class Timings:
     def __init__(self, hub: Hub):
         self.hub = hub
         self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
-        self._depth = 0  # of nested compilation
+        self._depth = 0  # depth of nested compilation
         self._begun = np.zeros(2)
 
     @contextmanager

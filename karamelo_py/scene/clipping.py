@@ -16,7 +16,7 @@ HALVED = 5  # per direction
 PLANE = 0.01  # distance from a plane, relative to the box
 EDGE = 0.05  # for a sub-box, whose edge would otherwise be sharp
 SHEET = 0.01  # for a surface that may belong to a thin sheet
-LEAST = 0.1  # of a box: smaller pieces are merged with a neighbour
+LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off, relative to the box
 # Fraction of a box in the smallest sub-boxes that are not plane: 1/3 of it at a corner in 2D or an
 # edge in 3D. A sheet thinner than these has more, or they are most of its body.

@@ -125,7 +125,7 @@ class Update:
         self.anti_locking = False  # F-bar
         self.half_start = False  # the first kick lasts half a step
         self.fixed_dt: float | None = None  # set_dt; None: adaptive
-        self.dt_factor: float | None = None  # of the stable step; None: automatic
+        self.dt_factor: float | None = None  # fraction of the stable step; None: automatic
         self.dt_mark: Mark | None = None
         self.boundary = "error"
         self.boundary_mark: Mark | None = None
@@ -189,7 +189,7 @@ class Hub:
         self.rehearsing = False
         self.rehearsed = False
         self.scouting = False  # the first run ends the rehearsal
-        self.begun = 0  # with a rehearsal's
+        self.begun = 0  # including the rehearsal
         self.answered = False  # the script printed, wrote or ended something
         self.checking = False  # ``karamelo-py check``: the first run only reports
         self.pausing = False  # stops before runs, which a program controls
@@ -211,7 +211,7 @@ class Hub:
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()  # of fixes and computes; time, timestep, dt
+        self.values = Values()  # values of fixes and computes; time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)

@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 
-FIRST, USUAL, LAST = range(3)  # at a stage; USUAL: as in the script
+FIRST, USUAL, LAST = range(3)  # order at a stage; USUAL: as in the script
 FROM_PYTHON = 3e-4  # seconds per call of a Python hook
 
 
@@ -98,7 +98,7 @@ class Fix(Publisher):
     group: Any = None
     formulas: tuple = ()  # of compiled hooks: one or None per component
     components: tuple = ()  # of a force in Python: a formula or None per direction
-    first_step_only = False  # in the first step after its definition
+    first_step_only = False  # acts only in the first step after its definition
     # Python hooks treat each point or node separately and move none. They get the local points, in
     # any order, before the first step in several calls. Sums need ``total``.
     point_by_point = False

@@ -336,7 +336,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
     path = Path(file).resolve()
     for plugin in parts:
-        with suppress(TypeError, OSError):  # of a built-in module
+        with suppress(TypeError, OSError):  # built-in modules have no source
             if Path(inspect.getfile(plugin.kind)).resolve() == path:
                 return plugin
     for plugin in parts:

@@ -54,7 +54,7 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
         if name in axes
         or (re.fullmatch(f"v[{axes}]|s[123]{{2}}|T|volume|mass", name) and values.any())
     }
-    velocity = last.columns.get("velocity", last.columns.get("Velocity"))  # of other programs
+    velocity = last.columns.get("velocity", last.columns.get("Velocity"))
     if velocity is not None and "vx" not in last.columns:
         columns |= {f"v{axis}": velocity[:, k].astype(float) for k, axis in enumerate(axes)}
     if "volume" in columns:

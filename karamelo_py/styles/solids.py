@@ -20,8 +20,8 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MISSED = 0.01  # of a shape's volume
-COARSE = 0.08  # of a box's or ball's volume
+MISSED = 0.01  # fraction of a shape's volume
+COARSE = 0.08  # fraction of a box's or ball's volume
 MANY = 10  # per cell and direction
 
 

@@ -77,7 +77,7 @@ class Measured(NamedTuple):
     bytes_per_particle: int
     bytes_per_particle_step: float  # without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # of arrays as large as the scene
+    roofline_in_place: float  # fraction of the bandwidth of arrays as large as the scene
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
     waits: float  # seconds per step to start and join threads

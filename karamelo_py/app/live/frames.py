@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 PAGE = Path(__file__).with_name("run.html")
-POINTS = 1_000_000  # in a frame, approximately
-BYTES = 1 << 29  # of all frames
+POINTS = 1_000_000  # approximate number of points in a frame
+BYTES = 1 << 29  # maximum size of all frames
 COUNT = 400
 SEEN = 1.0  # seconds for a page to request a frame
 

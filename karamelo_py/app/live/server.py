@@ -62,7 +62,7 @@ class Server:
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}
         self.opened = False  # a page has been open
-        self.framed = False  # in a notebook
+        self.framed = False  # the page is shown in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"

@@ -128,7 +128,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
-    warnings: tuple[str, ...] = ()  # of its finest run
+    warnings: tuple[str, ...] = ()  # warnings of its finest run
 
     @property
     def label(self) -> str:

@@ -55,12 +55,12 @@ class CaseOutcome:
 # Measured for every run; with titles of axes.
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
-    "cpu_seconds": "processor time of the stepping loop (s)",  # of all threads
+    "cpu_seconds": "processor time of the stepping loop (s)",  # sum over all threads
     "seconds_spread": "spread of that time over repetitions (s)",  # largest minus smallest
     "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
     "node_visits": "steps times points times nodes of a point",
-    "steps": "steps",  # of all runs of the script
+    "steps": "steps",  # sum over all runs of the script
     "points": "points",  # at the beginning
     "dt": "first step (time of the script)",
     "stable_dt": "stable step (time of the script)",  # at the beginning
@@ -100,10 +100,10 @@ class Stop(Exception):
 @dataclass
 class Launch:
     script: Path
-    threads: int = 1  # of each run
+    threads: int = 1  # number for each run
     repeat: int = 1  # runs of each case; the time is their median
     limit: float | None = None  # seconds
-    texts: tuple[str, ...] = ()  # of the script and its includes
+    texts: tuple[str, ...] = ()  # texts of the script and its includes
     stop: threading.Event = field(default_factory=threading.Event)
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
@@ -220,7 +220,7 @@ def command_of(script: str | Path, case: Mapping[str, str]) -> str:
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
-OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of a pool of processes
+OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of MPI pools
 
 
 def environment() -> dict[str, str]:

@@ -114,7 +114,7 @@ class Elsewhere:
         self.package = send()
         # Callbacks run in the thread that talks to the machines, which must not wait.
         self.retries = ends.enter_context(ThreadPoolExecutor(1))
-        self.machines: dict[Path, str] = {}  # of folders
+        self.machines: dict[Path, str] = {}  # machine by folder
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
         """Return a future of the outcome; the files of the case come into `folder`."""

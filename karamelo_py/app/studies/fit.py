@@ -33,11 +33,11 @@ largest measured value. The true value is within +- with a probability of 95 %, 
 differences are independent. There is no +- if the three searches disagree, nor for a value at the
 end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
-STARTS = (0.5, 0.2, 0.8)  # of each range
+STARTS = (0.5, 0.2, 0.8)  # fractions of each range
 # Waves and points that cross cells make curves rough: derivatives over 0.01 of a range end in a
 # local minimum.
 STEP = 0.04
-NEAR = 0.01  # of a range: at its end, or equal ends
+NEAR = 0.01  # fraction of a range within which values count as equal
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search
 AGAIN = 3  # searches from a lower point near the end
 ALIKE = 0.99  # correlation of indistinguishable variables

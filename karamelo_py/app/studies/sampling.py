@@ -26,7 +26,7 @@ CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
 class Random(NamedTuple):
     name: str
     text: str  # as given
-    law: Any  # of scipy.stats
+    law: Any  # distribution of scipy.stats
 
 
 def needs_scipy(word: str) -> None:

@@ -62,7 +62,7 @@ class Study:
     page: StudyPage | None = None  # with --live
     elsewhere: Elsewhere | None = None  # with -on
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
-    claim: Claim | None = None  # of the folder
+    claim: Claim | None = None  # lock of the folder
     ran: int = 0
     next_write: float = 0.0  # when the table is due
     begun: float = field(default_factory=time.perf_counter)

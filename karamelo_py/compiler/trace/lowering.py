@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 100_000  # of one function; more are better left to LLVM as a loop
+MOST_OPERATIONS = 100_000  # limit for a function; a loop is better for more
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 

@@ -24,7 +24,7 @@ class Session:
         self.functions: dict[tuple, Any] = {}  # with result types, by types of arguments
         self.operations: dict[tuple, Any] = {}
         self.outdated = False  # whether functions have to be selected again
-        self.changes = 0  # of implementations that compiled kernels may contain
+        self.changes = 0  # number of changed implementations that compiled kernels may contain
         self.loaded: dict[str, list[int]] = {}  # addresses by names of kernels
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()

@@ -10,7 +10,7 @@ from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
 CELLS = 16  # samples along a line
-ENTRIES = 256  # of a table, per cell
+ENTRIES = 256  # entries of a table per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:

@@ -245,7 +245,7 @@ known_failure(
 )
 
 
-FAST = 0.02  # of the wave speed; metals yield in faster impacts
+FAST = 0.02  # fraction of the wave speed above which impacts make metals yield
 
 
 def _locks(law, scene):

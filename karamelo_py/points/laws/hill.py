@@ -50,7 +50,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 from karamelo_py.script.errors import ScriptError
 
 COUPLED = 1e-9  # out-of-plane part, over the largest, that counts as none
-FACTORS = np.array([1.0, 1.0, 1.0, sqrt(2), sqrt(2), sqrt(2)])  # of shears (Mandel's notation)
+FACTORS = np.array([1.0, 1.0, 1.0, sqrt(2), sqrt(2), sqrt(2)])  # Mandel's notation
 
 
 class ElasticBase:

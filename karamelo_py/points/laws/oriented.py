@@ -1,7 +1,7 @@
 """Axes of a law by formulas of position: the deformation gradient of a point starts as a rotation.
 
-A law with directions that knows the deformation by F alone has other axes if F starts from the
-rotation R to them: then F R takes the place of F, and the axes turn with the body.
+If a law depends on the deformation only through F, its axes are rotated by R if F starts from R:
+F R replaces F, and the axes rotate with the body.
 """
 
 from math import sqrt
@@ -40,7 +40,8 @@ class Axes:
         formulas = formulas_of_place(hub, argument)
         if len(formulas) not in (1, 6):
             raise ScriptError(
-                f"'{argument.text}' gives no axes", mark=argument.mark, expected=cls.script_kind
+                f"'{argument.text}' does not define "
+                "axes", mark=argument.mark, expected=cls.script_kind
             )
         made = cls(formulas, argument.mark)
         if not any(one.names for one in formulas):
@@ -74,7 +75,7 @@ class Axes:
             R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places
         ]
         if np.abs(outside).max(initial=0) > LEANS:
-            raise self.fault("axes that lean out of the plane or line of the scene", x0[0])
+            raise self.fault("axes inclined to the plane or line of the scene", x0[0])
         return np.stack([R[:, i, j] for i, j in F.places], axis=1)
 
     def fault(self, what: str, x0: np.ndarray) -> ScriptError:

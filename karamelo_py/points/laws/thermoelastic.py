@@ -18,7 +18,7 @@ class Expansion(NamedTuple):
 
     cp: float
     kappa: float
-    alpha: float  # of linear expansion
+    alpha: float  # coefficient of linear expansion
     pressure: float  # 3 K alpha, per kelvin
     initial_temperature: float  # T0 of the solid, set when the scene is lowered
 

@@ -33,7 +33,7 @@ class ThinInLargeIncrements(Thin):
 
 
 class State(NamedTuple):
-    whole: Any  # of the wrapped law
+    whole: Any  # state of the wrapped law
     across: Any  # thickness over initial thickness
 
 

@@ -89,7 +89,7 @@ class Wlf(NamedTuple):
         return cls(*numbers)
 
 
-DECADES = 30.0  # of the shift; the formula ends at T = Tr - C2
+DECADES = 30.0  # largest shift; the formula ends at T = Tr - C2
 
 
 def shifted(shift, dt, T):

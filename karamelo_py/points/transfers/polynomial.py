@@ -2,7 +2,7 @@
 
 With hats the field in a cell is multilinear: v + L (X - x) + sum_m c_m prod_(i in m) (X - x)_i over
 the sets m of two or more directions. Its coefficients at a point are derivatives of the nodal
-velocities, so nothing that nodes have is lost on the way to the points and back (Fu, Guo, Gast,
+velocities, so the transfer to the points and back loses no nodal velocity (Fu, Guo, Gast,
 Jiang & Teran 2017, "A polynomial particle-in-cell method", section 5.1).
 """
 
@@ -36,9 +36,8 @@ class Modes(Moment):
 class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
-    In the total frame with a linear basis, where it is all that nodes have: a disk that vibrates
-    for 20 periods loses 4 % of its energy with 4 cells in the radius and less than 0.1 % with 8;
-    with APIC 20 and 13 %.
+    For the total frame with a linear basis. A disk that vibrates for 20 periods loses 4 % of its
+energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
 
     Example
     -------

@@ -221,7 +221,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve  # the run may return to it
-        self.halvings = self.returns = 0  # of the step so far; to this state
+        self.halvings = self.returns = 0  # halvings of the step so far; returns to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}

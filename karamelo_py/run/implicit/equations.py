@@ -345,7 +345,7 @@ class Equations:
             ):
                 young, volume = of_laws[:, block.points.material]
                 loops.scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
-            none = np.full(len(sums), np.inf)  # of nodes with gradients only
+            none = np.full(len(sums), np.inf)  # nodes with gradients only
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)
             weights = weights * np.where(np.isfinite(least), least, 0.0) / moduli.mean

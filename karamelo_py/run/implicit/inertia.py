@@ -13,7 +13,7 @@ from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
-    diagonal = 0.0  # of the stiffness, in units of a nodal mass
+    diagonal = 0.0  # added to the stiffness, in units of a nodal mass
 
     def __init__(self, equations: Equations):
         self.blocks = equations.blocks

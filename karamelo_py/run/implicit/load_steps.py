@@ -51,10 +51,10 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
-        self.cached: dict[str, np.ndarray] = {}  # of the last equations
+        self.cached: dict[str, np.ndarray] = {}  # data of the last equations
         self.parts = 0  # substeps done of the present step
         self.failure = ""  # why a step has no equilibrium
-        self.unknowns = self.corrections = 0  # of the last equilibrium; so far
+        self.unknowns = self.corrections = 0  # of the last equilibrium, and of all steps so far
         self.seconds: dict[str, float] = {}  # by stage, so far
 
     def advance(self, hooks: Tag, count: int) -> int:

@@ -36,7 +36,7 @@ def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
     if A.format == "bsr":
         A = A.tocsr()
-        A.eliminate_zeros()  # of decoupled components, which may be many
+        A.eliminate_zeros()  # decoupled components may be many
     if s is None:
         diagonal = np.abs(A.diagonal())
         if not np.all(diagonal > 0):

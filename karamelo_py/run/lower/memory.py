@@ -27,8 +27,8 @@ THERE = 1  # bytes per point of the whole scene, in `present`
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # of the last good state, present positions only
-    common: int  # of the whole scene, to each process
+    copied: int  # bytes of the last good state, with present positions only
+    common: int  # bytes of data about the whole scene in each process
 
 
 def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTaken:

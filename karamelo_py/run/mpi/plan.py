@@ -23,11 +23,11 @@ MAY_CHANGE = 1.25  # acceptable largest number of points over the mean
 class ProcessShare(NamedTuple):
     points: int
     tiles: int  # occupied tiles of points
-    nodes: int  # in use
-    others: int  # to which it sends
+    nodes: int  # nodes in use
+    others: int  # processes to which it sends
     sent: int  # bytes sent per step
     memory: int  # bytes touched in steps, and of a copy of the last good state
-    common: int  # of these, data about the whole scene
+    common: int  # bytes of data about the whole scene
 
 
 class _Sums(NamedTuple):
@@ -71,7 +71,7 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_space = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)
-    boxes: list[Boxes] = []  # of all
+    boxes: list[Boxes] = []  # boxes of all processes
     of_all = [
         SharedTiles(
             _PretendedComm(rank, ranks, boxes), lattices, s.basis, *few, one_space=one_space

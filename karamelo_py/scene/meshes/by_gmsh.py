@@ -129,7 +129,7 @@ class _Header:
         names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", head, re.S)
         groups = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
         self.names = {(int(dim), int(number)): name for dim, number, name in groups}
-        self.groups: dict[int, int] | None = None  # by element number
+        self.groups: dict[int, int] | None = None  # groups by element number
         version = re.match(rb"\$MeshFormat\s+([12])\S* +0", head)
         if not version and b"$NOD" not in head:
             return

@@ -32,7 +32,7 @@ class DeckKeyword(NamedTuple):
     name: str
     options: dict[str, str]
     lines: list[str]
-    number: int  # of its line
+    number: int  # line number
     file: Path
 
 
@@ -87,7 +87,7 @@ def _is_number(text: str) -> bool:
 
 class DeckElements(NamedTuple):
     type: str  # meshio's
-    label: str  # in the deck
+    label: str  # name of the type in the deck
     numbers: np.ndarray  # (n,)
     nodes: np.ndarray  # (n, c) node numbers of the deck
 
@@ -102,7 +102,7 @@ class DeckPart:
         self.groups: SetItems = {}
         self.sides: dict[str, list[tuple[str, str]]] = {}  # elements or their set; S1, S2, ...
         self.faces: dict[str, list[np.ndarray]] = {}  # node numbers of the deck (n, c)
-        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # of the nodes that follow
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # system of later nodes
 
     def add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
         self.numbers.append(numbers)

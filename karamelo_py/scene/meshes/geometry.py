@@ -30,7 +30,7 @@ _GENERAL = re.compile(
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # to a file with a > after the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # write to a file if > follows the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
 _NAMES = frozenset(("For", "Macro", "Function"))

@@ -7,10 +7,10 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Distance of equal vertices, relative to the size: files have few digits.
+# Largest distance between equal vertices, relative to the size, because files have few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # positions on a shell, to test whether it lies in another
-_SETS = 8  # at most, of shells that do not overlap
+_SAMPLES = 4000  # positions on a shell that are tested to be in another
+_SETS = 8  # maximum number of sets of shells that do not overlap
 
 
 class Skin:
@@ -231,7 +231,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number shells by common edges (3 m,); not `sided`: by edges of two."""
+    """Number shells by common edges (3 m,); if not `sided`, by edges of two triangles."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

@@ -48,7 +48,7 @@ _NO_SOLIDS = re.compile(
 class _Entry(NamedTuple):
     name: str
     fields: list[str]
-    number: int  # of its line
+    number: int  # line number
     file: Path
 
     def whole(self, k: int) -> int:

@@ -85,7 +85,7 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """Return `scaled`, and add a new moment to `history` and `largest`."""
+        """Return `scaled`, and add a new output to `history` and `largest`."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)

@@ -18,7 +18,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
-ALIKE = 1e-6  # of a velocity, or of the wave speed; smaller differences are ignored
+ALIKE = 1e-6  # fraction of a velocity or the wave speed below which differences are ignored
 DIFFERENT = " how they move, the other how they deform"
 
 

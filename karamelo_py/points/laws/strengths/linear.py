@@ -77,7 +77,7 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
-SIGNIFICANT = 0.05  # of the fluid's viscosity
+SIGNIFICANT = 0.05  # fraction of the fluid's viscosity
 
 
 def _viscosity(strength, scene):

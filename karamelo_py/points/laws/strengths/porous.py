@@ -20,7 +20,7 @@ from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
 MOST_PASSES = 80  # of Newton's method, safeguarded by bisection
-DENSE = 0.999999  # of the strain of densification
+DENSE = 0.999999  # fraction of the strain of densification
 NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
 
@@ -273,7 +273,7 @@ def matrix(strength, ep):
 
 @most_recovered.on(Gurson)
 def _most_recovered_gurson(strength, memory):
-    return 1 / (1 - memory.f)  # by closing all voids
+    return 1 / (1 - memory.f)  # all voids are closed
 
 
 @returned.on(Gurson)
