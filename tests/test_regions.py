@@ -400,5 +400,5 @@ def test_a_plane_has_two_sides():
     assert slope.depth(x, 1) == pytest.approx([0, 0, (0.9 + 1.6) / 5, (-0.9 - 1.6) / 5], abs=1e-12)
     other = hub.region("other", Plane, 0, 0.1, 3, 4, "exterior")
     assert other.inside(x[2:]).tolist() == [False, True]
-    with pytest.raises(ScriptError, match="has no length"):
+    with pytest.raises(ScriptError, match="the normal of the plane is zero"):
         hub.region("none", Plane, 0, 0, 0, 0)

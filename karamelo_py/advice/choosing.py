@@ -135,9 +135,7 @@ class Scouted(SceneFacts):
     rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
     # Plane stress, or a line: plastic flow does not prescribe the volume of cells.
     narrow = property(lambda s: s.hub.domain.thin or (s.d == 1 and not s.hub.domain.kin.hoops))
-    burns = property(
-        lambda s: any(isinstance(parameter(law, "eos", None), Jwl) for law in s.laws)
-    )
+    burns = property(lambda s: any(isinstance(parameter(law, "eos", None), Jwl) for law in s.laws))
 
     @property
     def rolls(self) -> bool:

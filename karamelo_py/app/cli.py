@@ -127,7 +127,6 @@ def _dispatch(arguments: list[str]) -> int:
     choice = commands.choices.get(arguments[0])
     options_of = choice.options() if choice else []
     arguments = _values_below_zero(arguments, options_of)
-    # argparse would take -o for -out.
     begins = [
         w for w in arguments if w[:1] == "-" != w[1:2] and w[1:].isalpha() and w not in options_of
     ]

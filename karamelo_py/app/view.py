@@ -91,7 +91,6 @@ def run(options: argparse.Namespace) -> int:
     movie = options.output.suffix.lower() in (".gif", ".mp4")
     (movie_format if movie else picture_format)(options.output)
     frames = Frames(options.fps)
-    # By number: 1000 comes after 999.
     files = sorted(_matching(options.files), key=lambda path: (_number(path), path.name))
     drawn, scene = 0, _scene(options)
     if not movie and "*" not in options.output.name and len(list(islice(_all_in(files), 2))) > 1:

@@ -12,7 +12,7 @@ shape
     function of the kinematics: the number of components (`scalar` by default, `vector`, `tensor`,
     `planar`);
 kept
-    whether it outlives a step (the default): it is carried from run to run;
+    whether its values persist between steps and runs (the default);
 start
     initial value: a number (default 0), or a function of the kinematics with one number per
     component;

@@ -285,20 +285,20 @@ def vector_hook(
 ) -> CompiledHook:
     """Make a compiled hook that sees vectors, declared fields and the law's state of points.
 
-        With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes.
+    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes.
 
-        Parameters
-        ----------
-        function
-            ``function(*read, values, dt)``: the quantities in `reads`, a tuple of the values of the
-    fix's `formulas`, and the time that the point moves for. It returns the new values of
-    `writes` and, with `publishes`, a number or vector whose sum is published; several as a
-    tuple.
-        reads
-            Of these: a word of `WORDS`; a class of a declared field, which is a number, a vector,
-            or a tuple of numbers; a function (law, kin, state) such as ``laws.cauchy_stress``.
-        writes
-            ``"velocity"`` or classes of declared fields.
+    Parameters
+    ----------
+    function
+        ``function(*read, values, dt)``: the quantities in `reads`, a tuple of the values of the
+        fix's `formulas`, and the time that the point moves for. It returns the new values of
+        `writes` and, with `publishes`, a number or vector whose sum is published; several as a
+        tuple.
+    reads
+        Of these: a word of `WORDS`; a class of a declared field, which is a number, a vector, or a
+        tuple of numbers; a function (law, kin, state) such as ``laws.cauchy_stress``.
+    writes
+        ``"velocity"`` or classes of declared fields.
     """
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused

@@ -310,7 +310,7 @@ class ColumnFormula:
         sets = hub.fields.shown_names()[len(columns) :]
         of_both = [name for name in sets if name in columns or argument.knows(name)]
         if clash := set(of_both).intersection(re.findall(r"[^\W\d]\w*", argument.text)):
-            message = f"'{min(clash)}' is a group or solid, and a column or another value, too"
+            message = f"'{min(clash)}' names both a group or solid and a column or value"
             raise ScriptError(message, mark=argument.mark, hint="rename the group or solid")
         names = [*columns, *(name for name in sets if name not in of_both)]
         self.hub, self.text = hub, argument.text

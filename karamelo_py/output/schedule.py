@@ -30,7 +30,6 @@ class Output:
         self.log = Log(hub)
         self.plots = Plots(hub)
         self.units: Units | None = None
-        # False if a program reads the log and no file is requested.
         self.writes = True
         self.last: list[Rhythmic] = []
         self.pages: list[Rhythmic] = []

@@ -9,7 +9,7 @@ from karamelo_py.output.files import whole
 from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.vtu import arrays_of
 
-VERSION = "v110"  # HDF5 version, from which on files are readable
+VERSION = "v110"  # oldest HDF5 version that can read the files
 POSITIONS = ("x", "y", "z")
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 

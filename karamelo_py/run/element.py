@@ -327,7 +327,6 @@ class Response:
         self.observe()
 
     def observe(self) -> None:
-        # Adding zero removes negative zeros.
         self.rows.append([float(value) + 0.0 for value in shown(self.point).values()])
 
     def last(self) -> dict[str, float]:

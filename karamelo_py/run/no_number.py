@@ -20,7 +20,6 @@ def _first_bad(simulation: SceneState) -> tuple | None:
         if over or not fix.hooks():
             continue
         for k, formula in enumerate(fix.all_formulas):
-            # A formula that reads a NaN is not its source.
             names = formula.names.difference(POINT_SEEDS)
             readable = all(n in values and np.isfinite(values.get(n)) for n in names)
             if formula.is_constant or not readable:

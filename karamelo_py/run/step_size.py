@@ -114,7 +114,6 @@ class StepSize:
                 "cannot choose a time step: all material is rigid and at rest",
                 hint="set_dt(...), or a velocity from fix initial_velocity_particles",
             )
-        # A body at rest without waves has no first limit to compare with.
         if step.first_limit == 0 and np.isfinite(self.limit) and not simulation.hub.update.fixed_dt:
             step.first_limit = self.limit
         self._watch_limit()

@@ -381,5 +381,4 @@ class Hub:
             mine = self.groups[ID] = copy.copy(group)
             mine.hub = self
         if real._lattices is not None:
-            # Unchanged lattices stay the same objects: node groups need no new search.
             self._lattices = self._key_of_lattices, real._lattices[1]

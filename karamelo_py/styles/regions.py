@@ -233,8 +233,8 @@ class Plane(Primitive):
         self.middle, normal = values[:d], values[d:]
         length = np.linalg.norm(normal)
         if length == 0:
-            message = "the direction across the plane has no length"
-            raise ScriptError(message, mark=numbers[d].mark, expected="a direction that is not 0")
+            message = "the normal of the plane is zero"
+            raise ScriptError(message, mark=numbers[d].mark, expected="a normal that is not zero")
         self.normal = normal / (length or 1)
         super().__init__(hub, np.full(d, -np.inf), np.full(d, np.inf), exterior=exterior)
         self.unknown |= bool(np.isnan(values).any())

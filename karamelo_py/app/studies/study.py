@@ -98,7 +98,6 @@ class Study:
         if self.writes and self.rows:
             begun = time.perf_counter()
             write(self.out, list(self.rows.values()))
-            # Writing ten thousand rows takes as long as a short run.
             self.next_write = time.perf_counter() + 20 * (time.perf_counter() - begun)
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:

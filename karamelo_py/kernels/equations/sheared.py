@@ -1,8 +1,8 @@
 """Sheared periodic cells (Lees & Edwards 1972): images across y move along x.
 
 The image of a point a length L above it is `shift` further along x and `speed` faster. Images of a
-node lie between nodes: the node takes parts of what points give to them, and they take the same
-parts of its velocity. One is the transpose of the other, which conserves momentum to round-off.
+node lie between nodes: the node gets fractions of their sums, and they get the same fractions of
+its velocity. One is the transpose of the other, which conserves momentum to round-off.
 """
 
 from math import floor
@@ -78,7 +78,7 @@ def _fold(images, nodes, array, n, fast):
 
 
 def _spread(images, nodes, array, n, first):
-    """Give an image its parts of the velocity times its mass, in columns from that along x on."""
+    """Give an image its fraction of velocity times mass, in columns from the one along x on."""
     sums, j = nodes.sums, _place(images.across, n)
     side = 0
     if j >= images.across.period:

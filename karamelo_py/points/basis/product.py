@@ -43,7 +43,7 @@ def along(basis, kin, grid, location, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """Return N D^-1 (X_I - x) of a line's nodes, if `along` leaves it out."""
+    """Return N D^-1 (X_I - x) of a line's nodes, if `along` omits it."""
     return line.affine
 
 

@@ -40,8 +40,9 @@ class Axes:
         formulas = formulas_of_place(hub, argument)
         if len(formulas) not in (1, 6):
             raise ScriptError(
-                f"'{argument.text}' does not define "
-                "axes", mark=argument.mark, expected=cls.script_kind
+                f"'{argument.text}' does not define axes",
+                mark=argument.mark,
+                expected=cls.script_kind,
             )
         made = cls(formulas, argument.mark)
         if not any(one.names for one in formulas):

@@ -37,7 +37,7 @@ class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
     For the total frame with a linear basis. A disk that vibrates for 20 periods loses 4 % of its
-energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
+    energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
 
     Example
     -------

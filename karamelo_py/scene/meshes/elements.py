@@ -274,7 +274,6 @@ def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np
     at, weight = np.polynomial.legendre.leggauss(-(-(d + 1) * order // 2))
     points = np.array(list(itertools.product(at, repeat=d)))
     weights = np.prod(list(itertools.product(weight, repeat=d)), axis=1)
-    # Collapsed square or cube (Duffy 1982).
     room = np.ones(len(points))
     for axis in range({"triangle": 2, "tetra": 3, "wedge": 2}.get(name, 0)):
         weights = weights / 2 * room

@@ -16,7 +16,9 @@ FAMILIES = {
     "WED": "wedge", "PYR": "pyramid", "BAR": "line", "BEA": "line", "TRU": "line", "EDG": "line",
     "SPH": "vertex", "CIR": "vertex",
 }  # fmt: skip
-MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # variables; not results
+MESH = re.compile(
+    "coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns"
+)  # variables of the mesh, without results
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "SHELL": ((0, 1, 2, 3), (0, 3, 2, 1), (0, 1), (1, 2), (2, 3), (3, 0)),

@@ -73,7 +73,10 @@ class Hdf5Dump(TableDump):
                     for name in ("time", "step", *self.columns):
                         root[name].resize(k, axis=0)
                     raise
-        except (OSError, RuntimeError) as error:  # h5py raises both, with the system's text
+        except (
+            OSError,
+            RuntimeError,
+        ) as error:  # h5py raises both kinds, with the text of the system
             reason = re.search("error message = '([^']*)'", str(error))
             message = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {message}") from error

@@ -76,7 +76,7 @@ class PyPlot(Dump):
         Fraction of the values beyond either colour limit, such as 0.01, so that a few extremes do
         not use up all colours.
     dpi
-        Pixels per inch: a picture of 600 pixels has 1800 with 300.
+        Pixels per inch, by default 100: with 300, a picture of 600 pixels has 1800.
     fontsize
         Font size in points.
     pointsize
@@ -297,7 +297,7 @@ def look_of(
     log = scale == "log"
     if log and min((end for end in (vmin, vmax) if end is not None), default=1.0) <= 0:
         message = "a logarithmic scale needs colour limits above 0"
-        raise ScriptError(message, argument="vmin", expected="ends of the colours above 0")
+        raise ScriptError(message, argument="vmin", expected="colour limits above 0")
     signed = SIGNED.fullmatch(column) is not None and not log
     if cmap is not None:
         from matplotlib import colormaps

@@ -29,11 +29,11 @@ class MassDamping(Fix):
 
     Notes
     -----
-    A layer before fix absorbing, as thick (L) as a wave is long, whose rate grows with the square
-    of the depth to 6 c/L at the edge, with the P wave speed c, reflects below 0.2 % of the energy
-    of P and S waves at up to 45 degrees. Rigid motion slows down, too: the rate is the
-    mass-proportional part of Rayleigh damping. In saturated ground it acts on the soil, which drags
-    the water along.
+    For waves, put a layer before fix absorbing with a thickness L of one wavelength, and a rate
+    that grows with the square of the depth to 6 c/L at the edge (c: P wave speed). It reflects
+    below 0.2 % of the energy of P and S waves at up to 45 degrees. Rigid motion is damped, too:
+    this is mass-proportional Rayleigh damping. In saturated ground it acts on the soil, which drags
+    the water.
 
     Publishes the sum of the damping forces as ID_x, ID_y, ID_z.
 
