@@ -42,7 +42,6 @@ def spatial_increment(frame, kin, dl, f):
 def of_places_before(frame, kin, dl):
     """Convert `dl` after a motion to the positions before it."""
     # grad v changes by (I - dl)^-1, so F grows by (I - dl)^-1 exactly; accurate for small dl.
-    # Gradients of the total frame belong to the reference.
     return dl @ inv(I - dl) if frame.moves else dl
 
 

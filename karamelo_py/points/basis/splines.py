@@ -84,7 +84,6 @@ def _along_quadratic_spline(basis, kin, grid, location, direction):
     line = product.Along(nearest - 1, 1 + t, weights, gradients, ())
     if all_lanes(bulk):
         return line
-    # At a wall the third node, inside the material, has no weight.
     first = max(min(where(behind, cell - 1, cell), last - 2), 0)
     return where(bulk, line, hats(grid, a, cell, first, 3))
 

@@ -100,6 +100,7 @@ class CamClayConstants(NamedTuple):
 
 
 class CamClay(NamedTuple):
+    style = "cam-clay"
     in_lanes = True
     traits = LawTraits(flows=True, rings=False)
 

@@ -369,7 +369,6 @@ def rotated_with_point(law, kin, state, dl):
         # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
-    # the difference contains the rotation of the old strain
     e = symmetric_tensor(kin, strengths.shear_strain(present(law, state.m), kin, s))
     return s, elastic_trial(law.strain, e, dl) - e
 
@@ -396,7 +395,6 @@ def volume_energy(law, j, m):
     elastic = strengths.elastic_ratio(law.strength, m.strength, j)
     energy = energy_of_elastic_volume(law, elastic, m)
     for inelastic in strengths.inelastic_ratio(law.strength, m.strength):
-        # The pressure works on the volume after plastic flow.
         energy += (inelastic - 1) * energy_to_unload(law, elastic, m)
     return energy
 
@@ -576,7 +574,6 @@ def _shown_remembered(tag, law, kin, state):
 
 @laws.with_stress.on(EosStrength)
 def _with_stress_eos_strength(law, kin, state, stress):
-    # Pressure follows from volume, so the volume is set to match the pressure.
     J, _, m = state
     stress = symmetric_tensor(kin, stress)
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)

@@ -8,6 +8,7 @@ from karamelo_py.points.laws.elastic import Hyperelastic, IsotropicConstants
 
 
 class Hencky(Hyperelastic):
+    style = "hencky"
     __slots__ = ()
 
 

@@ -150,6 +150,7 @@ class JointedConstants(NamedTuple):
 
 
 class Jointed(NamedTuple):
+    style = "jointed"
     in_lanes = True
 
     specific_volume: float

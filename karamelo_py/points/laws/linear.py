@@ -11,6 +11,7 @@ from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 
 
 class LinearElastic(ElasticLaw):
+    style = "linear"
     __slots__ = ()
     turns = True
 
@@ -123,7 +124,6 @@ def _shear_part_linear_elastic(law, kin, state):
 
 @laws.elastic_strain.on(LinearElastic)
 def _elastic_strain_linear_elastic(law, kin, state):
-    # Hooke's law is isotropic and rotates with the point, so strain follows from stress.
     mean = law.lam / (3 * law.lam + 2 * law.G) * tr(state.sigma)
     return 0.5 / law.G * (state.sigma - mean * I)
 

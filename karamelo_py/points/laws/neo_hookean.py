@@ -9,6 +9,7 @@ from karamelo_py.points.laws.elastic import Hyperelastic, IsotropicConstants
 
 
 class NeoHookean(Hyperelastic):
+    style = "neo-hookean"
     __slots__ = ()
 
 

@@ -97,7 +97,6 @@ take_nodal_velocity(MLS)
 
 @transfers.gradient_weight.on(MLS)
 def _gradient_weight_mls(transfer, node):
-    # The hoop part N / r is unchanged.
     moved = node.affine_N
     return as_gradient(node.kin, [*moved, *node.grad_N[len(moved) :]])
 

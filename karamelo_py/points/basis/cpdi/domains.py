@@ -136,7 +136,6 @@ def _domain_simplex(basis, kin, location):
     d = kin.dimension
     corners, edges = corners_and_edges(kin, location)
     k = 1 / determinant(edges, d)
-    # Reciprocal vectors of the edges; the gradients sum to zero.
     others = [vector(kin, [k * cofactor(edges, d, e, i) for i in range(d)]) for e in range(d)]
     first = -others[0]
     for other in others[1:]:

@@ -275,7 +275,6 @@ def _bulk_modulus_ideal_gas(eos, j, memory, heat):
 
 @at_pressure.on(IdealGas)
 def _at_pressure_ideal_gas(eos, j, memory, p, heat):
-    # Volume is constant and energy follows; a gas sustains no tension.
     return j, InternalEnergy(max(p, 0) * j / (eos.gamma - 1))
 
 
@@ -333,6 +332,7 @@ class JwlConstants(NamedTuple):
 
 
 class Jwl(NamedTuple):
+    style = "jwl"
     in_lanes = True
     traits = LawTraits(any_speed=True)
 

@@ -92,6 +92,7 @@ class PAlphaConstants(NamedTuple):
 
 
 class PAlpha(NamedTuple):
+    style = "p-alpha"
     in_lanes = True
 
     specific_volume: float

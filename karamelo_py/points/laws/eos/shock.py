@@ -83,7 +83,6 @@ class ShockConstants(NamedTuple):
 
     def checked(self):
         rho0, K, c0, S, Gamma, cv, Tr, *viscous, tension = self
-        # K could only replace c0, so rho0 c0^2 replaces K.
         if 0.5 < rho0 * K**2 / c0 < 2 and not 0.5 < rho0 * c0**2 / K < 2:
             raise ScriptError(
                 f"K = {K:g} and c0 = {c0:g} are swapped: c0 is a speed, and K is near rho0 c0^2",
@@ -96,6 +95,7 @@ class ShockConstants(NamedTuple):
 
 
 class Shock(NamedTuple):
+    style = "shock"
     in_lanes = True
     scalarised = ("ratio_at_pressure",)
 

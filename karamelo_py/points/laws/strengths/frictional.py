@@ -102,7 +102,6 @@ def respond_by_friction(strength, law, kin, step, memories):
     p_point = pressure(law.eos, elastic, energy, heat) + warm
     extra = fbar_fraction(strength, memory) * step.extra
     if memory.Js > 1 and p_point + extra > 0:
-        # Separation closes before the point sustains pressure.
         closed, _ = at_pressure(law.eos, elastic, memories.energy, -warm - extra, heat)
         memory = memory._replace(Js=max(1, step.j / (memory.Jp * closed)))
         elastic = elastic_ratio(strength, memory, step.j)

@@ -170,7 +170,6 @@ def surroundings(strength, heat):
     return Around(temperature_or(heat, strength.initial_temperature), 0.0, 1.0)
 
 
-# Newton's method takes one to three; bisection one per bit.
 _MOST_ITERATIONS = 80
 
 

@@ -82,6 +82,7 @@ class JohnsonCookConstants(NamedTuple):
 
 
 class JohnsonCook(NamedTuple):
+    style = "johnson_cook"
     in_lanes = True
 
     G: float

@@ -144,7 +144,6 @@ def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
     if bound <= 0:
         return s, p
     (a, b, c), directions = principal(s)
-    # ranks from the largest; equal values stay in order
     at_a = (1 if b > a else 0) + (1 if c > a else 0)
     at_b = (1 if a >= b else 0) + (1 if c > b else 0)
     at_c = (1 if a >= c else 0) + (1 if b >= c else 0)

@@ -76,6 +76,7 @@ class CrushableFoamConstants(NamedTuple):
 
 
 class CrushableFoam(NamedTuple):
+    style = "crushable-foam"
     in_lanes = True
 
     G: float
@@ -214,7 +215,6 @@ def _respond_porous(strength, law, kin, step, memories):
 
 
 def foam_flow(strength, ep):
-    # Beyond DENSE the curve continues along its tangent.
     some, dense = ep > 0, DENSE * strength.e
     ratio = min(where(some, ep, 1) / strength.e, DENSE)
     pores = where(some, power(ratio, strength.beta), 0)
