@@ -281,10 +281,13 @@ solid("""
 WATER = (
     "region(top, block, -INF, INF, 0.39, INF)", "group(top, nodes, region, top, all)",
     "fix(table, initial_pore_pressure, all, 9*(0.4 - y0))",
-    "fix(drain, pore_pressure, top, 3*time)", "compute(p, probe, all, pore_pressure)",
+    "fix(drain, pore_pressure, top, 3*time)", "region(low, block, -INF, INF, -INF, 0.31)",
+    "group(low, nodes, region, low, all)", "fix(rain, flux, low, 0.1, ylo)",
+    "region(side, block, -INF, 0.31, -INF, INF)", "group(side, nodes, region, side, all)",
+    "fix(face, seepage_face, side, 0)", "fix(g, body_force, all, 0, -9)", "compute(p, probe, all, pore_pressure)",
     "fix(v, initial_velocity_particles, all, sin(9*x0), -y0)", "set_output(1)",
     "dump(d, all, particle, 2, d.*.txt, wx, wy, pore_pressure, porosity)",
-    "log_modify(custom, step, time, p, drain_s)", "run(4)",
+    "log_modify(custom, step, time, p, drain_s, rain_s, face_s)", "run(4)",
 )  # fmt: skip
 FREE = (
     "region(above, block, 0.4, 0.6, 0.41, 0.61)", "material(steel, rigid, 6)",
@@ -310,14 +313,14 @@ SERIAL = {  # scenes that one process takes
     "clay": block(2, *SWAYS, size=SIZE).replace(
         "rubber, linear, 2, 100, 0.3", "rubber, cam-clay, 2, 40, 1, 0.1, 0.02, 1"
     ),
-    "water in pores": block(2, *WATER, transfer="FLIP quadratic", size=SIZE).replace(
-        "\nsolid(", WET, 1
-    ),
     "rigid body that moves freely": block(2, *FREE, size=SIZE),
     "rigid bodies that meet": block(2, *LINKED, size=SIZE),
     "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS, size=SIZE),
 }
 SCENES = {
+    "water in pores": block(2, *WATER, transfer="FLIP quadratic", size=SIZE).replace(
+        "\nsolid(", WET, 1
+    ),
     "loads": block(2, *LOADS, size=SIZE),
     "loads in the total frame": block(2, *LOADS, size=SIZE).replace("ulmpm", "tlmpm"),
     "wall that rubs": rubbed().replace("run_time(0.2)", "run(4)"),

@@ -99,7 +99,7 @@ def test_in_pieces(run_interpreted):
 @pytest.mark.parametrize(
     "scene",
     few(["flow in the total frame", "deleted", "points that go", "wall that rubs", "stages",
-         "inflow"], "deleted", "wall that rubs"),
+         "inflow", "water in pores"], "deleted", "wall that rubs"),
 )  # fmt: skip
 def test_goes_on_from_a_file(run_interpreted, scene):
     """Also with a file of the other: what a card does not know of, such as tiles, is made anew."""

@@ -65,7 +65,26 @@ def pair(method, materials, *lines, d=2, begin=0.2, more="", T=""):
     return "\n".join([found, *lines]) + OUTPUT.format(more=more, T=T)
 
 
+def wet(method):
+    return (
+        bar(method)
+        .replace("axisymmetric(true)", "")
+        .replace("solid(", "pore_water(rubber, n=0.4, permeability=0.1, K=1000)\nsolid(", 1)
+        .replace(
+            "-4*y)",
+            "-4*y)\nregion(top, block, -INF, INF, 0.29, INF)\ngroup(top, nodes, region, top, all)\n"
+            "region(low, block, -INF, INF, -INF, 0.11)\ngroup(low, nodes, region, low, all)\n"
+            "fix(g, body_force, all, 0, -9)\nfix(face, seepage_face, top, 0)\n"
+            "fix(rain, flux, low, 0.1, ylo)",
+        )
+        .replace("Ek, Es", "Ek, Es, face_s, rain_s")
+        .replace("vx, s11", "vx, s11, pore_pressure, wx")
+    )
+
+
 SCENES = {
+    "water": wet("method(tlmpm, FLIP, linear, 1)"),
+    "water and splines": wet("method(ulmpm, FLIP, quadratic-spline, 0.99)"),
     "axis": bar("method(ulmpm, FLIP, linear, 0.99)"),
     "centre": bar("method(ulmpm, FLIP, linear, 0.99)")
     .replace("dimension(2, 0, 0.4, 0, 0.4", "dimension(1, 0, 0.4")

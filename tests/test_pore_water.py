@@ -298,7 +298,6 @@ def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
 
 MISTAKES = [
     ({"kind": "axisymmetric(true)"}, (), "does not support axisymmetric scenes"),
-    ({}, ("--gpu",), "does not support --gpu"),
     ({"water": "pore_water(clay, n=1, permeability=1e-3)"}, (), "the porosity is 1"),
     ({"water": "pore_water(clay, n=0.4)"}, (), "the permeability is given nowhere"),
     ({"water": "pore_water(clay, n=0.4, permeability=0)"}, (), "above 0"),

@@ -81,8 +81,7 @@ def pore_water(
 
     Use the command before the solid of the material. It needs method ulmpm or tlmpm with FLIP or
     PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a scene in
-    1D, plane strain or 3D on one process without a GPU. With ulmpm and linear, strains above 10 %
-    are less accurate.
+    1D, plane strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
 
     See Also
     --------

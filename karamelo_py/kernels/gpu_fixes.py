@@ -19,10 +19,12 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
+from karamelo_py.kernels.equations.pore_water import RelativeVelocity, WaterWork
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
+from karamelo_py.points.laws.pore_water import Saturated
 
 
 def _hooks_with_room(hooks):
@@ -256,8 +258,18 @@ def _add_all(copy, first_row, solid, total):
 ADDED = WorkOfForces, VelocityAround
 
 
+def add_work_at_node(i, fate, s, copies):
+    work = field(s.nodes.fields, WaterWork)
+    totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[i, 0]))
+    work[i, 0] = 0
+
+
 def add_work(i, fate, s, block, copies):
-    """Add a point's work of forces, and its energy of rotation."""
+    """Add a point's work of forces, and its energy of rotation or of water in its pores."""
+    if isinstance(block.laws, Saturated):
+        relative = field(block.points.fields, RelativeVelocity)
+        energy = watch.water_energy(s.kin, known_to_laws(block.points), block.laws, relative, i)
+        totals.add_to(copies[index((i // 32) % len(copies))], totals.KINETIC, energy)
     around = field(block.points.fields, VelocityAround)
     if around is not None:
         v = float(around[0, i])

@@ -27,11 +27,14 @@ def at_water(hooks, s):
     pass
 
 
+def at_its_nodes(s):
+    sums = field(s.nodes.fields, pores.WaterSums)
+    return arrays.with_items(s, nodes=arrays.with_items(s.nodes, sums=sums))
+
+
 @at_water.on(arrays.Hooks)
 def _at_water_hooks(hooks, s):
-    here = arrays.with_items(
-        s, nodes=arrays.with_items(s.nodes, sums=field(s.nodes.fields, pores.WaterSums))
-    )
+    here = at_its_nodes(s)
     members = hook_loop.hooked_nodes(here, arrays.ON_SUMS, 0.0)
     hook_loop.node_hooks(arrays.POST_WATER_TO_GRID, members, hooks, here, kick(s))
 

@@ -111,22 +111,29 @@ def _take_work(work, control):
     totals.carry(control.totals[totals.WORK])
 
 
+def water_energy(kin, points, laws, relative, p):
+    law, state = state_at(kin, points, laws, p)
+    v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
+    mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
+    return float(0.5 * mass * dot(v, v))
+
+
 @kernel
 def _add_water(matter, relative, control):
     """Add the kinetic energy of the water in pores."""
     (kin, points, laws), relative = at_hand(matter), at_hand(relative)
     for p in range(points.mass.size):
-        law, state = state_at(kin, points, laws, p)
-        v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
-        mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
-        totals.add_to(control.totals, totals.KINETIC, float(0.5 * mass * dot(v, v)))
+        energy = water_energy(kin, points, laws, relative, p)
+        totals.add_to(control.totals, totals.KINETIC, energy)
 
 
 @kernel
 def _take_work_at_nodes(spans, work, control):
+    """Add work at nodes, and clear it."""
     for r in range(1, 1 + spans[0, 0]):
         for n in range(spans[r, 0], spans[r, 1]):
-            totals.add_to(control.totals, totals.WORK, float(work[n, 0]))
+            counted = totals.counts(control.ranks, n)
+            totals.add_to(control.totals, totals.WORK, float(work[n, 0]) if counted else 0.0)
             work[n, 0] = 0
     totals.carry(control.totals[totals.WORK])
 

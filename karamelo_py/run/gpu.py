@@ -13,9 +13,10 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
 from karamelo_py.compiler.programs import EVALUATE
-from karamelo_py.kernels import arrays, gpu, heat, table, twist
+from karamelo_py.kernels import arrays, gpu, heat, pore_water, table, twist
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
+from karamelo_py.kernels.equations.pore_water import WaterWork
 from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
@@ -351,6 +352,8 @@ class StepsOnCard:
                 found.append(self.launch(fixes.add_energies, threads, s, block, copies))
             if any(field(block.points.fields, kind) is not None for kind in fixes.ADDED):
                 found.append(self.of_points(fixes.add_work, block, copies))
+        if field(s.nodes.fields, WaterWork) is not None:
+            found.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
         found += [*self.collect(0, WORK + 1), *self.collect(*solids)]
         before, behind = (
             self.launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
@@ -500,6 +503,12 @@ def _at_heat_nodes(row, steps):
 @take.on(twist.AtRotation, Card)
 def _at_rotation(row, steps):
     return steps.hooks_on_nodes(row.stage, row.target, twist.at_its_nodes)
+
+
+@take.on(pore_water.AtWater, Card)
+def _at_water(row, steps):
+    stage = arrays.POST_WATER_TO_GRID
+    return steps.hooks_on_nodes(stage, arrays.ON_SUMS, pore_water.at_its_nodes)
 
 
 @take.on(table.AtPoints, Card)

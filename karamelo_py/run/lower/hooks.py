@@ -77,6 +77,10 @@ def compiled_hooks(fixes: list) -> list[tuple[Fix, str, CompiledHook]]:
     ]
 
 
+def is_wet(hub: Hub) -> bool:
+    return any(solid.material.fluid is not None for solid in hub.solids.values())
+
+
 class _Builder:
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
@@ -93,7 +97,7 @@ class _Builder:
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
         self.whole: list[Tag] = []  # of hooks on whole points
-        self.wet = any(solid.material.fluid is not None for solid in hub.solids.values())
+        self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
@@ -173,7 +177,12 @@ class ActingFixes:
 
     def __init__(self, simulation: SceneState, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
-        self.functions = [hook.function for _, _, hook in compiled_hooks(fixes)]
+        wet = is_wet(simulation.hub)
+        self.functions = [  # of the rows of the table
+            hook.function
+            for fix, _, hook in compiled_hooks(fixes)
+            for _ in range(1 + (fix.accelerates and wet))
+        ]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
         self.in_python: dict[int, list[tuple[Fix, Callable]]] = {}  # by stage
         for fix in fixes:

@@ -17,7 +17,7 @@ RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
           "basis": HATS_AND_SPLINES, "scheme": ("musl", "quasi-static"), "kinematics": FLAT},
-    without=("heat", "delete", "reflect", "thin", "ranks", "gpu"),
+    without=("heat", "delete", "reflect", "thin"),
     but={"single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
 )  # fmt: skip
