@@ -255,6 +255,13 @@ def test_water_and_soil_rest_under_gravity(run_script):
     assert np.abs(log["p"][1:] / (9810 * (1 - 1 / 64)) - 1).max() < 1e-3
 
 
+def test_tension_beyond_one_bar_is_doubted(run_script):
+    fixes = "fix(up, force_nodes, top, {})"
+    for force, count in ((2e5, 1), (5e4, 0)):
+        result = run_script(column(fixes.format(force), [(2.0, 2)], more="time"))
+        assert result.err.count("in tension beyond 1 bar") == count
+
+
 def test_rain_seeps_to_a_water_table_as_gardner_has_it(run_script):
     """Steady infiltration (1958): k(p)/k = q/k + (1 - q/k) exp(-rho g x/a)."""
     fixes = """fix(still, velocity_nodes, all, 0)

@@ -208,6 +208,12 @@ class LoadSteps:
         equilibrium.inertia.end(equilibrium.u)
         if equilibrium.seepage is not None:
             equilibrium.seepage.end(simulation.fixes.acting)
+            cavitates = equilibrium.seepage.cavitates()
+            if cavitates and simulation.hub.update.first_time("cavitation"):
+                simulation.hub.warn(
+                    f"{self._now()}: the water is in tension beyond 1 bar, where it boils",
+                    hint="pore_water(..., suction=1000): pores that empty",
+                )
         finish(control)
         simulation.steps.anew()
         return equilibrium.iterations, equilibrium.residual

@@ -34,6 +34,7 @@ from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
 OUTLET = 1e3  # conductance of a seepage face over the conductance of its cells
+CAVITATION = -1e5  # Pa
 EPS = 50 * float(np.finfo(float).eps)
 
 
@@ -240,6 +241,10 @@ class Seepage:
         left = np.where(self.p < 0, S * (1 + step / a), 1 + whole / a)
         dried = a * np.log(np.maximum(left, 0.1 * S))
         self.p = np.where((a < np.inf) & (left < 1), dried, whole)
+
+    def cavitates(self) -> bool:
+        """Return True if water that fills its pores is below -1 bar."""
+        return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:
         """Write the water of the points; let fixes publish what left through their nodes."""

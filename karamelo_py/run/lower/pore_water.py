@@ -62,7 +62,10 @@ class PoreWater(NamedTuple):
         Tv = consolidation * duration / side**2
         state = "coupled: water flows during the run"
         if Tv < UNDRAINED:
-            state = "undrained: less than 2 % of the water flows"
+            state = (
+                "undrained: less than 2 % of the water flows; a dry material of the saturated "
+                f"density, with a bulk modulus {self.stiffness:.3g} larger, would do"
+            )
         elif Tv > DRAINED:
             state = "drained: the dry soil with its weight in water is enough"
         return f"Tv = {Tv:.2g} across the shortest side of '{solid.id}', {state}"
