@@ -354,24 +354,19 @@ def coordinates(law, e):
     ]
 
 
-def strain_from(law, z, e):
-    def component(i, j):
-        k = INDEX[i][j]
-        made = total([law[FROM + 6 * k + column] * z[column] for column in range(6)])
-        return made if k < 3 else sqrt(0.5) * made
+def in_place(e, numbers):
+    """Return a tensor such as `e` with `numbers(k)` in Mandel's notation."""
+    indices = [INDEX[i][j] for i, j in e.places]
+    return e._make([numbers(k) if k < 3 else sqrt(0.5) * numbers(k) for k in indices])
 
-    return e._make([component(i, j) for i, j in e.places])
+
+def strain_from(law, z, e):
+    return in_place(e, lambda k: total([law[FROM + 6 * k + c] * z[c] for c in range(6)]))
 
 
 def stress_of(law, e):
     z = coordinates(law, e)
-
-    def component(i, j):
-        k = INDEX[i][j]
-        made = total([law[TO + 6 * row + k] * z[row] for row in range(6)])
-        return made if k < 3 else sqrt(0.5) * made
-
-    return e._make([component(i, j) for i, j in e.places])
+    return in_place(e, lambda k: total([law[TO + 6 * r + k] * z[r] for r in range(6)]))
 
 
 def as_tensor(kin, s):
