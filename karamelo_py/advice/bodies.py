@@ -9,7 +9,6 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts, Body
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import law_kind, law_traits, parameter
-from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.noise import drift_limits
 from karamelo_py.run.body_motion import BodyMotion
@@ -52,8 +51,8 @@ def rings(law: Any) -> bool:
 
 
 def yields(law: Any) -> bool:
-    elastic = (law_traits(kind).rebounds or issubclass(kind, ElasticLaw) for kind in law_kind(law))
-    return not any(elastic)
+    traits = map(law_traits, law_kind(law))
+    return not any(each.rebounds or each.hypoelastic for each in traits)
 
 
 def vibrating(facts: BasicFacts) -> list[Body]:

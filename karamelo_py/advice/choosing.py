@@ -18,12 +18,8 @@ from karamelo_py.advice.bodies import fixes_at, yields
 from karamelo_py.advice.choices import CHOICES, PLAIN, RESUMED, Choice
 from karamelo_py.advice.crossing import boxes_of, meetings
 from karamelo_py.advice.facts import SceneFacts
-from karamelo_py.points.laws import can, conductivity, law_kind, law_traits, parameter
+from karamelo_py.points.laws import LawTraits, can, conductivity, law_kind, law_traits, parameter
 from karamelo_py.points.laws.eos import taken_heat
-from karamelo_py.points.laws.eos.by_formula import MieGrueneisen
-from karamelo_py.points.laws.eos.fluid import Jwl
-from karamelo_py.points.laws.eos.p_alpha import PAlpha
-from karamelo_py.points.laws.eos.shock import Shock
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.laws.strengths.mu_i import MuI
 from karamelo_py.run.loop import RunLoop
@@ -135,7 +131,7 @@ class Scouted(SceneFacts):
     rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
     # Plane stress, or a line: plastic flow does not prescribe the volume of cells.
     narrow = property(lambda s: s.hub.domain.thin or (s.d == 1 and not s.hub.domain.kin.hoops))
-    burns = property(lambda s: any(isinstance(parameter(law, "eos", None), Jwl) for law in s.laws))
+    burns = property(lambda s: any(eos_traits(law).burns for law in s.laws))
 
     @property
     def rolls(self) -> bool:
@@ -179,8 +175,12 @@ def holds_shape(law: tuple) -> bool:
     return strength is None or shear_modulus(strength) > 0
 
 
+def eos_traits(law: tuple) -> LawTraits:
+    return law_traits(parameter(law, "eos", None))
+
+
 def has_solid_eos(law: tuple) -> bool:
-    return isinstance(parameter(law, "eos", None), (Shock, PAlpha, MieGrueneisen))
+    return eos_traits(law).of_solids
 
 
 def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:

@@ -27,6 +27,9 @@ class LawTraits(NamedTuple):
     flows: bool = False  # holds no shape: liquids, soils
     rings: bool = True  # vibrates if it has a shear modulus
     any_speed: bool = False  # may move many times faster than its waves: gases
+    hypoelastic: bool = False  # never yields, although it does not return all work
+    of_solids: bool = False  # an equation of state that holds solids together
+    burns: bool = False  # products of an explosive
     least_density: float = 10.0  # kg/m^3; a lower density suggests wrong units
 
 

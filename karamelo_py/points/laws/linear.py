@@ -20,7 +20,7 @@ class FixedFrame(LinearElastic):
     """Hooke's law whose stress does not rotate with the point, as in Karamelo."""
 
     __slots__ = ()
-    traits = LawTraits()
+    traits = LawTraits(hypoelastic=True)
     turns = False
 
 

@@ -334,7 +334,8 @@ class JwlConstants(NamedTuple):
 class Jwl(NamedTuple):
     style = "jwl"
     in_lanes = True
-    traits = LawTraits(any_speed=True)
+    style = "jwl"
+    traits = LawTraits(any_speed=True, burns=True)
 
     specific_volume: float
     A: float

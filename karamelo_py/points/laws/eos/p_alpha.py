@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import any_lane, round_off, where
 from karamelo_py.compiler.powers import logarithm, power
-from karamelo_py.points.laws import column, shown, specific_volume
+from karamelo_py.points.laws import LawTraits, column, shown, specific_volume
 from karamelo_py.points.laws.eos import (
     at_pressure,
     bulk_modulus,
@@ -94,6 +94,8 @@ class PAlphaConstants(NamedTuple):
 class PAlpha(NamedTuple):
     style = "p-alpha"
     in_lanes = True
+    style = "p-alpha"
+    traits = LawTraits(of_solids=True)
 
     specific_volume: float
     solid: Any

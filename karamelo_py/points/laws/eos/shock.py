@@ -6,6 +6,7 @@ from typing import NamedTuple
 from karamelo_py.compiler import where
 from karamelo_py.compiler.powers import logarithm
 from karamelo_py.language.rules import known_failure
+from karamelo_py.points.laws import LawTraits
 from karamelo_py.points.laws.eos import (
     bulk_modulus,
     compression_energy,
@@ -97,6 +98,8 @@ class ShockConstants(NamedTuple):
 class Shock(NamedTuple):
     style = "shock"
     in_lanes = True
+    style = "shock"
+    traits = LawTraits(of_solids=True)
     scalarised = ("ratio_at_pressure",)
 
     specific_volume: float
