@@ -334,7 +334,6 @@ class JwlConstants(NamedTuple):
 class Jwl(NamedTuple):
     style = "jwl"
     in_lanes = True
-    style = "jwl"
     traits = LawTraits(any_speed=True, burns=True)
 
     specific_volume: float

@@ -94,7 +94,6 @@ class PAlphaConstants(NamedTuple):
 class PAlpha(NamedTuple):
     style = "p-alpha"
     in_lanes = True
-    style = "p-alpha"
     traits = LawTraits(of_solids=True)
 
     specific_volume: float

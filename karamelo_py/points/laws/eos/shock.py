@@ -98,7 +98,6 @@ class ShockConstants(NamedTuple):
 class Shock(NamedTuple):
     style = "shock"
     in_lanes = True
-    style = "shock"
     traits = LawTraits(of_solids=True)
     scalarised = ("ratio_at_pressure",)
 

@@ -84,7 +84,6 @@ class JohnsonCookConstants(NamedTuple):
 class JohnsonCook(NamedTuple):
     style = "johnson_cook"
     in_lanes = True
-    style = "johnson_cook"
 
     G: float
     A: float

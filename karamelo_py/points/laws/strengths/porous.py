@@ -78,7 +78,6 @@ class CrushableFoamConstants(NamedTuple):
 class CrushableFoam(NamedTuple):
     style = "crushable-foam"
     in_lanes = True
-    style = "crushable-foam"
 
     G: float
     Y: float
