@@ -191,7 +191,7 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def _odd_in(units: Units | None, law: NamedTuple, speed: float) -> tuple[str, str] | None:
-    """Return what no real material has, and what to write."""
+    """Return an implausible property of a material, and the fix."""
     density = 1 / float(specific_volume(law))
     modulus = density * speed**2
     if units is None:

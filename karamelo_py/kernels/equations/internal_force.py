@@ -79,7 +79,7 @@ def follow_strain(pt, v, dt):
     """Let contact and the work of forces follow the velocity v (d,) that strains, mapped again.
 
     Points moved by v*, which differs from v by a part of dt f / m. A spring that followed it would
-    give back more energy than it takes.
+    generate energy.
     """
     further = dt * v - (pt.y - pt.x)
     work = 0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further)
