@@ -168,7 +168,7 @@ class PointsSolid(Solid):
     table
         A file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z`` (one per
         dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains the area in
-        the plane xy) or ``mass``. Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
+        the xy plane) or ``mass``. Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
         stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump particle, vtk
         or hdf5, or of LAMMPS), points in VTK (.vtu), or an .xyz file, whose last snapshot gives
         these columns. In Python, a dictionary of arrays or a DataFrame.
