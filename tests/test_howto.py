@@ -10,16 +10,18 @@ from scenes import block
 HOWTO = Path(__file__).parent.parent / "docs" / "howto"
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```", re.S | re.M)
 PAGES = sorted(path for path in HOWTO.glob("*.md") if path.name != "index.md")
+# Too large for an interpreted run: tests/test_ground.py.
+COMPILED = "excavation", "inflow", "landslide", "retaining-wall", "wet-slope"
 SCRIPTS = [
     (page, body)
     for page in [*PAGES, HOWTO.parent / "index.md"]
     for language, body in FENCE.findall(page.read_text("utf-8"))
-    if language == "karamelo"
+    if language == "karamelo" and page.stem not in COMPILED
 ]
 
 
 def test_each_page_has_a_script():
-    assert {page for page, _ in SCRIPTS} >= set(PAGES) and len(PAGES) > 12
+    assert {page.stem for page, _ in SCRIPTS} >= {page.stem for page in PAGES} - {*COMPILED}
 
 
 def files_of(page):

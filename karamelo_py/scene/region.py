@@ -114,6 +114,10 @@ class Region(Named):
             near[other, k] = high
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
+    def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
+        """Mask (n,) of positions where the surface of `other` is this one, if that is known."""
+        return None
+
     def shape(self) -> Any:
         """Argument of `kernels.surfaces.depth` for `distance`, or None."""
         return None

@@ -217,7 +217,8 @@ def _cell_size(hub: Scene, domain: Domain, h: float) -> float:
 
 def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
     for other in hub.solids.values():
-        if other is not new and coinciding(new, other):
+        absent = np.isin(np.arange(other.count) + other.first_id, hub.waiting).all()
+        if other is not new and not absent and coinciding(new, other):
             hub.warn(
                 f"points of solid '{ID}' coincide with points of solid '{other.id}': the mass "
                 "there is doubled",

@@ -345,7 +345,12 @@ class Difference(region.Region):
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
         first, *others = (operand.depth(x, reach) for operand in self.parts)
-        return np.minimum(first, -np.maximum.reduce(others))
+        depth = np.minimum(first, -np.maximum.reduce(others))
+        for operand in self.parts[1:]:
+            same = self.parts[0].coincides(operand, x)
+            if same is not None:  # nothing is left, and clipping would search for a sheet
+                depth[same] = np.minimum(depth[same], -reach)
+        return depth
 
     def shape(self) -> Common | None:
         parts = outlines(self.parts)

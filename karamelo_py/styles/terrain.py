@@ -1,6 +1,6 @@
 """Region style heights: the ground below a raster or a profile."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -94,6 +94,24 @@ class Heights(Enclosed):
             hub, faces.min(axis=(0, 1)), faces.max(axis=(0, 1)), exterior=exterior is not None
         )
         self.skin = Skin([faces], self.tolerance)
+        self.at, self.heights = at, z
+
+    def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
+        if not isinstance(other, Heights) or self.exterior or other.exterior:
+            return None
+        if self.heights.shape != other.heights.shape or any(
+            (a != b).any() for a, b in zip(self.at, other.at, strict=True)
+        ):
+            return None
+        apart = np.abs(self.heights - other.heights) > self.tolerance
+        for axis in range(apart.ndim):  # of a cell, if one of its corners is
+            ends = np.moveaxis(apart, axis, 0)
+            apart = np.moveaxis(ends[1:] | ends[:-1], 0, axis)
+        cells = (
+            np.clip(np.searchsorted(at, along) - 1, 0, len(at) - 2)
+            for at, along in zip(self.at, x.T, strict=False)
+        )
+        return np.logical_not(apart[tuple(cells)[::-1]])
 
     def _refuse_holes(self, name: str, at: list[np.ndarray], z: np.ndarray) -> None:
         rows, columns = np.nonzero(np.isnan(z))
