@@ -30,6 +30,7 @@ class Scene(Protocol):
     update: Any
     output: Any
     fields: Any
+    waiting: Any
 
     @property
     def simulation(self) -> Any:
