@@ -262,6 +262,52 @@ def test_tension_beyond_one_bar_is_doubted(run_script):
         assert result.err.count("in tension beyond 1 bar") == count
 
 
+@pytest.mark.full
+def test_undrained_triaxial_compression_of_cam_clay(run_script):
+    """Roscoe & Burland 1968: q = M p, p = p0 2^-(1 - kappa/lam)."""
+    sides = "left", "front", "bottom", "right", "back", "top"
+    lines = []
+    for k, side in enumerate(sides):
+        block = ["-INF, INF"] * 3
+        block[k % 3] = "1, INF" if k > 2 else "-INF, 0"
+        lines += [f"region({side}, block, {', '.join(block)})"]
+        lines += [f"group({side}, nodes, region, {side}, all)"]
+    for k, side in enumerate(sides[:3]):
+        v = ", ".join("0" if i == k else "NULL" for i in range(3))
+        lines += [f"fix({side}, velocity_nodes, {side}, {v})"]
+    log = last(
+        run_script(
+            """
+            method(tlmpm, FLIP, linear, 1)
+            scheme(quasi-static)
+            dimension(3, 0, 1, 0, 1, 0, 1, 1)
+            region(cube, block, 0, 1, 0, 1, 0, 1)
+            material(clay, cam-clay, 1590, 4e6, 1.0, 0.1, 0.02, 1e5)
+            pore_water(clay, n=0.4, permeability=1e-9)
+            solid(clay, region, cube, 2, clay, 1, 0)
+            """
+            + "\n".join(lines)
+            + """
+            fix(press, velocity_nodes, top, NULL, NULL, -0.015)
+            # 1e5 Pa on sides of the area sqrt(height)
+            fix(cell_x, force_nodes, right, -1e5*sqrt(1 - 0.015*time), NULL, NULL)
+            fix(cell_y, force_nodes, back, NULL, -1e5*sqrt(1 - 0.015*time), NULL)
+            compute(s, probe, all, s11, s22, s33, pore_pressure)
+            q = s_s11 - s_s33
+            p = -(s_s11 + s_s22 + s_s33)/3
+            log_modify(custom, step, time, q, p, s_pore_pressure)
+            set_dt(1)
+            set_output(20)
+            run(20)
+            """
+        )
+    )
+    end = 1e5 * 2**-0.8
+    assert abs(log["p"] / end - 1) < 5e-4
+    assert abs(log["q"] / end - 1) < 5e-4
+    assert abs(log["s_pore_pressure"] / (1e5 + end / 3 - end) - 1) < 2e-3
+
+
 def test_rain_seeps_to_a_water_table_as_gardner_has_it(run_script):
     """Steady infiltration (1958): k(p)/k = q/k + (1 - q/k) exp(-rho g x/a)."""
     fixes = """fix(still, velocity_nodes, all, 0)
