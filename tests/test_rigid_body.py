@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from conftest import INPUTS
 from going_on import goes_on, same_files, with_files
+from meshed import cube_surface, write
 
 from karamelo_py.kernels import rigid_motion as motion
 
@@ -406,3 +407,34 @@ def test_one_thread_or_two(run_script, scene):
     )
     one = run_script(text, "--threads", "1", folder="one").folder
     same_files(one, run_script(text, "--threads", "2", folder="two").folder)
+
+
+CUBE = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, 0, 4, 0, 4, 0, 4, 1)
+region(below, block, 1, 3, 1, 3, 0, 1)
+region(box, block, 1.2, 2.8, 1.2, 2.8, 1.2, 2.8)
+region(skin, stl, cube.stl)
+material(soft, linear, 1, 100, 0.3)
+material(steel, rigid, 2)
+solid(a, region, below, 1, soft, 1)
+solid(b, region, box, 1, steel, 1)
+fix(b, rigid_body, b, velocity=(0.1, 0, -1))
+fix(f, contact/rigid_body, all, b, 0.3, region={region})
+set_output(1)
+log_modify(custom, step, b_z, b_vx, b_vz, b_fz, f_z)
+run(30)
+"""
+
+
+def test_faces_of_a_file_touch_as_the_shape_does(run_interpreted, tmp_path):
+    """Away from edges, where normals of a block are smoothed over 0.05 cells."""
+    for folder in ("box", "skin"):
+        (tmp_path / folder).mkdir()
+        points, triangles = cube_surface(1.2, 2.8)
+        write(tmp_path / folder / "cube.stl", points, {"triangle": triangles}, binary=True)
+    logs = [run_interpreted(CUBE.format(region=name), folder=name).log for name in ("box", "skin")]
+    for name in ("b_z", "b_vz", "b_fz"):
+        size = np.abs(logs[0][name]).max()
+        assert logs[0][name] == pytest.approx(logs[1][name], abs=1e-4 * size)
+    assert np.abs(logs[0].b_fz).max() > 0.2

@@ -10,7 +10,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, list_pairs
-from karamelo_py.kernels.surfaces import Surface, depth, distance, slopes
+from karamelo_py.kernels.surfaces import Surface, depth, distance, encloses, nearest, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
@@ -32,6 +32,7 @@ class TouchingSurface(NamedTuple):
 
     shape: arrays.Tag
     members: np.ndarray  # (N,) bool, by id
+    clear: np.ndarray  # (N,) by id: no face is closer to this point
     mu: float
     slot: int  # of the force on the points
     torque: int  # slot of its torque, or 0
@@ -48,15 +49,41 @@ def _stencil_of(s, points, p):
 
 
 @point_function(otherwise=True)
-def depth_near(shape, kin, x, reach):
-    """Depth at `x`; -reach if the surface is further away than that, on either side."""
-    return depth(shape, kin, x, reach)
+def free_way(shape, kin, x, reach):
+    """Distance to the surface, at most `reach`, where it saves later searches; else 0."""
+    return 0.0
 
 
-@depth_near.on(Surface)
-def _depth_near_faces(shape, kin, x, reach):
-    # Testing whether faces enclose a position takes longer than finding that none is near.
-    return depth(shape, kin, x, reach) if distance(shape, kin, x, reach) < reach else -reach
+@free_way.on(Surface)
+def _free_way_to_faces(shape, kin, x, reach):
+    away = distance(shape, kin, x, reach)
+    return 0.0 if away >= reach and encloses(kin, shape, x) else away
+
+
+@noinline
+def _touched(shape, kin, x, about):
+    """Depth at `x`, and the unit direction out, 0 if there is none or the surface is not close."""
+    close, ball, reach, step, _ = about
+    within = depth(shape, kin, x, close)
+    if within <= -close:
+        return within, x - x
+    if within > ball:
+        within = depth(shape, kin, x, reach)
+    return within, direction_of(slopes(shape, kin, x, reach, (within, step)), step)
+
+
+@point_function(otherwise=True)
+def touched(shape, kin, x, about):
+    return _touched(shape, kin, x, about)
+
+
+@touched.on(Surface)
+def _touched_faces(shape, kin, x, about):
+    _, _, _, step, away = about
+    if not 0.01 * step < away:
+        return _touched(shape, kin, x, about)
+    sign = 1.0 if encloses(kin, shape, x) else -1.0  # slopes take six searches
+    return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
 
 
 @noinline
@@ -74,21 +101,23 @@ def _list_point(body, surface, s, block, p):
     if away > (constants.bound + 2 * h) ** 2:
         return False
     # Surfaces that may meet in this step: most points are far, and a short reach is cheap.
-    near = min(2 * dt * (speed + constants.speed), h)
+    move, number = 2 * dt * (speed + constants.speed), points.id[p]
     law, material = state_at(kin, points, block.laws, p)
     ball = radius(kin, volume_of(kin, points, law, material, p), x)
+    close = min(move, h) + ball
+    surface.clear[number] -= move
+    if surface.clear[number] > close:
+        return False
     arm = [x[c] - state.x[c] if c < d else 0.0 for c in range(3)]
     local = motion.to_start(state, (arm[0], arm[1], arm[2]))
     y = none._make([local[c] + constants.start[c] for c in range(d)])
-    within = depth_near(surface.shape, kin, y, near + ball)
-    if within <= -near - ball:
+    surface.clear[number] = free_way(surface.shape, kin, y, max(close, h))
+    if surface.clear[number] > close:
         return False
-    if within > ball:
-        within = depth(surface.shape, kin, y, h + ball)
-    step = ASIDE * h
-    way = direction_of(slopes(surface.shape, kin, y, h + ball, (within, step)), step)
+    about = close, ball, h + ball, ASIDE * h, surface.clear[number]
+    within, way = touched(surface.shape, kin, y, about)
     if way.squared() == 0:
-        if within > 0 and _call(surface.lost, points.id[p]) == 0:
+        if within > 0 and _call(surface.lost, number) == 0:
             raise RuntimeError("a point has no way out")
         return False
     out = [way[c] if c < d else 0.0 for c in range(3)]
