@@ -23,7 +23,9 @@ HEAD = """# What a lesser model saves
 
 Each row is a scene of `inputs/models/` in fewer dimensions and in 3D, next to its exact or
 published answer. The 3D grid has cubic cells, one across half the thickness of a plate and two
-across half a bar. Cost is the processor time of the steps in 3D over the lesser model's.
+across half a bar. Cost is the processor time of the steps in 3D over the lesser model's. Spheres in
+3D: nodes that are driven inside a hole (`in.shell`, `in.cavity`) let its surface lag by 11 to 18 %;
+a pressure on cut points (`in.pressed`) errs by 2 %.
 `python -m comparisons.lesser` writes the table.
 
 | scene | answer | lesser model | 3D | exact | cost of 3D |
@@ -61,16 +63,21 @@ def radius_of_shock(result: Result) -> float:
     return float(r[peak:][rho[peak:] > (1 + rho[peak]) / 2].max())
 
 
-def contraction_of_edge(result: Result) -> float:
-    """-e_r/e_hoop at the edge of the ring, near the rolling direction, from displacements."""
+def contraction_of_edge(result: Result, angle: float = 0.0) -> float:
+    """-e_r/e_hoop at the edge of the ring, at an angle to the rolling direction, x."""
     t = newest(result, "earing")
     rim = t.x0.max() - 0.08
-    near = (np.hypot(t.x0, t.y0) > rim) & (t.y0 < 0.14 * t.x0)
+    near = (np.hypot(t.x0, t.y0) > rim) & (abs(np.arctan2(t.y0, t.x0) - angle) < 0.1)
     places = np.stack([t.x0, t.y0, np.ones_like(t.x0)], axis=1)[near]
     moved = np.stack([t.x, t.y], axis=1)[near]
     F = np.linalg.lstsq(places, moved, rcond=None)[0][:2].T
-    C = F.T @ F
-    return float(-log(C[0, 0]) / log(C[1, 1]))
+    c, s = np.cos(angle), np.sin(angle)
+    radial, hoop = (one @ F.T @ F @ one for one in (np.array([c, s]), np.array([-s, c])))
+    return float(-log(radial) / log(hoop))
+
+
+def contraction_between_axes(result: Result) -> float:
+    return contraction_of_edge(result, pi / 4)
 
 
 class Twins(NamedTuple):
@@ -143,10 +150,13 @@ ROWS = {
                     {**FULL, "t": 0.01}, in_units("stress", 1e6), 670.97, 0.025),
     "earing": Twins("earing", "contraction across the edge of a rolled ring (Hill)", PLANE,
                     {**FULL, "t": 0.032}, contraction_of_edge, 2 / 3, 0.035),
-    "torsion": Twins("torsion", "torque of a plastic bar (Nadai 1923), error", {"model": "twist"},
-                     FULL, logged("err"), 0, 0.003),
-    "loads": Twins("torsion", "the same in 5 load steps", {"model": "twist", "steps": 5},
-                   {**FULL, "steps": 5}, logged("err"), 0, 0.003),
+    "earing 45": Twins("earing", "contraction at 45° to the rolling direction (Hill)", PLANE,
+                       {**FULL, "t": 0.032}, contraction_between_axes, 1 / 2, 0.05),
+    "torsion": Twins("torsion", "torque of a plastic bar (Nadai 1923), error",
+                     {"model": "twist", "n": 16}, {**FULL, "n": 16}, logged("err"), 0, 0.001),
+    "loads": Twins("torsion", "torque in 5 load steps (Nadai 1923), error",
+                   {"model": "twist", "n": 16, "steps": 5}, {**FULL, "n": 16, "steps": 5},
+                   logged("err"), 0, 0.001),
     "pendulum": Twins("pendulum", "torsional pendulum, error of the frequency",
                       {"model": "twist"}, FULL, logged("err"), 0, 0.002),
     "clutch": Twins("clutch", "torque of a clutch over 2/3 mu N R, less 1", {"model": "twist"},
@@ -155,6 +165,12 @@ ROWS = {
                    {"model": "eighth"}, logged("err"), 0, 0.006),
     "cavity": Twins("cavity", "pressure of a plastic cavity (Tresca)", {"model": "spherical"},
                     {"model": "eighth", "n": 10}, logged("p"), 1.3728, 0.01),
+    "pressed": Twins("pressed", "thick shell under pressure, error of the displacement",
+                     {"model": "spherical", "n": 64}, {"model": "eighth", "n": 8}, logged("err"),
+                     0, 0.01),
+    "flows": Twins("pressed", "plastic shell under pressure (Hill), error",
+                   {"model": "spherical", "n": 64, "c": 1.25},
+                   {"model": "eighth", "n": 8, "c": 1.25}, logged("err"), 0, 0.02),
     "blast": Twins("blast", "radius of a blast wave (Sedov)", {"model": "spherical"},
                    {"model": "eighth", "n": 30}, radius_of_shock, 0.7579, 0.03),
 }  # fmt: skip

@@ -244,7 +244,9 @@ def test_axes_by_formulas_of_place(state_interpreted):
     assert found[0]["ep"].max() > 0.01
     for name in names:
         for one in found[1:]:
-            assert np.allclose(one[name], found[0][name], rtol=1e-9, atol=1e-3)
+            # The bound of the wave speed, where the stress across is sought from, depends on axes.
+            size = abs(found[0][name]).max()
+            assert np.allclose(one[name], found[0][name], rtol=0, atol=2e-3 * size)
 
 
 @pytest.mark.parametrize(

@@ -303,25 +303,14 @@ class Tensor(Matrix):
         a = self.transposed().at()
         return self.symmetric._make([squares(a, self.axes, i, j) for i, j in self.symmetric.places])
 
-    def turned_back(self, f):
-        r, f = self.at(), f.at()
-
-        def component(i, j):
-            terms = [r[k, i] * f[k, j] for k in range(3)]
-            if i == j:
-                return total(terms)
-            return 0.5 * total([*terms, *[r[k, j] * f[k, i] for k in range(3)]])
-
-        return self.symmetric._make([component(i, j) for i, j in self.symmetric.places])
-
 
 def further_terms(squared):
     """Return tan(x) / x - 1 - x^2 / 3 from x^2, with error x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Round-off takes four steps for ratios of principal stretches up to 2, seven for any invertible F.
-POLAR_STEPS = 7
+# Steps to round-off for any ratio of principal stretches.
+ROOT_STEPS = 6
 
 
 def cofactor(a, d, i, j):
@@ -571,15 +560,12 @@ def stretch(f):
     """Return U = sqrt(F^T F) for det F != 0.
 
     2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson 1984, J.
-    Elasticity 14). 3D: Newton's iteration X <- (g X + X^-T / g) / 2 takes F to its rotation R, then
-    U = R^T F (Higham 1986, SIAM J. Sci. Stat. Comput. 7, scaled by Frobenius norms), to round-off
-    even for equal stretches.
+    Elasticity 14). 3D: U = (C + i2 I)^-1 (i1 C + i3 I) with the invariants of U, of which i1^2 = tr
+    C + 2 i2 and i2^2 = c2 + 2 i1 i3 (the same). Newton's method for i1 falls from the bound
+    sqrt(3 tr C), which strains change in the second order only.
     """
     if f.kin.dimension == 3:
-        r = f
-        for _ in range(POLAR_STEPS):
-            r = towards_rotation(r)
-        return r.turned_back(f)
+        return stretch_in_space(f)
     a = f.at()
     if f.kin.dimension == 1:
         return f.symmetric._make([abs(a.get((i, i), 1)) for i in range(3)])
@@ -590,11 +576,20 @@ def stretch(f):
     return f.symmetric._make([k * (c[0, 0] + size), k * (c[1, 1] + size), around, k * c[0, 1]])
 
 
-def towards_rotation(f):
-    back = inv(f)
-    g = sqrt(sqrt(total([t * t for t in back]) / total([t * t for t in f])))
-    pairs = zip(f, back.transposed(), strict=True)
-    return f._make([(0.5 * g) * a + (0.5 / g) * b for a, b in pairs])
+def stretch_in_space(f):
+    C = f.right_cauchy_green()
+    xx, yy, zz, xy, xz, yz = C
+    first, third = xx + yy + zz, abs(determinant(f.at(), 3))
+    second = xx * yy + yy * zz + zz * xx - (xy * xy + xz * xz + yz * yz)
+    i1 = sqrt(3 * first)
+    for _ in range(ROOT_STEPS):
+        i2 = sqrt(second + 2 * third * i1)
+        i1 = i1 - 0.5 * (i1 * i1 - first - 2 * i2) / (i1 - third / i2)
+    i2 = sqrt(second + 2 * third * i1)
+    a, b = (C + i2 * I).at(), (i1 * C + third * I).at()
+    k = 1 / determinant(a, 3)
+    back = {(i, j): cofactor(a, 3, i, j) for i in range(3) for j in range(3)}
+    return C._make([k * total([back[i, m] * b[m, j] for m in range(3)]) for i, j in C.places])
 
 
 def sym(a):

@@ -519,8 +519,8 @@ laws.column(YieldingByHill, "dissipated", laws.dissipated_energy)
 
 @laws.wave_speed_squared.on(YieldingByHill)
 def _wave_speed_squared_hill(law, kin, state):
-    tau = laws.kirchhoff_stress(law, kin, state).largest_row_sum()
-    return (law.fastest + tau) * law.specific_volume
+    T = stress_of(law, state.e).largest_row_sum()  # the bound holds in any axes
+    return (law.fastest + T) * law.specific_volume
 
 
 @laws.with_stress.on(YieldingByHill)
