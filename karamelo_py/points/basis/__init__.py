@@ -28,14 +28,14 @@ class BasisTraits(NamedTuple):
     courant_strained_first: float = inf
     courant_total: float = 1.0
     # h^2 / D, max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: the stiffness of a
-    # point alone at its nodes. Last, what the eigenvalues of a step of usl with D have.
+    # point alone at its nodes. The third value is from the eigenvalues of a step of usl with D.
     lone: tuple[float, float, float] | None = None
     # D / h^2 where it is constant: mapping to the nodes and back damps waves by it.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations, in the updated frame.
     corrected_share: float = 0.8
     bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
-    drift_limits: DriftLimits | None = None  # None: as similar bases
+    drift_limits: DriftLimits | None = None  # None: the limits of similar bases
     # Data stored for a domain, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     # ``deformation`` (F in 2D or 3D), ``corners`` (of the basis's `element`).
     shape: tuple[str, ...] = ()

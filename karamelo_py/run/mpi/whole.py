@@ -27,7 +27,7 @@ class PointsMoved(Exception):
 class Whole:
     def __init__(self, simulation: SceneState, subdomain: Any):
         self.simulation, self.subdomain = simulation, subdomain
-        # With arrays of nodes, and one point.
+        # It has arrays of nodes, and one point.
         s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())
         control = simulation.control._replace(ranks=s.control.ranks)
         self.setup = s._replace(control=control, contact=simulation.setup.contact)
