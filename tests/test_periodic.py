@@ -199,6 +199,16 @@ def test_mistakes_get_one_message(run_interpreted, change, options, told):
     assert err.count("error:") == 1
 
 
+def test_a_wall_on_a_periodic_edge_is_refused(run_interpreted):
+    """A wall inside the cell is none, nor a floor that ends at the edges."""
+    wall = ("region(left, block, -INF, {x}, -INF, {y})\n    group(left, nodes, region, left, all)\n"
+            "    fix(wall, velocity_nodes, left, 0, NULL)\n    run(1)")  # fmt: skip
+    for x, y, status in ((0, "INF", 1), (0.25, "INF", 0), ("INF", 0.25, 0)):
+        script = SCENE.format(**USUAL).replace("run(1)", wall.format(x=x, y=y))
+        err = run_interpreted(script, status=status).err
+        assert ("'wall' is a wall on the edges of a periodic cell" in err) == bool(status)
+
+
 def test_a_sheared_cell_is_full(run_interpreted):
     script = SCENE.format(**USUAL | {"directions": ", x, y, shear=1"})
     tall = script.replace("dimension(2, 0, 1, 0, 1,", "dimension(2, 0, 1, 0, 16,")

@@ -180,6 +180,7 @@ class VelocityNodes(Fix):
         if self.hub.domain.h is None:
             return
         self.group.refuse_past_domain()
+        self._refuse_periodic_edges()
         if self.bound:
             return
         for other in self.hub.fixes.values():
@@ -194,6 +195,19 @@ class VelocityNodes(Fix):
                     f"fix '{other.id}' (line {other.mark.line}) gives {count} of this group a "
                     f"different {names}: this fix decides there",
                     hint="groups that have no nodes in common, or NULL for one of the components",
+                )
+
+
+    def _refuse_periodic_edges(self) -> None:
+        domain = self.hub.domain
+        for k in {*self.held_directions} & {*domain.periodic}:
+            x = self.hub.lattices[0].positions(self.group.nodes)[:, k]
+            from_edge = np.abs((x - domain.lo[k]) / domain.h) % domain.cells_of_period(k)
+            if len(x) and domain.cells_of_period(k) > 1 and (from_edge < 1e-6).all():
+                raise ScriptError(
+                    f"fix '{self.id}' is a wall on the edges of a periodic cell",
+                    mark=self.mark,
+                    expected=f"NULL for v{AXES[k]}, or boundary(periodic, ...) without {AXES[k]}",
                 )
 
 
