@@ -49,6 +49,18 @@ def test_an_id_that_is_in_use_replaces_the_fix_and_says_so(run_interpreted):
     assert [int(new) - int(old) for new, old in lines] == [1, 4]
 
 
+def test_work_of_gravity_on_a_body_that_falls_freely(run_interpreted):
+    """A body that nothing strains has the same velocity before and after it is mapped again."""
+    out = run_interpreted(block(1, "fix(g, body_force, all, -3)", "set_dt(0.001)", "run(60)")).out
+    assert abs(float(re.search(r"energy +([-+][\d.]+) % of the largest", out)[1])) < 0.02
+
+
+def test_a_compute_has_the_id_of_a_fix_with_other_values(run_interpreted):
+    lines = "fix(E, local_damping, all, 0.1)", "compute(E, kinetic_energy, all)"
+    log = run_interpreted(block(2, *lines, "log_modify(custom, step, E, E_x)", "run(1)")).log
+    assert len(log["E"]) == len(log["E_x"]) == 2
+
+
 def test_force_nodes_applies_its_total_once(run_interpreted):
     """With two solids of different laws, too: dp/dt = the total, split over nodes with mass."""
     two = block(

@@ -209,6 +209,7 @@ COMMANDS = [
     ("compute(Es, strain_energy, all)\nE = Es_y", 5, "publishes Es, Es_s, not Es_y"),
     ("fix(k, initial_velocity_nodes, all, 1, 0)\nE = k_x", 5, "publishes nothing, not k_x"),
     ("fix(E, kinetic_energy, all)\ncompute(E, strain_energy, all)", 9, "'E' is a fix already"),
+    ("fix(f, body_force, all, 0, -9,81)", 31, "with a decimal point: -9.81"),
     ("method(ulmpm, PIC, linear)", 1, "move it above line 5"),
     ("fix(body_force, all, 0, -9.81)", 5, "fix(ID, body_force, all, ...)"),
     ("compute(C, kinetic_energy, al)", 28, "one of all, n, p"),

@@ -33,8 +33,7 @@ ENDLESS = 1e8
 MIXED = 300  # step over the stable step, above which wrong units are likelier
 DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases excluded
 IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
-# Least density, and moduli, of solids in m, kg, s and in mm, t, s with the two numbers swapped.
-SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)
+SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # least density, moduli: m, kg, s and mm, t, s
 SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to above diamond
 REST = "a scene at rest"
 UNITS = (

@@ -97,11 +97,16 @@ def print_help(
     failures = [words for _, *words in rules.known_failures() if rules.code_of(words[0]) == name]
     for about, reason, cure in failures[:1]:
         _explain_code(name, f"known failure: {about}", f"{reason}.\n\nFix: {cure}")
+    programs, page, seeks = _subcommands(said, manuals()), _Page(), _patterns(said)
+    first = [(f, n) for f, n in related if all(s.search(f"{n} {_summary(f, n)[0]}") for s in seeks)]
+    if arguments and first:
+        page.say(f"Commands about {said}", "bold")
+        page.rows([(f"{family} {style}", family, style) for family, style in first])
+        page.say()
+        related = [one for one in related if one not in first]
     if arguments:
         _explain_argument(name, arguments)
-    programs = _subcommands(said, manuals())
     if related or programs:
-        page = _Page()
         page.say("\nSee also" if arguments or failures else f"Commands about {said}", "bold")
         page.rows([(f"{family} {style}", family, style) for family, style in related])
         for program, summary in programs.items():

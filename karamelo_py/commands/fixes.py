@@ -106,7 +106,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     catalogue.refuse_unnameable(ID)
     _check_names(hub, kind, ID, target)
     if kind == "fix" and target.reads_itself and ID not in catalogue:
-        hub.values.publish_vector(ID, target.published, other)
+        hub.values.publish_vector(ID, target.published, *other)
     new = signature.call(target, hub, list(arguments), f"{kind} {style}")
     new.style = style
     if kind == "fix" and new.by_sizes and hub.domain.thickness != 1:
@@ -122,7 +122,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
         )
     catalogue.add(ID, new, replace=replaces)
     hub.asked.update(new.columns)
-    hub.values.publish_vector(ID, new.published, other)
+    hub.values.publish_vector(ID, new.published, *other)
     group = new.group
     if group is not None and not group.all and len(group) == 0:
         hub.warn(f"{kind} '{ID}' acts on the empty group '{group.id}': it will do nothing")

@@ -256,8 +256,8 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     every
         Steps between two files, or ``time(T)``; 0 stops writing.
     file
-        File name. The first ``*`` becomes the step number; without ``*`` each file replaces the
-        previous one.
+        File name, ``restart.h5`` when left out. The first ``*`` becomes the step number; without
+        ``*`` each file replaces the previous one.
 
     Notes
     -----
@@ -290,12 +290,10 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     --------
     write_restart, read_restart
     """
-    if file is None and every != 0:
-        raise ScriptError("a file is missing", expected="restart(N, file), or restart(0)")
     hub.output.last.clear()
     if every == 0:
         return
-    new = restart_file.Restarts(hub, every, Path(file))
+    new = restart_file.Restarts(hub, every, Path(file or "restart.h5"))
     new.mark = hub.mark
     hub.output.check_file(new.file)
     hub.output.claim(new.file, RESTART)

@@ -37,7 +37,7 @@ END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # tasks
 LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or the re-mapped velocity
-DONE = -1  # instead of a stage
+DONE, FREE = -1, 1e-3  # no stage; fraction of its force that a fix gives a node that it holds
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
 _call_point_function = caller_of(kinds.POINT_FUNCTION)
@@ -505,10 +505,11 @@ def _work_at_nodes(members, call, count):
             # XPIC has replaced the change of v* by then
             moved = 2 * update[n, c] - update[n, change + c]
             if again and counts:
-                # A fix that holds the node prescribes its velocity before the step, too.
-                v = velocity[n, c]
-                held = v == update[n, c]
-                moved = v + (v if held else sums[n, momentum + c] / sums[n, arrays.MASS])
+                # Fixes that hold nodes prescribe v before the step, too. In free fall v is v*.
+                v, mass, force = velocity[n, c], sums[n, arrays.MASS], arrays.of_force(members.kin)
+                before, pushed = sums[n, momentum + c] / mass, dt * sums[n, force + c] / mass
+                held = v == update[n, c] and abs(v - before - pushed) > FREE * abs(pushed)
+                moved = v + (v if held else before)
             terms[q] = 0.5 * dt * load * moved if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 

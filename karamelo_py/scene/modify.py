@@ -227,13 +227,17 @@ def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool 
     if len(formulas) > 3:
         message = f"{len(formulas)} components, but there are at most 3 directions"
         raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
-    for extra in formulas[d:]:
+    for k, extra in enumerate(formulas[d:], d - len(formulas)):
         if extra is not None and not (extra.is_constant and extra.constant == 0):
+            last = ": gravity is a component of it" * (name == "b")
+            hint = f"the last direction here is {axes[-1]}{last}"
+            if len(formulas) == d + 1 and extra.text.isdigit() and formulas[d - 1] is not None:
+                hint = f"with a decimal point: {formulas[d - 1].text}.{extra.text}; else {hint}"
             raise ScriptError(
                 f"more components than the {plural(d, 'dimension')} of the domain",
+                argument=k,
                 expected=f"{wanted} (a further one may only be NULL or 0)",
-                hint=f"the last direction here is {axes[-1]}"
-                + ": gravity is a component of it" * (name == "b"),
+                hint=hint,
             )
     if all(formula is None for formula in formulas[:d]):
         hub.warn("all components are NULL: it has no effect")

@@ -43,9 +43,7 @@ class Values:
         self.array[slot] = value
         return slot
 
-    def publish_vector(
-        self, ID: str, suffixes: Sequence[str] = SUFFIXES, others: Sequence[str] = ()
-    ) -> None:
+    def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES, *others: str) -> None:
         """Publish ``ID_x`` for "x" and so on, ``ID`` for "".
 
         ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other

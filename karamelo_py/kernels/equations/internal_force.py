@@ -82,8 +82,7 @@ def follow_strain(pt, v, dt):
     generate energy.
     """
     further = dt * v - (pt.y - pt.x)
-    work = 0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further)
-    increase(pt.of(WorkOfForces), pt.p, (work,))
+    increase(pt.of(WorkOfForces), pt.p, (0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further),))
     for lever in _levers(pt):
         arm = load_vector(pt.kin, lever, pt.p)
         d, size = len(arm), sqrt(arm.squared())

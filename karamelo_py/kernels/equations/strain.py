@@ -17,7 +17,6 @@ class Strain(Task):
     of_last_step = of_load_step = in_move = again = False
     records = "velocity"
     says = "stress"
-    follows = 1.0  # fraction of a step after its move
     reads = ("x", "v", "state", "material", "deformation gradient", "volume ratio")
     writes = ("state", "deformation gradient")
 
@@ -25,8 +24,7 @@ class Strain(Task):
         gradient = zero(w.kin, x[0])
         if task.in_move and not isinstance(w.averaging, fbar.FBar):
             gradient = transfers.straining(w.transfer, w.kin, gradient)
-        mapped = x - x if task.follows and _pushed(w) else ()
-        return gradient, fbar.no_ratio(w, x[0]), mapped
+        return gradient, fbar.no_ratio(w, x[0]), x - x if _maps_again(task, w) else ()
 
     def gathered(task, node, total):
         gradient, ratio, mapped = total
@@ -49,9 +47,9 @@ class Strain(Task):
         extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
         state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
         store(w.points.state, pt.p, state)
-        stretch_levers(pt, growth, task.follows == 1 and len(mapped) > 0)
+        stretch_levers(pt, growth, len(mapped) > 0 and not task.again)
         if len(mapped):
-            follow_strain(pt, mapped, pt.dt / task.follows)
+            follow_strain(pt, mapped, 2 * pt.dt if task.again else pt.dt)
         now = frames.strained(w.frame, w.kin, f, dl)
         store(pt.of(frames.DeformationGradient), pt.p, now)
         j = laws.jacobian(law, w.kin, state)
@@ -67,14 +65,12 @@ class StrainOfLastStep(Strain):
     """`Strain` with the velocity of the last step, at the new positions."""
 
     of_last_step = True
-    follows = 0.0
 
 
 class SecondStrain(Strain):
     again = True
     records = ""
     says = "second half of the stress"
-    follows = 0.5
 
 
 class StrainOfLoadStep(Strain):
@@ -82,7 +78,6 @@ class StrainOfLoadStep(Strain):
 
     of_load_step = True
     records = ""
-    follows = 0.0
 
 
 class StrainInMove(Strain):
@@ -90,7 +85,6 @@ class StrainInMove(Strain):
 
     in_move = True
     records = ""
-    follows = 0.0
 
 
 class TrialStrain(Strain):
@@ -120,8 +114,10 @@ class TrialStrainOfLastStep(TrialStrain):
     of_last_step = True
 
 
-def _pushed(w):
-    return field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
+def _maps_again(task, w):
+    """Return True for forces on points that moved, whose velocity was mapped to the nodes again."""
+    before = task.of_last_step or task.of_load_step or task.in_move
+    return not before and field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
 
 
 @point_function(otherwise=True)

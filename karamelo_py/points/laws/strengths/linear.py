@@ -45,7 +45,7 @@ def _shear_response_elastic(strength, kin, step, memory, heat):
 
 
 class Viscous(NamedTuple):
-    """Viscous shear of a Newtonian fluid.
+    """Shear stress of a Newtonian fluid with a viscosity.
 
     Parameters
     ----------
