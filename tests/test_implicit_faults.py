@@ -218,9 +218,9 @@ def test_multigrid_that_fails_is_no_singular_matrix(monkeypatch, recwarn):
     A, rigid, b = (A + A.T).tocsr(), np.ones((60, 3)), np.ones(60)
     with pytest.raises(solvers.Unconverged):
         solvers.amg(A, b, rigid, 1e-10, {})
-    with pytest.raises(solvers.Unconverged):
-        solvers.amg(A * np.inf, b, rigid, 1e-10, {})
     assert not recwarn.list
+    with pytest.raises(solvers.Unconverged), np.errstate(all="ignore"):
+        solvers.amg(A * np.inf, b, rigid, 1e-10, {})
     monkeypatch.setattr(solvers, "AMG_FROM", 10)
     assert np.allclose(A @ solvers.solve("auto", A, b, rigid, 1e-10, {}), b)
     monkeypatch.setattr(solvers, "find_spec", lambda name: None)
