@@ -37,7 +37,9 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
     volume. A point with the penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which
     moves a free point out within one step. Friction and dt are as in contact/minimize_penetration
-    (de Vaucorbeil & Nguyen 2021). A moving plane does not drag.
+    (de Vaucorbeil & Nguyen 2021). A moving plane does not drag. The force acts at the centres of
+    points: the lowest row of a body at rest has a third of its stress too little, and disks that
+    hit at 25 % of their wave speed gain 2 to 4 % of energy. contact/surface has neither error.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 
