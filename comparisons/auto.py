@@ -215,7 +215,7 @@ UNSEEN = {
     "lame_quarter": Scene(f"{M}.lame", last("err"), HALF, more=("model", "quarter")),
     "shell_1d": Scene(f"{M}.shell", last("err"), HALF),
     "shell": Scene(f"{M}.shell", last("err"), HALF, more=("model", "axisymmetric")),
-    "oblique_57": Scene(f"{V}.oblique", last("err_history"), HALF, more=("angle", 1.0)),
+    "oblique_11": Scene(f"{V}.oblique", last("err_history"), HALF, more=("angle", 0.2)),
     "resting_disk": Scene(
         f"{IN}.energy_disk", lambda r: abs(r.log.E[-60:].mean() / r.log.E[:60].mean() - 1),
         ("5", "10"), "n", more=("periods", 10, "moving", 0, "strain", 0.05)),

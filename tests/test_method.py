@@ -179,7 +179,7 @@ def fluid(eos, strength="fluid, 0"):
         ("material(m, linear, 1000, 1e6, 0.3, 500, 50)", "", "linear, thermo-mechanical)"),
         (fluid("fluid, 1000, 1e5, 7"), "", "method(ulmpm, APIC, quadratic-spline)"),
         (fluid("fluid, 1000, 1e5, 7"), "fix(weight, body_force, all, 0, -1)",
-         "method(ulmpm, FLIP, quadratic-spline, 1); scheme(usavg)"),
+         "method(ulmpm, AFLIP, quadratic-spline, 1)"),
         (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "scheme(newmark)\nset_dt(1)",
          "method(tlmpm, FLIP, linear, 1); anti_volumetric_locking(true)"),
         (fluid("ideal-gas, 1, 1.4, p=1e5"), "",

@@ -81,10 +81,10 @@ CHOICES = (
         ("in.plane_flow",),
     ),
     Choice(
-        lambda s: s.liquid and s.sag > 0 and s.grid == "ulmpm",
-        ("method(ulmpm, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
+        lambda s: s.liquid and s.sag > 0,
+        ("method({grid}, AFLIP, quadratic-spline, 1)",),
         "a liquid under its weight",
-        "surface waves and fronts lose least where nothing is averaged over the nodes",
+        "surface waves and fronts lose least where points take the change of the velocity",
         ("in.slosh", "in.dam_ritter"),
     ),
     Choice(
