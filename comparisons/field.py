@@ -2,7 +2,8 @@
 
 Draws docs/_static/field.png and prints the least error at equal cost: of ten usual set-ups, and
 with corrected accelerations, PolyPIC, usl and AFLIP. Cost is visited nodes
-(:mod:`comparisons.auto`), or with ``-seconds`` the processor time of the steps (picture: FOLDER/seconds.png).
+(:mod:`comparisons.auto`), or with ``-seconds`` the processor time of the steps, and then the
+picture is FOLDER/seconds.png.
 """
 
 import sys
