@@ -25,8 +25,8 @@ Each row is a scene of `inputs/models/` in fewer dimensions and in 3D, next to i
 published answer. The 3D grid has cubic cells, one across half the thickness of a plate and two
 across half a bar. Cost is the processor time of the steps in 3D over the lesser model's. Spheres in
 3D: nodes that are driven inside a hole (`in.shell`, `in.cavity`) let its surface lag by 11 to 18 %;
-a pressure on cut points (`in.pressed`) errs by 2 %. The wall that drives a fluid (`in.spin_up`) is such
-a staircase in 3D, too.
+a pressure on cut points (`in.pressed`) errs by 2 %. The wall that drives a fluid (`in.spin_up`) is
+such a staircase in 3D, too.
 `python -m comparisons.lesser` writes the table.
 
 | scene | answer | lesser model | 3D | exact | cost of 3D |
