@@ -8,6 +8,7 @@ from conftest import INPUTS
 from laws import isochoric, mises, pressure_of, start, stress, stretched, worked
 from tensors import flat as matrix
 
+from karamelo_py.advice.choosing import has_solid_eos
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Space
@@ -331,7 +332,7 @@ def test_foam_without_pores_is_elastic():
     assert -stress(law, SPACE, state)[0, 0] > 20 * 5e-3
 
 
-HOT = MieGrueneisen.given(8.94, 3.933, 1.5, 2.0)["eos"]
+HOT = MieGrueneisen(8.94, 3.933, 1.5, 2.0).checked()["eos"]
 
 
 @pytest.mark.parametrize(
@@ -383,7 +384,7 @@ def test_tangents_of_porous_solids(strength):
 @pytest.mark.parametrize("J", [0.7, 0.9, 1.2])
 def test_a_stiffened_gas_follows_its_isentrope(J):
     """p + p0 is proportional to J^-gamma (Menikoff & Plohr 1989); waves to (p + p0) gamma."""
-    gas, n = StiffenedGas.given(1.0, 4.4, 6.0, p=0.1)["eos"], 400
+    gas, n = StiffenedGas(1.0, 4.4, 6.0, p=0.1).checked()["eos"], 400
     memory = initial_energy(gas, 1.0)
     ends = J ** (np.arange(n + 1) / n)
     for before, after in pairwise(ends.tolist()):
@@ -400,7 +401,8 @@ def test_a_stiffened_gas_follows_its_isentrope(J):
 
 def test_pressure_by_formula_has_temperature_and_energy():
     """p = K (1 - J) + a (T - T0); stored K x^2/2 + a (T - T0) x at constant T, x = 1 - J."""
-    made = EosFormula.given(8.0, with_numbers("160*(1 - J) + 0.01*(T - 300)"), T=300.0)["eos"]
+    formula = with_numbers("160*(1 - J) + 0.01*(T - 300)")
+    made = EosFormula(8.0, formula, T=300.0).checked()["eos"]
     heat = PlasticWork(0.0, 1.0, 0.0, 0.0, 300.0, 2000.0)
     law = EosStrength(made, Elastic(80.0), temperature=heat)
     state = with_temperature(law, SPACE, start(law, SPACE), 400.0)
@@ -414,11 +416,12 @@ def test_pressure_by_formula_has_temperature_and_energy():
 
 def test_a_shock_in_one_step_is_on_the_hugoniot():
     """rho0 c0^2 x/(1 - S x)^2 with the heat of the shock, E = p x/2 (Meyers 1994)."""
-    copper = MieGrueneisen.given(8.94, 3.933, 1.5, 1.99)["eos"]
+    copper = MieGrueneisen(8.94, 3.933, 1.5, 1.99).checked()["eos"]
     memory = compressed(copper, initial_energy(copper, 1.0), VolumeStep(1.0, 0.8, 1.0), 0.0)
     exact = 8.94 * 3.933**2 * 0.2 / (1 - 1.5 * 0.2) ** 2
     assert pressure(copper, 0.8, memory, ()) == pytest.approx(exact, rel=1e-12)
     assert pytest.approx(0.1 * exact, rel=1e-12) == memory.E
+    assert has_solid_eos(EosStrength(copper, Elastic(8.0)))
 
 
 FORMULAS = (

@@ -24,7 +24,7 @@ from karamelo_py.points.laws.formulas import (
     plain,
     with_numbers,
 )
-from karamelo_py.points.laws.parameters import AboveZero, FromZero
+from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.temperatures import temperature_or
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script import terms
@@ -62,10 +62,15 @@ class GasByPressure(ByPressure):
     traits = LawTraits(any_speed=True, least_density=1e-3)
 
 
+class SolidByPressure(ByPressure):
+    __slots__ = ()
+    traits = LawTraits(of_solids=True)
+
+
 EosFields = namedtuple("EosFields", ("specific_volume", "initial", "initial_temperature"))
 
 
-class EosFormula(ByPressure, EosFields):
+class EosFormula(NamedTuple):
     """Pressure by a formula of volume and internal energy.
 
     Parameters
@@ -99,25 +104,20 @@ class EosFormula(ByPressure, EosFields):
     mie-grueneisen, stiffened-gas, ideal-gas, shock, strength formula, damage formula
     """
 
-    __slots__ = ()
-    syntax = "rho0, p[, E=0][, T=293][, Q1=0][, Q2=0]"
+    rho0: AboveZero
+    p: PressureFormula
+    E: ByName[float] = 0.0
+    T: ByName[FromZero] = 293.0
+    Q1: ByName[FromZero] = 0.0
+    Q2: ByName[FromZero] = 0.0
 
-    @classmethod
-    def given(
-        cls,
-        rho0: AboveZero,
-        p: PressureFormula,
-        *,
-        E: float = 0.0,
-        T: FromZero = 293.0,
-        Q1: FromZero = 0.0,
-        Q2: FromZero = 0.0,
-    ) -> Any:
-        return {"eos": eos_of(rho0, p, (E, T), "formula"), **artificial_viscosity(Q1, Q2)}
+    def checked(self):
+        rho0, p, E, T, *viscous = self
+        return {"eos": eos_of(rho0, p, (E, T), "formula"), **artificial_viscosity(*viscous)}
 
 
 def eos_of(
-    rho0: float, formula: Expression, initial: tuple[float, float], style: str
+    rho0: float, formula: Expression, initial: tuple, style: str, kind: type = ByPressure
 ) -> NamedTuple:
     """Build it from initial E and T; raise ScriptError without a value or stiffness at rest."""
     term = plain(formula, "p")
@@ -135,12 +135,12 @@ def eos_of(
     codes: dict[str, Any] = {"p": writer.code(term), "slopes": tuple(map(writer.code, slopes))}
     codes |= {"linear": "E" not in slopes[1].names, "style": style}
     codes["in_lanes"] = in_lanes(codes["p"])
-    kind = GasByPressure if initial[0] > 0 else ByPressure
+    kind = GasByPressure if initial[0] > 0 else kind
     fields = zip(EosFields._fields, (1 / rho0, *initial), strict=True)
     return writer.law(kind, dict(fields), codes)
 
 
-class StiffenedGas(ByPressure, EosFields):
+class StiffenedGas(NamedTuple):
     """Liquid under strong shocks: a gas with an additional stiffness.
 
     Parameters
@@ -170,25 +170,23 @@ class StiffenedGas(ByPressure, EosFields):
     ideal-gas, fluid, formula
     """
 
-    __slots__ = ()
-    syntax = "rho0, gamma, stiffness[, p=0][, Q1=0][, Q2=0]"
+    rho0: AboveZero
+    gamma: float
+    stiffness: AboveZero
+    p: ByName[float] = 0.0
+    Q1: ByName[FromZero] = 0.0
+    Q2: ByName[FromZero] = 0.0
 
-    @classmethod
-    def given(
-        cls, rho0: AboveZero, gamma: float, stiffness: AboveZero, *, p: float = 0.0,
-        Q1: FromZero = 0.0, Q2: FromZero = 0.0,
-    ) -> Any:  # fmt: skip
+    def checked(self):
+        rho0, gamma, stiffness, p, *viscous = self
         if not gamma > 1:
             raise ScriptError(f"gamma = {gamma:g} is impossible", argument="gamma", expected="> 1")
         formula = with_numbers("(g - 1)*E/J - g*p0", g=gamma, p0=stiffness)
-        E = (p + gamma * stiffness) / (gamma - 1)
-        return {
-            "eos": eos_of(rho0, formula, (E, 0.0), "stiffened-gas"),
-            **artificial_viscosity(Q1, Q2),
-        }
+        made = eos_of(rho0, formula, ((p + gamma * stiffness) / (gamma - 1), 0.0), "stiffened-gas")
+        return {"eos": made, **artificial_viscosity(*viscous)}
 
 
-class MieGrueneisen(ByPressure, EosFields):
+class MieGrueneisen(NamedTuple):
     """Pressure of shocked solids and liquids, with the heat of the shock itself.
 
     Parameters
@@ -219,20 +217,19 @@ class MieGrueneisen(ByPressure, EosFields):
     shock, formula
     """
 
-    __slots__ = ()
-    syntax = "rho0, c0, S, Gamma[, Q1=0][, Q2=0]"
+    rho0: AboveZero
+    c0: AboveZero
+    S: FromZero
+    Gamma: FromZero
+    Q1: ByName[FromZero] = 0.0
+    Q2: ByName[FromZero] = 0.0
 
-    @classmethod
-    def given(
-        cls, rho0: AboveZero, c0: AboveZero, S: FromZero, Gamma: FromZero, *,
-        Q1: FromZero = 0.0, Q2: FromZero = 0.0,
-    ) -> Any:  # fmt: skip
+    def checked(self):
+        rho0, c0, S, Gamma, *viscous = self
         curve = "K*(1 - J)*(1 - G/2*max(1 - J, 0))/(1 - S*max(1 - J, 0))^2 + G*E"
         formula = with_numbers(curve, K=rho0 * c0**2, S=S, G=Gamma)
-        return {
-            "eos": eos_of(rho0, formula, (0.0, 0.0), "mie-grueneisen"),
-            **artificial_viscosity(Q1, Q2),
-        }
+        made = eos_of(rho0, formula, (0.0, 0.0), "mie-grueneisen", SolidByPressure)
+        return {"eos": made, **artificial_viscosity(*viscous)}
 
 
 class EnergyAndHeat(NamedTuple):
