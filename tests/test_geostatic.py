@@ -85,6 +85,12 @@ def test_each_layer_has_its_k0(run_interpreted):
     assert abs(log["s_s22"][-1] / exact - 1) < 1e-5
 
 
+def test_initial_stress_of_a_weight_has_a_hint(run_interpreted):
+    script = LAYERS.format(**LINE).replace("geostatic_stress, all,", "initial_stress, all,")
+    err = run_interpreted(script, status=1).err
+    assert "fix(ID, geostatic_stress, group, k0=0.5, gravity=9.81)" in err
+
+
 def test_a_stress_that_follows_from_deformation_is_refused(run_interpreted):
     script = LAYERS.format(**LINE).replace("clay, linear", "clay, neo-hookean")
     err = run_interpreted(script, status=1).err

@@ -142,6 +142,37 @@ def test_a_sheared_cell_of_oil(run_script, way):
     assert np.abs(points["vx"] - 0.1 * (points["y"] - 2.5)).max() < 1e-9
 
 
+GRAINS = """
+    N = 8
+    rate = 0.2
+    method(ulmpm, APIC, quadratic-spline)
+    dimension(2, 0, 1, 0, 1, 1/N)
+    boundary(periodic, x, y, shear=rate)
+    region(cell, block, 0, 1, 0, 1)
+    eos(sand, linear, 1000, 1e5)
+    strength(sand, mu-i, 1e5, 0.382, 0.643, 0.279, 0.05, 2000)
+    material(sand, eos-strength, sand, sand)
+    solid(sand, region, cell, 2, sand, 1/N, 0)
+    fix(s, initial_stress, all, -1000, -1000, -1000, 0, 0, 0)
+    fix(v, initial_velocity_particles, all, rate*y, 0.1)
+    compute(s, average_stress, all)
+    compute(p, probe, all, p)
+    I = 0.2*0.05/sqrt(1000/2000)
+    mu = s_12/p
+    exact = 0.382 + 0.261/(0.279/I + 1)
+    log_modify(custom, step, time, s_12, p, mu, exact)
+    set_output(time(0.5))
+    run_time(2)
+"""
+
+
+@pytest.mark.full
+def test_grains_in_a_sheared_cell(run_script):
+    """mu(I) (Jop, Forterre & Pouliquen 2006), while points go through the edge across the shear."""
+    log = run_script(GRAINS).log
+    assert np.abs(log["mu"][1:] / log["exact"][1:] - 1).max() < 1e-5
+
+
 @pytest.mark.xdist_group("sheared")
 def test_threads_and_restarts_change_no_bit_of_a_sheared_cell(run_script):
     script = SHEARED.format(way="FLIP, linear, 0.99", **PLANE)

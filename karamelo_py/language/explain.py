@@ -71,11 +71,13 @@ def _filled(
     return arguments[before], ", ".join(word or next(rest).text for word in words)
 
 
-def unknown_keyword(word: str, argument: Argument, expected: Sequence[Parameter]) -> ScriptError:
+def unknown_keyword(
+    word: str, argument: Argument, expected: Sequence[Parameter], owner: str
+) -> ScriptError:
     by_name = [p.name for p in expected if p.keyword]
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
-    hint = turned or meant(word, by_name) or longer
+    hint = turned or meant(word, by_name) or longer or table()["otherwise"].get(owner)
     if expected and not (hint or by_name):
         hint = f"leave out '{word} ='; a comparison is written =="
     if any(p.name == word for p in expected):

@@ -251,7 +251,7 @@ def _bind(
         if not word or (passed_on and word not in by_name):
             positional.append(argument)
         elif word not in by_name:
-            raise explain.unknown_keyword(word, argument, expected)
+            raise explain.unknown_keyword(word, argument, expected, name)
         elif word in bound:
             raise ScriptError(f"{word} is given twice", mark=argument.mark)
         else:

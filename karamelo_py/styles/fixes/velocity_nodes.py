@@ -197,7 +197,6 @@ class VelocityNodes(Fix):
                     hint="groups that have no nodes in common, or NULL for one of the components",
                 )
 
-
     def _refuse_periodic_edges(self) -> None:
         domain = self.hub.domain
         for k in {*self.held_directions} & {*domain.periodic}:
