@@ -260,6 +260,16 @@ def test_mistakes_are_refused(run_interpreted, line):
     assert message in said and remedy in said, result.err
 
 
+@pytest.mark.parametrize("fails", [True, False])
+def test_a_body_on_which_nothing_acts(run_interpreted, fails):
+    """A joint to the ground, or to a body at rest, does not move it; to one that moves it does."""
+    still = body("c", "block, 9, 10, 5, 6")
+    joint = f"fix(j, joint, hinge, c{'' if fails else ', a'}, at=(9, 6))\n"
+    text = scene([*TWO, still], f"fix(t, contact/bodies, a, b)\n{joint}", "step", steps=1)
+    said = " ".join(run_interpreted(text, status=int(fails)).err.split())
+    assert ("acts on the body 'c'" in said) == fails, said
+
+
 def test_bodies_without_a_contact_are_reported(run_interpreted):
     said = " ".join(run_interpreted(scene(TWO, "", "step", steps=1)).err.split())
     assert "passes through other rigid solids: b" in said and "contact/bodies, a, b" in said

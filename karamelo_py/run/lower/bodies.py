@@ -26,6 +26,7 @@ from karamelo_py.styles.fixes.rigid_body import (
     contacts_of,
     surfaces_of,
 )
+from karamelo_py.styles.fixes.rigid_links import contacts, joints
 from karamelo_py.styles.methods.base import LOADS, slots_of_loads
 
 APART = 1e-3  # cells between a point and its place in a rigid body: round-off is far smaller
@@ -146,6 +147,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         _refuse_contact(hub, touch, bodies)
     method, solids = hub.update.method, hub.solids.values()
     rigid = [solid for solid in solids if can(solid.material.law, constrained_velocity)]
+    driven = _driven(hub, moving)
     for fix in moving:
         body, apart = fix.body, method.own_grids or method.fields_per_solid
         if body.places is not fix.weighed:
@@ -157,9 +159,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
             raise _error(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
         if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
             raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
-        moves = fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin)
-        acts = moves or surfaces_of(fix) or any(other.links for other in hub.fixes.values())
-        if not acts and not (method.fields_per_solid and len(solids) > len(rigid)):
+        if body not in driven and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
             raise _error(fix, f"no load acts on the body '{body.id}': it stays at rest", hint)
     for fix in hub.fixes.values() if moving else ():
@@ -169,6 +169,22 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
             message = f"fix {fix.style} also moves '{led[0].id}', which fix rigid_body moves"
             hint = "velocity=, spin=, motion= or turning= of fix rigid_body, or another group"
             raise _error(fix, message, hint)
+
+
+def _driven(hub: Hub, moving: list[RigidBody]) -> set:
+    """Return the bodies on which something acts, directly or through contacts and joints."""
+    driven = set()
+    for fix in moving:
+        if fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix):
+            driven.add(fix.body)
+    links = [fix.linked for fix in (*contacts(hub), *joints(hub))]
+    for joint in joints(hub):
+        if joint.spring and joint.spring[2] is not None:  # its length without force
+            driven.update(joint.linked)
+    driven -= {None}  # the ground
+    while more := {s for some in links if driven & set(some) for s in some} - driven - {None}:
+        driven |= more
+    return driven
 
 
 def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
