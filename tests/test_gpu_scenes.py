@@ -98,6 +98,14 @@ SCENES = {
         "-4*y, x*sin(9*y))\ngroup(some, nodes, region, bar, all)\n"
         "fix(turn, angular_velocity_nodes, some, time*y0)",
     ),
+    "friction around an axis": pair(
+        CONTACTS,
+        RUBBERS,
+        "fix(rub, contact/friction, left, right, 0.3)",
+        more=", ContactForce_right_x, ContactTorque_right_y",
+    )
+    .replace("region(", "axisymmetric(true, twist=true)\nregion(", 1)
+    .replace("0.1, 0.05)", "0.1, 0.05, x)"),
     "averaged volumes": bar("method(ulmpm, FLIP, linear, 0.99)\nanti_volumetric_locking(true)"),
     "averaged pressure of soil": bar(
         "method(ulmpm, FLIP, linear, 0.99)\nscheme(usavg)\nanti_volumetric_locking(true)"

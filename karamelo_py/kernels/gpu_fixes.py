@@ -154,13 +154,14 @@ def take_moves(i, fate, s):
 
 
 def _setup(s: arrays.Setup) -> Callable:
-    fields, d = len(s.contact.slot) if isinstance(s.contact, SeparateFields) else 0, s.kin.dimension
+    fields = len(s.contact.slot) if isinstance(s.contact, SeparateFields) else 0
+    unknown = len(s.kin.Unknown._fields)
 
     def contact_of(s):
         if fields == 0:
             return s.contact
         scratch = room_for(2, (0,) * fields)
-        change = room_for(d, (0.0,) * fields)
+        change = room_for(unknown, (0.0,) * fields)
         return with_items(s.contact, meeting=scratch[:, 0], partners=scratch[:, 1], change=change)
 
     def setup_of(s, copies, i):
