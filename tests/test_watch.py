@@ -489,11 +489,11 @@ def test_gravity_beside_a_fix_in_python(run_interpreted):
     assert abs(float(share)) < 0.1
 
 
-def test_what_impulses_of_contact_lose_is_told(run_interpreted):
+def test_the_work_of_impulses_of_contact_is_known(run_interpreted):
+    """With v*, of which the points take a part, a tenth of the energy seemed to be lost."""
     fix = "contact/minimize_penetration/plane, body, 0.28, 0, 0, 1, 0, 0, 0"
     (share,), said = balance(run_interpreted, fix, 0.002)
-    assert float(share) < -10
-    assert "contact that removes penetrations within one step" in said
+    assert abs(float(share)) < 4 and "spurious" not in said
 
 
 def balance(run_interpreted, fix, dt=0.004):
