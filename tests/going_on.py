@@ -272,8 +272,9 @@ SWAYS = (
 EDGES = (
     "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
     "fix(out, absorbing, low, rubber, ylo)", "fix(start, geostatic_stress, all, k0=0.4)",
+    "fix(sponge, mass_damping, all, 9*(0.6 - y0))",
     "fix(v, initial_velocity_particles, all, sin(9*x0), -y0)", "set_output(1)",
-    "log_modify(custom, step, time, out_x, out_y)", "run(4)",
+    "log_modify(custom, step, time, out_x, out_y, sponge_x)", "run(4)",
 )  # fmt: skip
 WET = """
 pore_water(rubber, n=0.4, permeability=0.1, K=1000, rho=1, kozeny=true)
