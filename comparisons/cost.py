@@ -25,6 +25,7 @@ def chart(
         for coarse, fine in pairwise(measured[name]):
             arrow = {"arrowstyle": "->", "color": line.get_color(), "shrinkA": 5, "shrinkB": 5}
             axes.annotate("", xy=fine, xytext=coarse, arrowprops=arrow)
-    axes.set(title="arrows lead to the finer or slower run", xlabel="processor time of the steps (s)")
+    axes.set_title("arrows lead to the finer or slower run")
+    axes.set(xlabel="processor time of the steps (s)")
     axes.set(ylabel="relative error")
     return measured
