@@ -122,13 +122,14 @@ SLIDE = """
 
 
 def test_a_block_slides_down_a_profile(run_script, tmp_path):
-    """Coulomb: the acceleration g (sin a - mu cos a), after the block has ceased to bounce."""
+    """Coulomb: the acceleration g (sin a - mu cos a), and mu times that of bounces."""
     (tmp_path / "run").mkdir()
     profile = f"x, y\n0, 4\n10, {4 - 10 * tan(radians(20))!r}\n"
     (tmp_path / "run" / "slope.csv").write_text(profile, encoding="utf-8")
     log = run_script(SLIDE).log
     a = radians(20)
     exact = 9.81 * (sin(a) - 0.2 * cos(a))
-    along = log["v_x"] * cos(a) - log["v_y"] * sin(a)
+    across = log["v_x"] * sin(a) + log["v_y"] * cos(a)
+    along = log["v_x"] * cos(a) - log["v_y"] * sin(a) + 0.2 * across
     time = log["Time"]
     assert (along[-1] - along[10]) / (time[-1] - time[10]) == pytest.approx(exact, rel=0.01)
