@@ -82,7 +82,8 @@ class ContactSurface(StiffTool):
     A block of 0.4 m whose weight acts at once bounces on a slope. With each push, friction takes mu
     times the change of its velocity across the slope, within 0.1 % at 20 to 45 degrees with mu =
     0.2. A block that hardly slides gains up to 0.03 m/s in its first bounces, in which its points
-    stick. Energy is balanced within 0.3 %. The block sinks in by twice the force on a point divided by m / dt^2, here 1 % of a cell.
+    stick. Energy is balanced within 0.3 %. The block sinks in by twice the force on a point divided
+    by m / dt^2, here 1 % of a cell.
     A belt over half a bollard with mu = 0.3 is drawn slowly with 2.50 times its load (exact 2.57
     for a thin belt, 2.45 for this one, as thick as 10 % of the radius).
 
