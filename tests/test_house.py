@@ -142,7 +142,7 @@ COUNTS = {
     "names that several classes have": lambda: len(shared_class_names()),
     "docstrings that begin with a question": riddles,
     "names imported from private modules of Numba": private_imports,
-    "kinds of errors that mypy passes over, by room": lenient,
+    "kinds of errors that mypy passes over, by package": lenient,
 }
 
 
