@@ -71,10 +71,10 @@ def finish(axes: Any, about: str) -> None:
     marked = [line for line in axes.get_lines() if line.get_marker() == "o"]
     for line, mark in zip(marked, look.MARKERS, strict=False):
         line.set_marker(mark)
-    if axes.get_aspect() == 1:  # no white above and below a flat body
-        wide, high = (np.ptp(limits) for limits in (axes.get_xlim(), axes.get_ylim()))
-        axes.figure.set_size_inches(6, min(4.0, 1.6 + 4.5 * high / wide))
     if axes.get_legend_handles_labels()[0]:
         legend = axes.figure.legend(loc="outside lower center", ncols=3)
         for handle in legend.get_lines():
             handle.set_markersize(5)
+    axes.figure.draw_without_rendering()  # a flat body leaves a part of its place empty
+    used = 1 - axes.get_position(original=True).height + axes.get_position().height
+    axes.figure.set_figheight(used * axes.figure.get_figheight())

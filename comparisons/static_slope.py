@@ -5,7 +5,7 @@ from math import radians
 import numpy as np
 
 from comparisons.exact import spiral_slip
-from comparisons.pictures import coloured
+from comparisons.pictures import body, coloured
 from comparisons.row import Row
 
 SMALL = {}  # 10 cells of height: ten seconds
@@ -26,6 +26,7 @@ def compare(run, axes, full):
         yield Row(name, N, limit(result.log), within, "Chen 1975 (bound from above)")
     last = result.snapshots("static_slope")[-1]
     strain = "plastic strain (%)"
+    body(axes, last.x, last.y, "slope at failure")
     coloured(axes, last.x, last.y, 100 * last.ep, strain, cmap="Greys", limits=(0, 1))
-    axes.plot(*(TOE + H * line).T, "C0", label="spiral through the toe (Chen 1975)")
-    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", ylim=(0, 45))
+    axes.plot(*(TOE + H * line).T, "C1", label="spiral through the toe (Chen 1975)")
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", xlim=(0, 75), ylim=(0, 38))

@@ -35,7 +35,10 @@ def _texts(axes):
 
 
 # Quantities without a unit, apart from ratios.
-DIMENSIONLESS = re.compile(r"cells|shear|damage|density, pressure|.*strain|.*error.*|.* / .*")
+DIMENSIONLESS = re.compile(
+    r"cells|points per cell|stretch|fraction of .*|shear|damage|density, pressure"
+    r"|.*strain|.*error.*|.* / .*"
+)
 
 
 def has_unit(label):

@@ -257,7 +257,7 @@ def test_words_along_the_axes(table, capsys):
     two = ["-versus", "basis", "-where", "basis != linear"]
     assert main([*draw, "relative error (1),", *two]) == 0
     text = (table / "chart.svg").read_text(encoding="utf-8")
-    assert "relative error (1)" in text and " over " in text
+    assert "relative error (1)" in text and "cubic-spline / quadratic-spline" in text
     assert main(["chart", "sweep.csv", "-accuracy", "err", "-axes", "N,err"]) == 1
     assert capsys.readouterr().err.count("expected: -curve, or -accuracy or -y with -o") == 1
     assert main([*draw, "N"]) == 1
@@ -500,9 +500,11 @@ def test_four_panels_make_a_square(table, monkeypatch):
 def test_titles_have_the_units_of_the_script(tmp_path):
     script = tmp_path / "in.units"
     computes = ("Ek, kinetic_energy", "v, average_velocity")
-    lines = ['units("mm", "g", "ms")', *(f"compute({words}, all)" for words in computes)]
+    lines = ["# A bar,", "# 2.5 mm long, swings. More.", 'units("mm", "g", "ms")']
+    lines += [f"compute({words}, all)" for words in computes]
     script.write_text("\n".join(lines) + "\n", encoding="utf-8")
     table = Table([], [], made={"script": str(script)})
+    assert table.title == "A bar, 2.5 mm long, swings"
     assert [table.label(name) for name in ("Time", "Ek", "v_x", "max:Ek", "err", "seconds")] == [
         "Time (ms)", "Ek (mJ)", "v_x (mm/ms)", "max:Ek (mJ)", "err",
         "time of the stepping loop (s)",

@@ -113,6 +113,7 @@ def test_charts_name_their_units():
     labels += [label for pair in axes for label in pair.split(",") if label]
     assert len(labels) > 100
     assert [label for label in labels if not has_unit(label)] == []
+    assert "(1)" not in "".join(commands)
 
 
 def test_faults_of_charts_are_found():

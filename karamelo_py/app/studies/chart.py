@@ -52,8 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
         help="write a table of the behaviour of a log column: keeps, damps, gains, breaks, "
-            "refused; "
-        "rows by -by, columns by the other variables",
+        "refused; rows by -by, columns by the other variables",
     )  # fmt: skip
     wanted.add_argument(
         "-distribution", metavar="COLUMN",
@@ -76,7 +75,7 @@ def add_options(parser: ArgumentParser) -> None:
     add_axes(parser)
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="log of -curve (log.mpm)")
     parser.add_argument("-where", action="append", default=[], help="draw only these rows")
-    parser.add_argument("-title", help="title (the name of the script)")
+    parser.add_argument("-title", help="title (the first sentence of the script)")
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
 
 
@@ -115,7 +114,7 @@ def run(options: Namespace) -> int:
     out = out_file(options.o, *SUFFIXES) if options.o else None
     if out is not None and out.suffix.lower() == ".html":
         require_plotly()
-    title = table.script if options.title is None else options.title
+    title = table.title if options.title is None else options.title
     axes = names(options.heat or "")
     require("-heat", axes, table.variables)
     if options.heat and len(axes) != 2:
@@ -182,9 +181,7 @@ def side_by_side(options: Namespace) -> int:
         pairs += more
     if out is not None:
         cost = look.label(options.cost).removesuffix(" (s)")
-        labels = along(
-            options, look.label(options.accuracy), f"{cost},\n{values[1]} over {values[0]} (1)"
-        )
+        labels = along(options, look.label(options.accuracy), f"{cost},\n{values[1]} / {values[0]}")
         sheet = pictures.Sheet(out, *labels, options.title or "")
         pictures.draw_pairs(pairs, values, options.accuracy, sheet)
     pictures.tell_pairs(pairs, values, options.accuracy, options.cost)
@@ -206,7 +203,7 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
     if options.exact:
         whole = max(read(options.exact), key=lambda each: len(each.x))
         exact = whole._replace(label=options.exact)
-    title = table.script if options.title is None else options.title
+    title = table.title if options.title is None else options.title
     histories = read(options.curve)
     labels = along(options, table.label(over), table.label(options.curve))
     pictures.draw_histories(histories, pictures.Sheet(out, *labels, title), exact)

@@ -11,7 +11,7 @@ import numpy as np
 from karamelo_py.app.studies import look
 from karamelo_py.app.studies.case import Row
 from karamelo_py.app.studies.records import SIGNED, value
-from karamelo_py.app.studies.variables import ScriptFiles
+from karamelo_py.app.studies.variables import ScriptFiles, title_of
 from karamelo_py.output.units import labelled
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
@@ -122,6 +122,10 @@ class Table(NamedTuple):
     @property
     def script(self) -> str:
         return Path(self.made.get("script", "")).name
+
+    @property
+    def title(self) -> str:
+        return title_of(Path(self.made.get("script", "")))
 
     def label(self, name: str) -> str:
         path = Path(self.made.get("script", ""))

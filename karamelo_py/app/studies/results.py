@@ -35,7 +35,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
     measured = measured_in(options.data, options.x, results[0]) if options.data else None
     if out is not None:  # the picture first: a reader of the table may close the pipe
         first = table.label(results[0]) if len(results) == 1 else ""
-        title = table.script if options.title is None else options.title
+        title = table.title if options.title is None else options.title
         sheet = Sheet(out, *along(options, table.label(options.x), first), title)
         _picture(lines, law, measured, sheet)
     _tell(lines, law, options)

@@ -133,7 +133,7 @@ def run(options: Namespace) -> int:
     finally:
         if chart.results:
             records.write(table, chart.rows())
-            chart.draw(out, options.script.name, words)
+            chart.draw(out, variables.title_of(options.script), words)
     chart.tell()
     searched = [n for n, words in zip(chart.shape, apart, strict=True) if not words]
     width = unseen(searched, options.stride)

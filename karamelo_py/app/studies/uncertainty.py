@@ -134,7 +134,7 @@ def draw(options: Namespace, table: Table) -> int:
     for axes in (first, *panels):
         tidy(axes)
         axes.set_axisbelow(True)
-    first.set_title(options.title or table.script, loc="left", fontsize=10)
+    first.set_title(options.title or table.title, loc="left", fontsize=10)
     savefig(figure, out)
     tell([{**row, "status": row.get("status", "done")} for row in table.rows], [name], None)
     print(f"drawn: {out}; lines: 5 %, 50 % and 95 %, with their 95 % intervals")

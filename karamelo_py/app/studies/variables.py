@@ -6,9 +6,10 @@ import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
-from itertools import product
+from itertools import product, takewhile
 from math import prod
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple, NoReturn
 
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
@@ -140,6 +141,13 @@ def holds(
     if not isinstance(value, float):
         raise ScriptError(f"{option} {condition} is neither true nor false")
     return value != 0
+
+
+def title_of(script: Path) -> str:
+    """First sentence of the comment at the head of a script, else the name of the file."""
+    lines = read_script(script).splitlines() if script.is_file() else []
+    head = " ".join(line.strip("# ") for line in takewhile(re.compile(r"#+ *\w").match, lines))
+    return fill(re.split(r"[.:](?:\s|$)", head)[0], 80) or script.name
 
 
 class ScriptFiles:

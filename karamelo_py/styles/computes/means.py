@@ -271,7 +271,7 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
 
 
 class Probe(Mean):
-    """Measure a column of the points: its mean, or its value at a point or a position.
+    """Measure a column of the points, such as a stress: the mean, or the value at a place.
 
     Published as ID, or for several columns as ID_column. NaN for an empty group, and for a point
     that no longer exists.

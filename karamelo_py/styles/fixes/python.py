@@ -68,7 +68,7 @@ class PythonFunction:
 
 
 class Python(Fix):
-    """Call a Python function on points or nodes in every step.
+    """Call a Python function on points or nodes in every step: write your own fix.
 
     Parameters
     ----------
