@@ -354,17 +354,13 @@ def in_html(lead: str, exponent: int) -> str:
     return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 
-def _values(row: Mapping[str, str], family: Family) -> dict[str, str]:
-    return {name: row[name] for name in family.table.variables}
-
-
 def _said(row: Mapping[str, str], family: Family) -> str:
-    return html.escape(worded(_values(row, family)))
+    return html.escape(worded({name: row[name] for name in family.table.variables}))
 
 
 def _about(row: Mapping[str, str], family: Family, folder: Path, k: int) -> Row:
     script = family.table.made.get("script", "SCRIPT")
-    values = _values(row, family)
+    values = {name: row[name] for name in family.table.variables}
     skipped = {*values, "status", "reason", "folder"}
     return {
         "title": worded(values),

@@ -120,10 +120,6 @@ class Table(NamedTuple):
     made: Mapping[str, Any] = {}
 
     @property
-    def script(self) -> str:
-        return Path(self.made.get("script", "")).name
-
-    @property
     def title(self) -> str:
         return title_of(Path(self.made.get("script", "")))
 

@@ -46,9 +46,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
 
 def lines_of(table: Table, x: str, results: Sequence[str], by: Sequence[str]) -> list[History]:
     differing = [
-        name
-        for name in by or table.variables
-        if name != x and len({row[name] for row in table.rows}) > 1
+        n for n in by or table.variables if n != x and len({row[n] for row in table.rows}) > 1
     ]
     groups: dict[tuple, list[Mapping[str, str]]] = {}
     for row in table.rows:
