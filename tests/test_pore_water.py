@@ -327,6 +327,24 @@ def test_mistakes_get_one_message(run_interpreted, change, options, told):
     assert err.count("error:") == status
 
 
+@pytest.mark.parametrize("scheme", ["musl", "quasi-static"])
+def test_water_without_weight_is_told_before_the_run(run_interpreted, scheme):
+    """No load, or hydrostatic pressures that nothing balances; a uniform pressure is a load."""
+
+    def told(tail):
+        script = COLUMN.replace("N = 16", "N = 4").replace("dt_factor", "# dt_factor") + tail
+        script = script.replace("dimension", f"scheme({scheme})\ndimension", 1)
+        err = run_interpreted(script, command="check").err
+        assert err.count("warning:") == ("has no weight" in err)
+        return err if "has no weight" in err else ""
+
+    run, table = "\nrun(200)", "fix(table, initial_pore_pressure, all, 9810*(1 - x0))"
+    assert "fix(weight, body_force, all, -9.81)" in told(run)
+    assert "^" in told(table + run)
+    assert not told(f"{table}\nfix(weight, body_force, all, -9.81){run}")
+    assert not told(f"fix(drain, pore_pressure, top, 100){run}")
+
+
 def test_a_permeability_in_the_wrong_unit_is_doubted(run_interpreted):
     script = SCENE.format(**USUAL | {"water": "pore_water(clay, n=0.4, permeability=1e-14)"})
     err = run_interpreted(script).err

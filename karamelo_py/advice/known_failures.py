@@ -27,6 +27,7 @@ from karamelo_py.scene.group import NOTHING_THERE, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Mark, ScriptError
+from karamelo_py.script.expressions import POINT_SEEDS
 
 PEEK = 100  # steps; shorter runs only inspect a scene
 ENDLESS = 1e8
@@ -58,11 +59,8 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
     parts += [kind for law in laws for kind in law_kind(law)]
     built_in = all(kind.__module__.startswith("karamelo_py.") for kind in parts)
-    for fix in hub.fixes.values():
-        formulas = fix.formulas
-        holds_at_zero = formulas and all(map(is_zero, formulas))  # walls and zero loads
-        if fix.for_method or (fix.hooks() and not holds_at_zero):
-            return False
+    if not all(_is_zero(fix) for fix in hub.fixes.values()):
+        return False
     if not built_in or update.thermal or any(can(law, constrained_velocity) for law in laws):
         return False
 
@@ -72,6 +70,34 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
         return np.max([np.abs(points.particle(name)) for name in columns], axis=0)
 
     return simulation.fastest() == 0 and simulation.points.largest(largest)[0] == 0
+
+
+def _is_zero(fix: Fix) -> bool:
+    """Return True for walls and zero loads."""
+    holds_at_zero = fix.formulas and all(map(is_zero, fix.formulas))
+    return not (fix.for_method or (fix.hooks() and not holds_at_zero))
+
+
+def warn_about_weightless_water(hub: Hub, simulation: Simulation) -> None:
+    """Warn once of pore water that nothing drives, except pressures that vary with the place."""
+    wet = [solid.material for solid in hub.solids.values() if solid.material.fluid]
+    still = all(map(_is_water_at_rest, hub.fixes.values())) and simulation.fastest() == 0
+    if wet and still and hub.update.first_time(REST):
+        given = [fix.mark for fix in hub.fixes.values() if fix.water_only and not _is_zero(fix)]
+        g = ", ".join([*["0"] * (hub.domain.dimension - 1), "-9.81"])
+        hub.warn(
+            f"the water in the pores of '{wet[0].id}' has no weight, and nothing loads the ground",
+            mark=[*given, wet[0].mark][0],
+            hint=f"fix(weight, body_force, all, {g}), which acts on soil and water, or a load",
+            code="weightless-water",
+        )
+
+
+def _is_water_at_rest(fix: Fix) -> bool:
+    """Return True if a fix is zero, or only gives water a pressure such as a hydrostatic one."""
+    if fix.water_only:
+        return all(is_zero(f) or not f.names.isdisjoint(POINT_SEEDS) for f in fix.formulas)
+    return _is_zero(fix)
 
 
 def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:
@@ -229,6 +255,8 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
         scene.duration = 0.0
     warn_about_steps(hub, simulation, halves)
     _warn_about_precision(scene)
+    if duration >= PEEK * simulation.dt:
+        warn_about_weightless_water(hub, simulation)
     warn_about_rest(hub, simulation, duration)
     _tell(hub, (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)))
 

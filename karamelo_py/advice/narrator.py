@@ -47,6 +47,7 @@ class Narrator(Listener):
         if simulation.implicit:
             known_failures.warn_about_factor(hub)
             known_failures.warn_about_loads(hub, steps)
+            known_failures.warn_about_weightless_water(hub, simulation)
             known_failures.warn_about_laws(hub, simulation, duration)
         else:
             known_failures.warn(hub, simulation, duration, halve)

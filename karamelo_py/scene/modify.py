@@ -132,6 +132,7 @@ class Fix(Publisher):
     exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed on request
     presses = False  # it is the force of a surface on points
     brakes = False
+    water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
     # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not
     # monitored.

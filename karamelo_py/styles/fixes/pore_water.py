@@ -63,7 +63,7 @@ class PorePressure(Fix):
 
     published = ("s",)
     node_fields = (GivenPressure, Flux)
-    conserves = True
+    conserves = water_only = True
 
     post_particles_to_grid = vector_hook(give, **FROM_FLUX)
 
@@ -186,7 +186,7 @@ class InitialPorePressure(Fix):
 
     published = ()
     first_step_only = True
-    point_by_point = True
+    point_by_point = water_only = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, p: Expression):
         super().__init__(hub, group)
