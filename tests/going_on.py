@@ -271,7 +271,7 @@ SWAYS = (
 )  # fmt: skip
 EDGES = (
     "region(low, block, -INF, INF, -INF, 0.301)", "group(low, nodes, region, low, all)",
-    "fix(out, absorbing, low, rubber, ylo)", "fix(start, geostatic_stress, all, k0=0.4)",
+    "fix(out, absorbing, low, rubber, ylo)", "fix(start, geostatic_stress, all, k0=0)",
     "fix(sponge, mass_damping, all, 9*(0.6 - y0))",
     "fix(v, initial_velocity_particles, all, sin(9*x0), -y0)", "set_output(1)",
     "log_modify(custom, step, time, out_x, out_y, sponge_x)", "run(4)",

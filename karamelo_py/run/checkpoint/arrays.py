@@ -247,7 +247,10 @@ def _take_nodes(simulation: SceneState, state: ArraysByName) -> None:
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
     used[counted] = True
     nodes = state["node numbers"][()] if "node numbers" in state else counted[:0]
+    kept = {id(array) for _, array in kept_at_nodes(simulation.setup)}  # restored, with -0
     for name, array in of_nodes(simulation.setup):
+        if id(array) in kept:
+            continue
         array[counted] = 0
         row = np.broadcast_to(array[:1], (len(nodes), *array.shape[1:]))
         if len(nodes):
