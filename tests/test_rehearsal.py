@@ -42,6 +42,7 @@ plot(curve, 1, time, E)
 CALLS = {
     "anti_volumetric_locking": (SCENE, "anti_volumetric_locking(true)"),
     "plane_stress": (BARE, "create_domain(0, 1, 0, 1)\nplane_stress(false)"),
+    "plane_strain": (BARE, "create_domain(0, 1, 0, 1)\nplane_strain(ezz=0)"),
     "uniaxial_stress": (BARE, "dimension(1, 0, 1, 0.1)\nuniaxial_stress(false)"),
     "axisymmetric": (BARE, "create_domain(0, 1, 0, 1)\naxisymmetric(true)"),
     "pore_water": (SCENE, "material(w, linear, 1, 10, 0)\npore_water(w, n=0.4, permeability=1)"),

@@ -8,7 +8,7 @@ from conftest import INPUTS
 from scipy.optimize import brentq
 
 from karamelo_py.compiler import on_numbers
-from karamelo_py.kernels.implicit import nominal_stress, stress_and_tangent
+from karamelo_py.kernels.implicit import IncrementAt, nominal_stress, stress_and_tangent
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, large
 from karamelo_py.points.laws import (
     advance,
@@ -187,12 +187,12 @@ def test_tangents_of_thin_laws(law, kin):
     state = initial_state(law, kin, 1.0)
     for size in (0.0, 2e-4):
         H = kin.Tensor._make([size] * kin.tensor_size)
-        _, C = on_numbers(stress_and_tangent)(law, kin, state, H, 1.0)
+        _, C = on_numbers(stress_and_tangent)(law, kin, state, IncrementAt(H), 1.0)
         for k in range(kin.tensor_size):
             ends = []
             for h in (1e-7, -1e-7):
                 moved = kin.Tensor._make([x + h * (j == k) for j, x in enumerate(H)])
-                ends.append(nominal_stress(law, kin, state, moved, 1.0))
+                ends.append(nominal_stress(law, kin, state, IncrementAt(moved), 1.0))
             slopes = [(a - b) / 2e-7 for a, b in zip(*ends, strict=True)]
             assert [row[k] for row in C] == pytest.approx(slopes, abs=2e-4 * E)
 

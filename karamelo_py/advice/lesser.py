@@ -67,7 +67,7 @@ def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
 def _flat(hub: Hub) -> Words:
     domain = hub.domain
     d = domain.dimension
-    if d == 1 or len(hub.lattices) > 1 or isinstance(domain.kin, Twisted):
+    if d == 1 or len(hub.lattices) > 1 or isinstance(domain.kin, Twisted) or domain.across:
         return
     round_ = domain.kin.hoops > 0
     whole = "thickness" if d == 3 else "length" if round_ else "cross-section"

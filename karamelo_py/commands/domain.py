@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
+from karamelo_py.commands.thin import refuse_late
 from karamelo_py.kernels.equations.periodic import InUse
 from karamelo_py.language import registry
 from karamelo_py.language.by_dimension import Forms, number
@@ -308,6 +309,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
         )
     hub.require_domain()
     hub.solids.refuse(ID)
+    refuse_late(hub)
     if not registry.knows("solid", kind):
         # Forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
         if kind in hub.regions:

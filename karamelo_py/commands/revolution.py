@@ -1,6 +1,6 @@
 """Commands for bodies around an axis or a centre: axisymmetric, cylindrical, spherical."""
 
-from karamelo_py.commands.thin import refuse_uneven
+from karamelo_py.commands.thin import refuse_across, refuse_uneven
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.hub import Hub
@@ -115,6 +115,7 @@ def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) ->
         thin = {1: "uniaxial_stress", 2: "plane_stress"}[d]
         message = f"the scene has {thin.replace('_', ' ')}, which has no hoop stress"
         raise ScriptError(message, argument="active", expected=f"{thin}(false)")
+    refuse_across(domain, active)
     if active and domain.kin.hoops and not same:
         message = f"the scene is {domain.kin.word} already"
         expected = f"{domain.kin.word}(false) first, or no {name}(true)"

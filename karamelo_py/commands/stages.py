@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.commands.thin import refuse_late
 from karamelo_py.output.point_table import from_solids, places_before
 from karamelo_py.scene.boundary import take_away
 from karamelo_py.scene.group import ParticleGroup
@@ -73,6 +74,7 @@ def activate(hub: Hub, group: ParticleGroup) -> None:
     --------
     deactivate, solid, fix initial_stress, fix inflow
     """
+    refuse_late(hub)
     ids = np.intersect1d(_members(hub, group), hub.inactive)
     hub.inactive = np.setdiff1d(hub.inactive, ids)
     if not len(ids) and not hub.rehearsing:

@@ -4,6 +4,9 @@ from typing import Annotated
 
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import is_rigid, is_round, law_parts, law_traits, parameter
+from karamelo_py.points.laws.across import Across
+from karamelo_py.points.laws.thin import Thin
+from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
@@ -76,6 +79,7 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
         expected = f"dimension({dimension}, ...) before {command}(true)"
         hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
+    refuse_across(domain, active)
     if active and domain.kin.hoops:
         message = f"the scene is {domain.kin.word}, which has hoop stress"
         raise ScriptError(message, argument="active", expected=f"{domain.kin.word}(false)")
@@ -101,9 +105,25 @@ def refuse_uneven(hub: Hub, material: Material, argument: str) -> None:
     )
 
 
+def refuse_across(domain: Domain, active: bool) -> None:
+    if active and domain.across is not None:
+        message = f"plane_strain prescribes the strain across (line {domain.across.mark.line})"
+        raise ScriptError(message, argument="active", expected="one of the two")
+
+
+def refuse_late(hub: Hub) -> None:
+    if hub.domain is not None and hub.domain.across is not None and hub.has_run:
+        message = "points that enter after a run would get all of ezz of plane_strain at once"
+        raise ScriptError(message, expected="all points before the first run", code="too-late")
+
+
 def fit_to_domain(hub: Hub, material: Material) -> None:
     refuse_uneven(hub, material, "style")
-    if hub.domain is None or not hub.domain.thin or is_rigid(material.whole):
+    if hub.domain is None or is_rigid(material.whole):
+        return
+    if hub.domain.across is not None:
+        material.flat = Across
+    if not hub.domain.thin:
         return
     parts = law_parts(material.whole)
     if any(law_traits(law).flows and not parameter(law, "cohesion") > 0 for law in parts):
@@ -116,4 +136,4 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
             argument="style",
             expected="plane_stress in 2D, or a material with equal axes y and z",
         )
-    material.thin = True
+    material.flat = Thin

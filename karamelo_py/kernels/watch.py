@@ -10,7 +10,7 @@ hide vibrations. The same checks measure how many cells stressed material moves 
 from math import exp, inf, sqrt
 
 from karamelo_py.compiler import all_lanes, at_hand, kernel, noinline, real
-from karamelo_py.compiler.fields import field, load_vector
+from karamelo_py.compiler.fields import field, load_vector, store
 from karamelo_py.compiler.lanes import added, of_present
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
@@ -31,6 +31,7 @@ from karamelo_py.points.laws import (
     specific_volume,
     temperature,
 )
+from karamelo_py.points.laws.across import Across
 from karamelo_py.points.laws.pore_water import Saturated, water_content
 
 LOOK = 10  # steps between two checks
@@ -128,6 +129,17 @@ def _add_water(matter, relative, control):
 
 
 @kernel
+def _take_work_across(matter, control):
+    kin, points, laws = at_hand(matter)
+    for p in range(points.mass.size):
+        law, state = state_at(kin, points, laws, p)
+        work = points.mass[p] * specific_volume(law) * state.work
+        totals.add_to(control.totals, totals.WORK, float(work))
+        store(points.state, p, state._replace(work=0))
+    totals.carry(control.totals[totals.WORK])
+
+
+@kernel
 def _take_work_at_nodes(spans, work, control):
     """Add work at nodes, and clear it."""
     for r in range(1, 1 + spans[0, 0]):
@@ -150,6 +162,8 @@ def sum_energies(s, mode):
         work = field(block.points.fields, WorkOfForces)
         if work is not None:
             _take_work(work, s.control)
+        if isinstance(block.laws, Across):
+            _take_work_across(matter_of(s.kin, block), s.control)
         if isinstance(block.laws, Saturated):
             relative = field(block.points.fields, RelativeVelocity)
             _add_water(matter_of(s.kin, block), relative, s.control)

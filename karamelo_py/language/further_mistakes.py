@@ -24,7 +24,7 @@ _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
 # These add columns to points.
-_COLUMNS = _SCENE | {"plane_stress", "uniaxial_stress", "scheme", "fix"}
+_COLUMNS = _SCENE | {"plane_strain", "plane_stress", "uniaxial_stress", "scheme", "fix"}
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
 _PLAIN = {"group", "plot", "load_path", "element"}  # without a style
 # Index of the style among the arguments.

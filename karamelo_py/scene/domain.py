@@ -32,6 +32,7 @@ class Domain:
 
     thin = False
     thickness = 1.0  # in 2D; cross-section in 1D
+    across: Any = None  # fix that prescribes the strain across
     mark: Mark | None = None
     periodic: tuple[int, ...] = ()  # directions
     shear = 0.0  # velocity gradient of images, x along y

@@ -4,7 +4,6 @@ from typing import Any, NamedTuple
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import Named
-from karamelo_py.points.laws.thin import Thin
 
 
 class MaterialPart(Named):
@@ -33,7 +32,7 @@ class MaterialPart(Named):
 class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
-    thin = False
+    flat: type | None = None  # wraps the law in thin bodies and generalised plane strain
     fluid: Any = None  # water in its pores: ``around(law)`` wraps the law
 
     @property
@@ -42,7 +41,7 @@ class Material(MaterialPart):
 
     @property
     def law(self) -> NamedTuple:
-        return Thin(self.whole) if self.thin else self.filled
+        return self.flat(self.whole) if self.flat else self.filled
 
     @property
     def filled(self) -> NamedTuple:

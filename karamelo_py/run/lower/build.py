@@ -165,6 +165,8 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
         yield TWIST, "twist=true", None
     if box.thin:
         yield THIN, "plane_stress" if box.dimension == 2 else "uniaxial_stress", None
+    if box.across is not None:
+        yield box.across.restrictions, "plane_strain(ezz=...)", box.across.mark
     for solid in hub.solids.values():
         if solid.material.fluid is not None:
             fluid = solid.material.fluid

@@ -343,7 +343,9 @@ class FixesOfRun(NamedTuple):
 
     @classmethod
     def of(cls, simulation: SceneState) -> "FixesOfRun":
-        fixes = sorted(simulation.hub.fixes.values(), key=lambda fix: fix.order)
+        across = simulation.hub.domain.across
+        fixes = [*simulation.hub.fixes.values(), *([] if across is None else [across])]
+        fixes.sort(key=lambda fix: fix.order)
         new = [fix for fix in fixes if fix.first_step_only and fix not in simulation.begun]
         once = [fix for fix in new if _sets_initial_state(fix)]
         lasting = ActingFixes(simulation, [fix for fix in fixes if not fix.first_step_only])

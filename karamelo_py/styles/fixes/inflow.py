@@ -76,7 +76,7 @@ class Inflow(VelocityNodes):
     looked = False
     restrictions = Restrictions(
         "inflow", "no inflow", only={"method": ("ulmpm",)},
-        without=("implicit", "periodic", "pore_water"),
+        without=("implicit", "periodic", "pore_water", "ezz"),
     )  # fmt: skip
 
     def __init__(
