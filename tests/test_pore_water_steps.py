@@ -255,6 +255,35 @@ def test_water_and_soil_rest_under_gravity(run_script):
     assert np.abs(log["p"][1:] / (9810 * (1 - 1 / 64)) - 1).max() < 1e-3
 
 
+@pytest.mark.parametrize("suction", ["", ", suction=20000"])
+def test_total_stress_carries_the_weight_of_soil_and_water(run_script, suction):
+    """Of a column that drains at its base, where suction empties some pores (Bishop 1959)."""
+    fixes = """fix(weight, body_force, all, -9.81)
+    fix(drain, pore_pressure, bottom, 0)
+    compute(t, probe, all, t11)
+    compute(S, probe, all, saturation)
+    compute(water, probe, all, water_content)"""
+    log = last(run_script(column(fixes, [(1e12, 2)], kozeny=suction, more="t, S, water")))
+    x = (np.arange(1000) + 0.5) / 1000
+    S = np.exp(-9810 * x / 20000) if suction else np.ones(1000)
+    assert abs(log["base_x"] / (9.81 * (1590 + log["water"])) - 1) < 1e-3
+    assert abs(log["t"] / (-9.81 * (1590 / 2 + 400 * np.mean(S * x))) - 1) < 1e-3
+    assert abs(log["S"] / np.mean(S) - 1) < 1e-3
+    assert abs(log["s"] - log["t"]) > 1000
+
+
+def test_total_stress_is_the_load_while_water_leaves(run_script):
+    log = run_script(
+        column(
+            LOADED.format(1000) + "\n    compute(t, probe, all, t11)",
+            [(1e5, 3)],
+            more="t",
+        )
+    ).log
+    assert np.abs(log["t"][1:] / -1000 - 1).max() < 1e-6
+    assert abs(log["s"][-1]) > 100
+
+
 def test_tension_beyond_one_bar_is_doubted(run_script):
     fixes = "fix(up, force_nodes, top, {})"
     for force, count in ((2e5, 1), (5e4, 0)):

@@ -64,8 +64,9 @@ def pore_water(
     -----
     Points carry the water in their pores; nodes have velocities of soil and water (Jassim, Stolle &
     Vermeer 2013; Bandara & Soga 2015). Columns of dumps and computes: ``pore_pressure``,
-    ``porosity``, ``water_content`` (mass of the water per volume before deformation), and ``wx``,
-    ``wy``, ``wz``, its velocity relative to the soil (times the porosity, Darcy's).
+    ``saturation``, ``porosity``, ``water_content`` (mass of the water per volume before
+    deformation), and ``wx``, ``wy``, ``wz``, its velocity relative to the soil (times the porosity,
+    Darcy's). ``s11`` ... is the effective stress, ``t11`` ... the total one.
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force

@@ -330,12 +330,19 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
     return table._exported[:, k].copy()
 
 
+def _total_stress(k: int, table: PointTable) -> np.ndarray:
+    """Stress of soil and water (n,), of which the saturation's fraction of p acts (Bishop 1959)."""
+    load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
+    return table._exported[:, k] - load
+
+
 # None: only with certain materials or fields; else 0, as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,
     **{name: partial(_of_vector, *where) for name, where in VECTORS.items()},
     **{f"s{name}": partial(_exported, k) for k, name in enumerate(COMPONENTS)},
+    **{f"t{name}": partial(_total_stress, k) for k, name in enumerate(COMPONENTS)},
     **{f"e{name}": partial(_exported, export.STRAIN + k) for k, name in enumerate(COMPONENTS)},
     "seq": lambda table: _von_mises(table._exported[:, : export.STRAIN]),
     "p": lambda table: -table._exported[:, :3].sum(axis=1) / 3,

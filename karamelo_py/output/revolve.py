@@ -35,7 +35,7 @@ def revolved(
             along * np.sin(a) + around * np.cos(a),
         )
         made.update(zip(components, turned, strict=True))
-    for kind in "se":
+    for kind in "set":
         wanted = {kind + name: places for name, places in FRAME.items() if kind + name in names}
         if not wanted:
             continue

@@ -29,7 +29,7 @@ NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
 COLUMNS = {
     r"[xyz]0?": LENGTH,
     r"v[xyz](_update)?": VELOCITY,
-    r"s[123]{2}|seq|p": STRESS,
+    r"[st][123]{2}|seq|p|pore_pressure": STRESS,
     r"[fb][xyz]": FORCE,
     r"volume": Powers(3),
     r"rho": DENSITY,

@@ -24,7 +24,7 @@ PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in betwee
 
 ARRAYS = {
     "velocity": "vx vy vz", "force": "fx fy fz",
-    "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",
+    "total stress": "t11 t22 t33 t12 t23 t13", "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",
 }  # fmt: skip
 
 

@@ -99,6 +99,13 @@ def pore_pressure(law, kin, state):
 
 
 @laws.number
+def saturation(law, kin, state):
+    """Return the fraction of the pores that water fills: 1 without suction."""
+    ratio = state.content / state.pores
+    return where(law.suction < law.K, where(ratio < 1, ratio, 1), 1)
+
+
+@laws.number
 def porosity(law, kin, state):
     """Return the porosity over the present volume."""
     return state.pores / (state.pores + (1 - law.n))
@@ -121,5 +128,5 @@ def drag_per_volume(law, kin, state):
     return law.drag * n * n / (1 + law.kozeny * (k - 1))
 
 
-for _function in (pore_pressure, porosity, water_content):
+for _function in (pore_pressure, saturation, porosity, water_content):
     laws.column(Saturated, _function.__name__, _function)
