@@ -70,7 +70,7 @@ def test_a_sphere_sinks_in_a_viscous_liquid(run_script, refine):
 
 @pytest.mark.parametrize("refine", [1, pytest.param(1.5, marks=FULL)])
 def test_a_projectile_goes_through_a_plate(run_script, refine):
-    """181.1 m/s remain (Borvik et al. 2002), and of 350 what Recht & Ipson (1963) say."""
+    """181.1 m/s remain (Borvik et al. 2002, unconfirmed), and of 350 what Recht & Ipson say."""
     remains, plug = [], 0.012 * np.pi * 0.01**2 * 7850
     for speed in (285.4, 350):
         words = ("-var", "refine", f"{refine}", "-var", "v", f"{speed}")
