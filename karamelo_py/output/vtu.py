@@ -14,7 +14,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-KINDS = {"vertex": 1, "line": 3, "quad": 9, "hexahedron": 12}
+KINDS = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
 BLOCK = 1 << 15  # compressed together
 COMPRESSION = 4  # 33 % of the time of level 6, slightly larger files
@@ -24,7 +24,8 @@ PIECE = 3 << 16  # bytes encoded together, a multiple of 3: no padding in betwee
 
 ARRAYS = {
     "velocity": "vx vy vz", "force": "fx fy fz",
-    "total stress": "t11 t22 t33 t12 t23 t13", "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",
+    "total stress": "t11 t22 t33 t12 t23 t13",
+    "stress": "s11 s22 s33 s12 s23 s13", "strain": "e11 e22 e33 e12 e23 e13",
 }  # fmt: skip
 
 

@@ -127,7 +127,7 @@ class Fix(Publisher):
     ignites = False
     follows_points = False  # force depends on positions of points (tools)
     depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
-    faces_of: Any = None  # present faces (m, d, d) of a tool
+    faces_of: Any = None  # present faces (m, d, d) of a tool or a body
     accelerates = False  # formulas are forces per mass
     exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed on request
     presses = False  # it is the force of a surface on points

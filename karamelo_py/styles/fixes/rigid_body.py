@@ -264,8 +264,20 @@ class RigidBody(Fix):
             )
 
     def rigid_positions(self) -> np.ndarray:
-        d, arm = self.hub.domain.dimension, np.zeros((self.body.count, 3))
-        arm[:, :d] = self.body.x0
+        return self._moved(self.body.x0)
+
+    def faces_of(self) -> np.ndarray | None:
+        of_touch = [touch.region for touch in surfaces_of(self)]
+        skin = next((one.skin for one in [*of_touch, self.body.region] if one), None)
+        if skin is None:
+            return None
+        faces = np.asarray(skin.faces)
+        return self._moved(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
+
+    def _moved(self, x0: np.ndarray) -> np.ndarray:
+        """Return present positions (n, d) of those at the start."""
+        d, arm = self.hub.domain.dimension, np.zeros((len(x0), 3))
+        arm[:, :d] = x0
         arm -= self.constants.start
         return (self.state.x + arm @ self.state[0].R.T)[:, :d]
 
