@@ -415,6 +415,10 @@ def _tried(lines, dimension, folder):
             h = STAGES[dimension][0].split()[-1]
             interpreter.run_text("material(lead, rigid, 1)")
             interpreter.run_text(f"solid({words[3]}, region, disk, 2, lead, {h}, 0)")
+        if words[3:4] == ["surface"]:
+            interpreter.run_text(
+                "region(hull, stl, body.stl)\nfix(hull, contact/surface, all, hull)"
+            )
         if words[2] == "angular_velocity_nodes":
             interpreter.hub.domain.kin = Twisted()
         if "pore_pressure" in words[2] or words[2] in ("seepage_face", "flux"):
