@@ -5,6 +5,7 @@ from math import log
 
 import numpy as np
 import pytest
+from going_on import ELASTIC, FLOWS, goes_on, of_laws, with_files
 from scipy.optimize import brentq
 
 from karamelo_py.points.laws.parameters import lame_parameters
@@ -77,10 +78,30 @@ def test_a_slow_ramp_in_explicit_steps_balances_its_energy(run_interpreted):
     assert abs(record["runs"][-1]["energy_change_percent"]) < 1
 
 
-def test_threads_ranks_and_restarts_have_the_same_bits(state_interpreted):
+def test_a_periodic_cell_has_no_strain_but_across(run_interpreted):
+    """s11 = lam e and s33 = (lam + 2 G) e, the constrained modulus; nothing is said of rest."""
+    slow = block(scheme="", run="log(200)\n    run_time(1)", ezz="0.005*(1 - cos(PI*time))")
+    slow = slow.replace("0, 1, 0.5)", "0, 1, 0.5)\n    boundary(periodic, x, y)", 1)
+    slow = slow.replace("tlmpm", "ulmpm").replace("    fix(", "    # fix(")
+    done = run_interpreted(slow)
+    lam, G = lame_parameters(1e6, 0.3)
+    e = log(1.01)
+    exact = (lam * e, (lam + 2 * G) * e)
+    assert (done.log["a_11"][-1], done.log["a_33"][-1]) == pytest.approx(exact, rel=1e-3)
+    assert "nothing moves" not in done.err
+
+
+@pytest.mark.parametrize("laws", [FLOWS, ELASTIC])
+def test_every_law_goes_on_with_the_same_bits(run_interpreted, laws):
+    script = of_laws("ulmpm, FLIP, linear, 1", laws)
+    script = script.replace("plane_stress(false)", "plane_strain(ezz=2*time)")
+    goes_on(run_interpreted, with_files(script))
+
+
+def test_boxes_and_ranks_have_the_same_bits(state_interpreted):
     law = "strength(y, plastic, 1e6/2.6, 400)\n    eos(b, linear, 1000, 1e6/1.2)\n    "
     law += "material(m, eos-strength, b, y)"
-    script = block(law, "", "restart(5, state.*.h5)\n    run(12)", ezz="0.1*time^2")
+    script = block(law, "", "run(12)", ezz="0.1*time^2")
     whole = state_interpreted(script, "x", "v", "thickness", "s33")
     assert whole["thickness"].max() > 1.0005
     for how in ({"boxes": True}, {"ranks": 2}):
@@ -122,3 +143,9 @@ def test_what_has_no_strain_across_is_refused(run_interpreted, lines, says):
 )
 def test_what_cannot_run_is_refused(run_interpreted, ezz, law, says):
     assert says in run_interpreted(block(law, ezz=ezz), status=1).err
+
+
+def test_points_that_enter_late_and_gpus_are_refused(run_interpreted):
+    late = block() + "solid(t, region, all, 2, m, 0.5)\n"
+    assert "after a run would get all of ezz" in run_interpreted(late, status=1).err
+    assert "does not support --gpu" in run_interpreted(block(), "--gpu", status=1).err

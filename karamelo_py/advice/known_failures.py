@@ -43,7 +43,9 @@ UNITS = (
 
 
 def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
-    if duration >= PEEK * simulation.dt and _rests(hub, simulation) and hub.update.first_time(REST):
+    if hub.domain.across is not None or duration < PEEK * simulation.dt:
+        return
+    if _rests(hub, simulation) and hub.update.first_time(REST):
         hub.warn(
             "nothing moves in this run: all velocities, stresses and loads are zero",
             hint="fix(ID, initial_velocity_particles, ...), fix(ID, body_force, ...) or another "
