@@ -1,5 +1,7 @@
 """Columns of Karamelo with their values: the rate of plastic strain, and those of nodes."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scenes import block
@@ -84,7 +86,8 @@ def test_volume_mask_and_loads_of_nodes(run_interpreted):
     heavy = left & (g.mass > 0)
     push = np.where(heavy, 5 / heavy.sum(), 0)
     assert g.by == pytest.approx(-9.81 * g.mass + push, rel=1e-4, abs=1e-6)
-    assert accelerate(2.0, 0, 0, 0.0, -9.81, 0, 1, 1)[2] == -2 * 9.81
+    node = SimpleNamespace(mass=2.0, v=0, v_star=0, force=0.0, value=-9.81)
+    assert accelerate(node)[2] == -2 * 9.81
 
 
 def test_nodes_of_rigid_solids(run_interpreted):

@@ -367,7 +367,7 @@ def test_groups_and_solids_are_left_out_by_name(shown):
     assert caught.value.hint == "did you mean 'part'?"
     for name in ("second", "x"):
         sim = Simulation(block(2, SETS.replace("(second", f"({name}"), "second = 2"))
-        with pytest.raises(ScriptError, match=f"'{name}' is a group or solid, and a column"):
+        with pytest.raises(ScriptError, match=f"'{name}' names both a group or solid"):
             sim.show(only=f"not {name}")
 
 

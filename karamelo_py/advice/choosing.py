@@ -205,7 +205,7 @@ def choose(hub: Hub) -> Chosen:
 
     ScriptError, as the script would raise it, for a mistake further on.
     """
-    if hub.restart is not None and (lines := hub.restart.content.get("chosen")):
+    if hub.restart is not None and (lines := hub.restart.content["chosen"]):
         return Chosen(RESUMED, lines)  # a longer run may suit another row
     if hub.rehearsing:
         return Chosen(PLAIN, PLAIN.lines)

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 FORMAT, VERSION = "karamelo-py restart", 10
 OURS = "a file that restart or write_restart of karamelo-py has written"
 CONTENT = (
-    "within", "statements", "values of statements", "presets", "variables", "runs", "scene",
-    "values", "begun", "parts", "run",
+    "within", "statements", "values of statements", "presets", "variables", "runs", "chosen",
+    "scene", "values", "begun", "parts", "run",
 )  # fmt: skip
 # From this version on HDF5 stores checksums of all but arrays, which have one as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"

@@ -51,7 +51,7 @@ class BaseAcceleration:
     script_kind = "a formula of time, or the name of a file with the columns time and acceleration"
 
     def __init__(self, hub: Hub, formula: Expression):
-        self.hub, self.formula = hub, formula
+        self.hub, self.formula, self.text = hub, formula, formula.text
         self.is_constant = formula.is_constant
         self.constant = formula.constant if self.is_constant else nan
 
@@ -90,7 +90,7 @@ class RecordedAcceleration(BaseAcceleration):
     is_constant, constant = False, nan
 
     def __init__(self, table: FileColumns, argument: Argument):
-        self.table = table
+        self.table, self.text = table, argument.text
         first, *others = (np.asarray(column, float) for column in table.columns.values())
         if not others or len(first) < 2 or (np.diff(first) <= 0).any():
             raise ScriptError(
