@@ -19,7 +19,14 @@ from karamelo_py.output import node_columns, point_table
 from karamelo_py.output.node_columns import NodeTable
 from karamelo_py.output.point_table import Part, PointTable, Rows, absent, declared_columns
 from karamelo_py.points.grid import Bounces
-from karamelo_py.points.laws import can, dissipated_energy, elastic_law, energy_density
+from karamelo_py.points.laws import (
+    can,
+    dissipated_energy,
+    elastic_law,
+    energy_density,
+    law_parts,
+    parameter,
+)
 from karamelo_py.points.laws.eos import initial_energy, taken_heat
 from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, one_of, table, unknown
@@ -281,10 +288,10 @@ def _of_field(kind: type) -> Callable:
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
     """Initial energy of a gas; stored energy is relative to it, to retain digits."""
-    law = elastic_law(block.laws)
-    if not can(law, taken_heat):
+    if not can(elastic_law(block.laws), taken_heat):
         return None
-    of_eos = np.array(initial_energy(law.eos, 1.0)[0]) * law.eos.specific_volume
+    eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
+    of_eos = np.array(initial_energy(eos, 1.0)[0]) * eos.specific_volume
     return (block.points.mass * of_eos[block.points.material]).astype(float)
 
 

@@ -226,7 +226,7 @@ class SceneArrays:
     def bring(self) -> None:
         """Bring the whole state here, with points in the order of their tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
-        if self.comm.allreduce_max(np.array([sorted_before]))[0] and np.isinf(
+        if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift
         ):
             self.sort()  # points have gone or come since

@@ -25,9 +25,9 @@ from karamelo_py.points.kinematics import (
     tr,
     unit,
 )
-from karamelo_py.points.laws.elastic import ElasticLaw
 from karamelo_py.points.laws.eos_strength import Strength
 from karamelo_py.points.laws.leaning import warn_of_leaning
+from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.orthotropic import (
     INDEX,
@@ -61,7 +61,7 @@ class ElasticBase:
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         material = look_up(hub.materials, argument)
-        if not isinstance(material.whole, ElasticLaw | Directional):
+        if not isinstance(material.whole, LinearElastic | Directional):
             raise ScriptError(
                 f"material '{material.id}' has no constant stiffness",
                 mark=argument.mark,

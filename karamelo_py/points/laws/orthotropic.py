@@ -99,10 +99,18 @@ class Orthotropic(NamedTuple):
         compliance[1, 2] = compliance[2, 1] = -self.nu23 / self.E2
         least = np.linalg.eigvalsh(compliance[:3, :3] * min(moduli[:3])).min()
         if not least > 1e-9:
+            pairs = {
+                f"nu{a + 1}{b + 1}": (f"E{a + 1}/E{b + 1}", moduli[a] / moduli[b])
+                for a, b in ((0, 1), (0, 2), (1, 2))
+            }
+            wrong = [name for name, (_, most) in pairs.items() if getattr(self, name) ** 2 >= most]
             raise ScriptError(
                 "with these Poisson's ratios some strain would release energy",
-                argument="nu12",
-                expected="nu12^2 < E1/E2, nu13^2 < E1/E3 and nu23^2 < E2/E3, with a margin",
+                argument=[*wrong, "nu12"][0],
+                expected=f"{wrong[0]}^2 < {pairs[wrong[0]][0]}"
+                if wrong
+                else "smaller ratios: nu12^2 E2/E1 + nu13^2 E3/E1 + nu23^2 E3/E2 "
+                "+ 2 nu12 nu13 nu23 E3/E1 < 1",
                 hint="nu12 = nu21 E1/E2: the ratio belongs to a pull along the first axis",
             )
         C = rotated(np.linalg.inv(compliance), axes(self.angle, self.tilt, self.spin))
