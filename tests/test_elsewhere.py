@@ -3,12 +3,14 @@
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
+from argparse import Namespace
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pandas
@@ -17,7 +19,8 @@ from test_sampling import SCRIPT
 
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import elsewhere, variables
-from karamelo_py.app.studies.case import Launch
+from karamelo_py.app.studies.case import CaseOutcome, Launch
+from karamelo_py.script.errors import ScriptError
 
 TIMES = ["seconds", "cpu_seconds", "seconds_spread", "particle_steps_per_s", "peak_memory_mib"]
 OF_MACHINES = [*TIMES, "wall_s", "folder", "machine"]
@@ -62,9 +65,13 @@ def test_a_killed_worker_changes_nothing(folder, scheduler, capsys):
             time.sleep(0.02)
         os.kill(next(iter(scheduler.workers.values())).pid, signal.SIGKILL)
 
+    address = scheduler.scheduler_address
+    options, package = Namespace(on=address, jobs=None), package_of(folder / "in.lin")
+    for timed, size in ((True, 1), (False, 2)):
+        with closing(elsewhere.opened(options, package, 1, timed=timed)) as place:
+            assert place.size == size
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
-    address = scheduler.scheduler_address
     assert main(["sweep", "in.lin", *WORDS, "-on", address, "-keep", "d.1*", "-o", "far.csv"]) == 0
     killer.join(10)
     assert not killer.is_alive()
@@ -106,14 +113,15 @@ def test_the_files_of_a_script_travel_with_it(folder):
     (folder / "parts" / "loads.csv").write_text("x,y\n0,1\n", "utf-8")
     (folder / "store.msh").write_text("mesh", "utf-8")
     (folder / "body.msh").symlink_to(folder / "store.msh")
+    (folder / "mydrag.py").write_text("class Drag: pass", "utf-8")
     (folder / "secret.txt").write_text("not named", "utf-8")
-    text = 'mesh = "none"\ninclude(parts/more.txt)\n' + SCRIPT
+    text = 'mesh = "none"\ninclude(parts/more.txt)\nfix(air, mydrag.Drag, all)\n' + SCRIPT
     (folder / "in.lin").write_text(
         text + "dump(d, all, particle, 1, parts/loads.csv, x)\n", "utf-8"
     )
     package = package_of(folder / "in.lin", mesh=["body.msh"])
     names = {name for name, _ in package.files}
-    assert names == {"in.lin", "parts/more.txt", "parts/loads.csv", "body.msh"}
+    assert names == {"in.lin", "mydrag.py", "parts/more.txt", "parts/loads.csv", "body.msh"}
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
@@ -149,6 +157,85 @@ def test_a_lost_case_is_tried_twice_more(folder, lost, status):
         outcome = place.submit({"a": "1"}, folder / "case").result(60)
     assert outcome.status == status
     assert status == "done" or outcome.reason == "lost 3 times: MemoryError: worker is gone"
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_a_scheduler_that_has_gone_ends_the_case(folder):
+    packages = iter([package_of(folder / "in.lin")])
+    with Losing(1) as pool:
+        place = elsewhere.Elsewhere(lambda: next(packages), pool, 1, ExitStack())
+        outcome = place.submit({"a": "1"}, folder / "case").result(60)
+    assert outcome.status == "killed"
+    assert outcome.reason.startswith("MemoryError: worker is gone; not sent again: StopIteration")
+
+
+class Answering(ThreadPoolExecutor):
+    """Calls a function for each case, with the preferred workers."""
+
+    def __init__(self, answer):
+        super().__init__(1)
+        self.answer = answer
+
+    def submit(self, function, package, case, workers=(), **_):
+        return super().submit(self.answer, workers)
+
+
+def test_only_a_full_disk_here_ends_the_study(folder, monkeypatch):
+    def full(_):
+        raise ScriptError("cannot write case.json: No space left on device")
+
+    with Answering(full) as pool:
+        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        outcome = place.submit({}, folder / "case").result(10)
+    assert outcome.status == "killed" and "lost 3 times: ScriptError: cannot" in outcome.reason
+    done = elsewhere.Returned(CaseOutcome("done"), {"log.mpm": b""}, "far")
+    monkeypatch.setattr(Path, "write_bytes", lambda *_: (_ for _ in ()).throw(OSError("full")))
+    with Answering(lambda _: done) as pool, pytest.raises(ScriptError, match="full"):
+        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        place.submit({}, folder / "case").result(10)
+
+
+@pytest.mark.parametrize(("willing", "status"), [(["b"], "done"), ([], "failed")])
+def test_a_worker_with_other_versions_is_avoided(folder, willing, status):
+    def answer(workers):
+        if not workers:
+            return elsewhere.Returned(CaseOutcome("failed", "far has 2"), {}, "far", "a")
+        return elsewhere.Returned(CaseOutcome("done"), {}, workers[0])
+
+    workers = dict.fromkeys(["a", *willing], 1)
+    with Answering(answer) as pool:
+        place = elsewhere.Elsewhere(tuple, pool, 2, ExitStack(), lambda: workers)
+        assert place.submit({}, folder / "case").result(10).status == status
+    assert place.refusing == {"a"} and place.size == (1 if willing else 2)
+
+
+def test_leaving_does_not_wait_for_a_case(folder):
+    free = threading.Event()
+    with Answering(lambda _: free.wait(20) and 1 / 0) as pool:
+        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        outcome = place.submit({}, folder / "case")
+        place.close()
+        assert not outcome.done()
+        free.set()
+    assert outcome.cancelled()
+
+
+@pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n", b""])
+def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, answer):
+    monkeypatch.setattr(elsewhere, "PATIENCE", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        held = []
+
+        def serve():
+            while True:
+                held.append(server.accept()[0])
+                if answer:
+                    held.pop().sendall(answer)
+
+        threading.Thread(target=serve, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        assert main(["sweep", "in.lin", *WORDS, "-on", address]) == 1
+    assert f"no scheduler answers at {address}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

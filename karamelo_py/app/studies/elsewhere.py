@@ -7,15 +7,18 @@ named by `-keep` come back: no disk is shared.
 import re
 import shutil
 import socket
+import sys
+import time
 from argparse import Namespace
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import lru_cache
 from importlib.util import find_spec
 from os.path import abspath, commonpath
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Thread
 from typing import Any, NamedTuple
 
 from karamelo_py.app.studies.case import KEPT, CaseOutcome, Launch
@@ -26,7 +29,9 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import CommandCall
 
 PATIENCE = 10  # seconds for a scheduler to answer
+TO_CLOSE = 3  # seconds for connections to close
 TRIES = 3
+CLASS = re.compile(r"(\w+)\.\w+")  # of a module next to the script
 QUOTED = re.compile(r'"([^"\n]*)"')
 RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
@@ -44,6 +49,7 @@ class Returned(NamedTuple):
     outcome: CaseOutcome
     files: dict[str, bytes]
     machine: str
+    refused_by: str | None = None  # worker with other versions; "" without an address
 
 
 def versions() -> tuple[tuple[str, str], ...]:
@@ -67,6 +73,9 @@ def packed(
         plain = word and "\n" not in word and len(word) < 1000 and not Path(word).is_absolute()
         if plain and (path.parent / word).is_file():
             paths.add(Path(abspath(path.parent / word)))
+        module = CLASS.fullmatch(word)
+        if module and (source := path.parent / f"{module[1]}.py").is_file():
+            paths.add(Path(abspath(source)))
     root = Path(commonpath([path.parent for path in paths]))
     files = tuple((path.relative_to(root).as_posix(), path.read_bytes()) for path in sorted(paths))
     name = Path(abspath(script.path)).relative_to(root).as_posix()
@@ -84,6 +93,16 @@ def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
     return Launch(Path(folder.name) / package.script, *package.launch, package.texts), folder
 
 
+def _address() -> str:
+    if "distributed" not in sys.modules:
+        return ""
+    from distributed import get_worker
+
+    with suppress(ValueError):  # no worker of Dask
+        return get_worker().address
+    return ""
+
+
 def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
     machine = socket.gethostname()
     differ = [
@@ -93,7 +112,7 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
     ]
     if differ:
         outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
-        return Returned(outcome, {}, machine)
+        return Returned(outcome, {}, machine, _address())
     launch, _ = _unpacked(package)
     with TemporaryDirectory(prefix="karamelo-py-case-") as name:
         folder = Path(name)
@@ -108,12 +127,22 @@ def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
 
 
 class Elsewhere:
-    def __init__(self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack):
-        """`send` makes the package known to the machines; its result goes with each case."""
+    def __init__(
+        self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack,
+        workers: Callable[[], Mapping[str, int]] = dict,
+    ):  # fmt: skip
+        """`send` makes the package known to the machines; its result goes with each case.
+
+        `workers` returns the threads of each worker by address; it is empty if a case cannot be
+        sent to chosen workers.
+        """
         self.send, self.executor, self.size, self.ends = send, executor, size, ends
+        self.workers = workers
+        self.refusing: set[str] = set()  # addresses
         self.package = send()
         # Callbacks run in the thread that talks to the machines, which must not wait.
-        self.retries = ends.enter_context(ThreadPoolExecutor(1))
+        self.retries = ThreadPoolExecutor(1)
+        self.closing = False
         self.machines: dict[Path, str] = {}  # machine by folder
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
@@ -125,25 +154,65 @@ class Elsewhere:
     def _try(self, case: Mapping[str, str], folder: Path, outer: Future, tries: int) -> None:
         def finished(inner: Future) -> None:
             try:
-                outer.set_result(self._received(inner.result(), folder))
-            except ScriptError as error:  # a full disk here
-                outer.set_exception(error)
-            except Exception as error:  # the machine, or its copy of the package
-                if tries < TRIES:
-                    self.retries.submit(self._again, case, folder, outer, tries + 1)
-                    return
+                result = inner.result()
+            except Exception as error:  # the machine, its disk, or its copy of the package
                 words = f"{type(error).__name__}: {error}".splitlines()[0]
-                reason = f"lost {TRIES} times: {words}"
-                outer.set_result(CaseOutcome("killed", reason, {}, folder))
+                self._retry(case, folder, outer, tries, words)
+                return
+            if result.refused_by is not None:
+                self._retry(case, folder, outer, tries, result.outcome.reason, result)
+                return
+            try:
+                outer.set_result(self._received(result, folder))
+            except Exception as error:  # a full disk here
+                outer.set_exception(error)
 
         try:
-            self.executor.submit(run_sent, self.package, dict(case)).add_done_callback(finished)
+            chosen: dict[str, Any] = {}
+            if self.refusing:  # a preference: Dask would wait for ever for a worker that has gone
+                chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
+            future = self.executor.submit(run_sent, self.package, dict(case), **chosen)
+            future.add_done_callback(finished)
         except Exception as error:  # the executor has gone
             outer.set_result(CaseOutcome("killed", f"not started: {error}", {}, folder))
 
-    def _again(self, *attempt: Any) -> None:
-        self.package = self.send()
-        self._try(*attempt)
+    def _willing(self) -> dict[str, int]:
+        return {name: n for name, n in self.workers().items() if name not in self.refusing}
+
+    def _retry(
+        self, case: Mapping[str, str], folder: Path, outer: Future, tries: int, reason: str,
+        refusal: Returned | None = None,
+    ) -> None:  # fmt: skip
+        def again() -> None:
+            try:
+                count = tries + 1
+                if refusal and refusal.refused_by:
+                    self.refusing.add(refusal.refused_by)
+                    if willing := self._willing():
+                        self.size = min(self.size, sum(willing.values()))
+                        count = tries
+                        time.sleep(0.2)  # Dask may move the case to an idle worker that refuses it
+                    else:
+                        count = TRIES + 1
+                if count <= TRIES:
+                    self.package = self.send()
+                    self._try(case, folder, outer, count)
+                elif refusal:
+                    outer.set_result(self._received(refusal, folder))
+                else:
+                    lost = f"lost {TRIES} times: {reason}"
+                    outer.set_result(CaseOutcome("killed", lost, {}, folder))
+            except Exception as error:  # the scheduler does not answer, or a full disk here
+                words = f"{reason}; not sent again: {type(error).__name__}: {error}".splitlines()[0]
+                outer.set_result(CaseOutcome("killed", words, {}, folder))
+
+        if self.closing:
+            outer.cancel()
+            return
+        try:
+            self.retries.submit(again)
+        except RuntimeError:  # closed in this moment
+            outer.cancel()
 
     def _received(self, result: Returned, folder: Path) -> CaseOutcome:
         with reported(folder):
@@ -157,13 +226,40 @@ class Elsewhere:
         return result.outcome
 
     def close(self) -> None:
+        """Leave without waiting for cases that run."""
+        self.closing = True
+        self.retries.shutdown(wait=False, cancel_futures=True)
         self.ends.close()
 
 
-def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
+def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
+    """Close with `ends`, whatever state the machines are in."""
+
+    def closing() -> None:
+        with suppress(Exception):
+            close(**how)
+
+    ends.callback(closing)
+
+
+def _in_time(connect: Callable[[], Any]) -> Any:
+    """Return the result of `connect`; TimeoutError if it never ends."""
+    result: Future = Future()
+
+    def connecting() -> None:
+        try:
+            result.set_result(connect())
+        except BaseException as error:
+            result.set_exception(error)
+
+    Thread(target=connecting, daemon=True).start()
+    return result.result(PATIENCE + 1)
+
+
+def opened(options: Namespace, package: Package, jobs: int, *, timed: bool = False) -> Elsewhere:
     ends = ExitStack()
     if options.on == "mpi":
-        return _mpi(package, ends)
+        return _mpi(package, ends, timed=timed)
     kinds = ("local", *QUEUES)
     if options.on not in kinds and "://" not in options.on:
         raise ScriptError(f"-on {options.on}", expected=WHERE)
@@ -176,35 +272,42 @@ def opened(options: Namespace, package: Package, jobs: int) -> Elsewhere:
 
     try:
         if options.on == "local":
-            cluster: Any = ends.enter_context(
-                LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=":0")
+            cluster: Any = LocalCluster(
+                n_workers=jobs, threads_per_worker=1, dashboard_address=":0"
             )
+            _closed(ends, cluster.close, timeout=TO_CLOSE)
         elif options.on in QUEUES:
             import dask_jobqueue
 
-            cluster = ends.enter_context(getattr(dask_jobqueue, QUEUES[options.on])())
+            cluster = getattr(dask_jobqueue, QUEUES[options.on])()
+            _closed(ends, cluster.close, timeout=TO_CLOSE)
             cluster.scale(jobs=jobs)
         else:
             cluster = options.on
-        client = ends.enter_context(Client(cluster, timeout=PATIENCE))
-    except OSError as error:
+        client = _in_time(lambda: Client(cluster, timeout=PATIENCE))
+    except ValueError as error:
+        ends.close()
+        raise ScriptError(f"-on {options.on}: {error}", expected=WHERE) from None
+    except Exception as error:  # anything, if something else than a scheduler answers
+        ends.close()
+        words = (str(error) or type(error).__name__).splitlines()[0]
         raise ScriptError(
-            f"no scheduler answers at {options.on}: {str(error).splitlines()[0]}",
+            f"no scheduler answers at {options.on}: {words}",
             expected="the address that 'dask scheduler' has printed",
         ) from None
-    except ValueError as error:
-        raise ScriptError(f"-on {options.on}: {error}", expected=WHERE) from None
-    if options.on not in QUEUES:
+    _closed(ends, client.close, timeout=TO_CLOSE)
+    if options.on not in QUEUES and not timed:
         jobs = options.jobs or sum(client.nthreads().values()) or jobs
-    executor = ends.enter_context(client.get_executor(retries=0))
+    executor = client.get_executor(retries=0)
+    _closed(ends, executor.shutdown, wait=False)
 
     def send() -> Any:
         return client.scatter(package, broadcast=True, hash=False)
 
-    return Elsewhere(send, executor, jobs, ends)
+    return Elsewhere(send, executor, jobs, ends, client.nthreads)
 
 
-def _mpi(package: Package, ends: ExitStack) -> Elsewhere:
+def _mpi(package: Package, ends: ExitStack, *, timed: bool) -> Elsewhere:
     if find_spec("mpi4py") is None:
         hint = "pip install '.[mpi]' in the folder of karamelo-py"
         raise ScriptError("-on mpi needs mpi4py", hint=hint)
@@ -217,4 +320,6 @@ def _mpi(package: Package, ends: ExitStack) -> Elsewhere:
             "-on mpi: there is one process",
             expected='mpiexec -n 5 python -m mpi4py.futures "$(which karamelo-py)" sweep ...',
         )
-    return Elsewhere(lambda: package, ends.enter_context(MPIPoolExecutor()), size, ends)
+    executor = MPIPoolExecutor()
+    _closed(ends, executor.shutdown, wait=False, cancel_futures=True)
+    return Elsewhere(lambda: package, executor, 1 if timed else size, ends)

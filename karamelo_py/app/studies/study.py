@@ -345,5 +345,6 @@ def open_study(
         from karamelo_py.app.studies.elsewhere import opened, packed
 
         package = packed(plan.script, plan.launch, plan.values, options.keep)
-        study.elsewhere = options.ends.enter_context(closing(opened(options, package, plan.jobs)))
+        place = opened(options, package, plan.jobs, timed=plan.timed)
+        study.elsewhere = options.ends.enter_context(closing(place))
     return study

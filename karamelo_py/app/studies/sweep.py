@@ -64,10 +64,9 @@ def run(options: Namespace) -> int:
     if not items and not options.time:
         print("no result is recorded: repeat the command with -record NAME, which reads the logs")
     if not any(row["status"] == "done" for row in rows):
-        raise ScriptError(
-            f"no run is done: {rows[0]['reason']}",
-            hint=f"{out.parent / rows[0]['folder'] / 'err.txt'} has all its messages",
-        )
+        messages = out.parent / rows[0]["folder"] / "err.txt"
+        hint = f"{messages} has all its messages" if messages.is_file() else None
+        raise ScriptError(f"no run is done: {rows[0]['reason']}", hint=hint)
     return 0
 
 

@@ -306,6 +306,7 @@ class StudyPlan(NamedTuple):
     script: ScriptFiles
     launch: Launch
     jobs: int  # runs at once
+    timed: bool = False
 
 
 def family(options: Namespace, *, timed: bool = False, repeat: int = 1) -> StudyPlan:
@@ -320,7 +321,7 @@ def family(options: Namespace, *, timed: bool = False, repeat: int = 1) -> Study
         raise ScriptError("-time runs one at a time", expected="-time without -jobs")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
     jobs = 1 if timed else options.jobs or max(1, cores // threads)
-    return StudyPlan(values, script, launch, jobs)
+    return StudyPlan(values, script, launch, jobs, timed)
 
 
 def out_file(path: Path, *suffixes: str) -> Path:
