@@ -487,6 +487,12 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2", "I4 needs a direction", "fibre=(x, y, z)"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + I4, fibre=(1, 0, 0)", "the fibres have a stress",
          "least for I4 = 1"),
+        ("l1^2 + l2^2 + l3^2 - 3 - 2*log(J) + (I4 - 1)^2, fibre=(1, 0, 0)",
+         "I4 cannot be combined with l1, l2 and l3", "I1, I2 and J"),
+        ("I1 - 3 - 2*log(J) + (J - 1)^2 - (I4 - 1)^2, fibre=(1, 0, 0)",
+         "no stiffness in stretching along the fibres", "grows with I4"),
+        ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2.5, fibre=(1, 0, 0)",
+         "no energy in stretching along the fibres", "max(I4 - 1, 0)"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2, fibre=(1, 0, 0)", "does not contain I4", "with I4"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2, fibre=(1, 0)", "'(1, 0)' is no direction",
          "(x, y, z)"),
@@ -516,6 +522,43 @@ def test_an_energy_that_loses_convexity_is_reported(run_interpreted):
     line = "material(m, saint-venant-kirchhoff, 1000, 2e7, 4e5)\nelement(e, m, p)\n"
     said = run_interpreted("load_path(p, 1, exx=0.01)\n" + line).err
     assert "loses its stiffness in swelling at a stretch of 0." in said
+
+
+@pytest.mark.parametrize("more", ["1e6*(I4 - 1)^2", "2e4*(I4 - 1)*(2 - I4)*(I4 - 1)"])
+def test_fibres_that_lose_convexity_are_reported(more):
+    """Where the warning says, W by ln x at constant volume is no longer convex."""
+    a = (0.6, 0.8, 0.0)
+    law = ready(f"2e5*({ISO}) + 1e7*(J - 1)^2 + {more}", rho=1, fibre=a, fibre2=a)
+    path, x = first_instability(law)
+    assert path == "stretching along the fibres at constant volume"
+    R = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+
+    def stored(e):
+        F = R @ np.diag(np.exp([e, -e / 2, -e / 2])) @ R.T
+        return energy_density(law, SPACE, State(flat(SPACE, F)))
+
+    h, stiff = 1e-3, np.log(x) * 0.9
+    curvatures = [stored(e + h) + stored(e - h) - 2 * stored(e) for e in (stiff, np.log(x))]
+    assert curvatures[0] > 0 >= curvatures[1]
+
+
+def test_fibres_stiffen_with_temperature(run_interpreted):
+    """tau = 4 k T (I4 - 1) I4 along fibres of the energy k T (I4 - 1)^2."""
+    text = """material(m, hyperelastic, 1, I1 - 3 - 2*log(J) + (J - 1)^2 + T*(I4 - 1)^2,
+        fibre=(1, 0, 0), cp=9, kappa=0, T={})
+load_path(p, 1, exx=0.1)
+element(e, m, p)"""
+    found = []
+    for T in (300, 600):
+        folder = run_interpreted(text.format(T), folder=str(T)).folder
+        found.append(np.genfromtxt(folder / "element_e.txt", names=True)[-1]["q"])
+    assert found[1] - found[0] == pytest.approx(300 * 4 * 0.21 * 1.21 / 1.1, rel=1e-6)
+
+
+def test_gent_ends_at_its_limit(run_interpreted):
+    line = "material(m, gent, 1000, 4e5, 4, 2e7)\nload_path(p, 40, exx=3, eyy=-0.4, ezz=-0.4)\n"
+    err = run_interpreted(line + "element(e, m, p)\n", status=1).err
+    assert "I1*J^(-2/3) - 3 = Jm" in err and ":3:" in err
 
 
 def test_a_formula_with_fibres_needs_no_other_material(tmp_path):

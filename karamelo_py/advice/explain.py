@@ -9,7 +9,7 @@ from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
 from karamelo_py.language.rules import code_of
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.points.basis import carried, extent
-from karamelo_py.points.laws import by_rates
+from karamelo_py.points.laws import by_rates, can, deformation
 from karamelo_py.run.listening import Trouble, when, where
 from karamelo_py.run.no_number import no_number
 from karamelo_py.run.simulation import Simulation
@@ -85,6 +85,8 @@ def _gained(hub: Hub, simulation: Simulation) -> Trouble:
             f"{named(hub, first)} ({when(simulation)})"
         )
         fix = "check the parameters of its material, and fixes in Python that act on it"
+        if can(solid_with(hub, first).material.whole, deformation):
+            fix += "; gent has no energy beyond I1*J^(-2/3) - 3 = Jm"
         return Trouble(message, fix, "not-a-number")
     supplied = abs(watch.first_balance) + watch.supplied
     cause, fix = energy.cause_of_gain(hub, simulation)

@@ -170,7 +170,8 @@ class Point:
             dl = self._strained(increment, motion.shear) + rigid
             try:
                 state = laws.advance(self.law, self.kin, self.state, self._flat(dl), dt)
-                if laws.jacobian(self.law, self.kin, state) > 0:
+                stored = laws.energy_density(self.law, self.kin, state)
+                if laws.jacobian(self.law, self.kin, state) > 0 and np.isfinite(stored):
                     return state, self._stress(state)
             except (ArithmeticError, ValueError):
                 pass  # logarithm of a negative stretch, overflow
@@ -192,7 +193,10 @@ class Point:
         after_increment = after(unknown)
         self.last = (self.state, self._strained(increment, motion.shear) + rigid, dt)
         if after_increment is None or not np.isfinite(after_increment[1]).all():
-            raise Unreachable("the point is turned inside out (det F <= 0) or has no stress")
+            raise Unreachable(
+                "the point is turned inside out (det F <= 0), or its energy has no value there: "
+                "gent ends at I1*J^(-2/3) - 3 = Jm"
+            )
         self._accept(after_increment[0], increment)
         return unknown
 

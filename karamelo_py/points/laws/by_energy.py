@@ -5,9 +5,9 @@ point (`karamelo_py.points.laws.formulas`).
 """
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import combinations, product
-from math import exp, isfinite, sqrt
+from math import exp, isfinite, isnan, nan, sqrt
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -43,6 +43,7 @@ class ByEnergy(OfDeformation):
     __slots__ = ()
     traits = LawTraits(rebounds=True)
     in_lanes = True
+    along: ClassVar[tuple[Code, ...]] = ()  # derivatives by I4, I6
     start: ClassVar[int]  # index of the formula's first number
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
@@ -97,6 +98,13 @@ def law_of(
     lam, G, at_rest = _judged(stretched, slopes, curves)
     names = INVARIANTS
     if energy.names.intersection(STRETCHES):
+        if directions:
+            raise ScriptError(
+                f"{min(energy.names.intersection(FIBRES))} cannot be combined with l1, l2 and l3",
+                argument="energy",
+                expected="an energy of the fibres and I1, I2 and J",
+                hint="l1^2 + l2^2 + l3^2 is I1, l1*l2*l3 is J",
+            )
         names, kind, term = STRETCHES, OfStretches, replaced(term, IN_STRETCHES)
     writer = ProgramWriter((*names, *FIBRES))
     first = [derivative(term, name) for name in names]
@@ -107,18 +115,29 @@ def law_of(
         "second": tuple(map(writer.code, second)),
     }
     if directions:
-        codes |= _along_fibres(term, writer)
+        codes |= _along_fibres(term, writer, T)
     codes["in_lanes"] = kind.in_lanes and in_lanes(codes["energy"])
     fields: dict[str, Any] = dict(zip(FIELDS, (1 / rho, lam, G, at_rest), strict=True))
     if directions:
         fields["directions"] = directions
-    return writer.law(kind, fields, codes, T=T)
+    law = writer.law(kind, fields, codes, T=T)
+    for family, path in _fibre_paths(law):
+        if not (stiffness := stiffness_along_fibre(law, family, path, 1.0)) > 0:
+            what, name = "energy" if isnan(stiffness) else "stiffness", FIBRES[family]
+            raise ScriptError(
+                f"the body has no {what} in {path} near rest",
+                argument="energy",
+                expected=f"an energy that grows with {name}, such as k*({name} - 1)^2 with k > 0, "
+                f"or with max({name} - 1, 0) if slack",
+            )
+    return law
 
 
-def _along_fibres(term: Term, writer: ProgramWriter) -> dict[str, Any]:
+def _along_fibres(term: Term, writer: ProgramWriter, T: float) -> dict[str, Any]:
+    rest = {**dict(zip(INVARIANTS, (3.0, 3.0, 1.0), strict=True)), **dict.fromkeys(FIBRES, 1.0)}
     slopes = [derivative(term, name) for name in FIBRES]
     for name, slope in zip(FIBRES, slopes, strict=True):
-        tension = terms.evaluated(slope, dict.fromkeys((*INVARIANTS, *FIBRES), 1.0).__getitem__)
+        tension = terms.evaluated(slope, {**rest, "T": T}.__getitem__)
         if abs(tension) > 0:
             raise ScriptError(
                 f"the energy changes by {tension:.4g} {name} at rest: the fibres have a stress",
@@ -205,7 +224,47 @@ PATHS = ISOCHORIC | {
     "uniaxial strain": lambda x: (x, 1.0, 1.0),
     "swelling": lambda x: (x, x, x),
 }
+ALONG_FIBRES = {
+    "stretching along the fibres at constant volume": lambda x: (x, x**-0.5),
+    "stretching along the fibres alone": lambda x: (x, 1.0),
+}
 NEAR = 1e-3
+
+
+def _fibre_paths(law: NamedTuple) -> list[tuple[int, str]]:
+    return list(product([k for k, code in enumerate(law.along) if code], ALONG_FIBRES))
+
+
+def stiffness_along_fibre(law: NamedTuple, family: int, path: str, x: float) -> float:
+    """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
+
+    At constant volume it is the curvature by ln l; it is NaN where the energy has no value.
+    """
+    a, b = law.directions[:3], law.directions[3:]
+    aligned = sum(p * q for p, q in zip(a, b, strict=True)) ** 2
+    W = []
+    for h in (-NEAR, 0, NEAR):
+        stretch, side = ALONG_FIBRES[path](x * exp(h))
+        squares = [stretch**2, aligned * stretch**2 + (1 - aligned) * side * side]
+        if family:
+            squares.reverse()
+        try:
+            W.append(evaluated(law.energy, law, (*invariants_of((stretch, side, side)), *squares)))
+        except (ValueError, ZeroDivisionError, OverflowError):
+            return nan
+    if np.iscomplexobj(W):
+        return nan
+    curvature = W[0] + W[2] - 2 * W[1]
+    return curvature if side != 1 else curvature - 0.5 * NEAR * (W[2] - W[0])
+
+
+def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
+    """Return the least stiffness along a principal direction or a path at constant volume."""
+    at = PATHS[path](x)
+    stiffness = [directional_stiffness(law, at, a) for a in {*map(at.index, at)}]
+    if path in ISOCHORIC:
+        stiffness.append(stiffness_of_path(law, PATHS[path], x))
+    return min(stiffness) if all(map(isfinite, stiffness)) else nan
 
 
 @lru_cache(typed=True)
@@ -215,18 +274,18 @@ def first_instability(law: NamedTuple) -> tuple[str, float] | None:
     The path ends where the energy does, such as at the limit of chains.
     """
     unstable = []
-    for (path, stretches), end in product(PATHS.items(), (0.5, 3.0)):
+    judged = [(path, partial(least_stiffness, law, path), x) for path in PATHS for x in (0.5, 3.0)]
+    for (family, path), end in product(_fibre_paths(law), (0.5, 2.0)):
+        judged.append((path, partial(stiffness_along_fibre, law, family, path), end))
+    for path, stiffness_at, end in judged:
         for x in np.geomspace(1, end, 60)[1:].tolist():
-            at = stretches(x)
             try:
-                stiffness = [directional_stiffness(law, at, a) for a in {*map(at.index, at)}]
-                if path in ISOCHORIC:
-                    stiffness.append(stiffness_of_path(law, stretches, x))
+                stiffness = stiffness_at(x)
             except (ValueError, ZeroDivisionError, OverflowError):
                 break
-            if not all(map(isfinite, stiffness)):
+            if not isfinite(stiffness):
                 break
-            if not min(stiffness) > 0:
+            if not stiffness > 0:
                 unstable.append((abs(np.log(x)), path, x))
                 break
     return min(unstable)[1:] if unstable else None

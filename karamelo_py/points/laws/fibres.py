@@ -38,8 +38,7 @@ class OfFibres(OfInvariants):
     """Adds I4 = a0.C a0 and I6 = b0.C b0 for two families, with a field `directions`."""
 
     __slots__ = ()
-    along: ClassVar[tuple[Code, ...]]  # derivatives by I4, I6
-    twice_along: ClassVar[tuple[Code, ...]]  # by I4 I4, I6 I6, I4 I6
+    twice_along: ClassVar[tuple[Code, ...]]  # derivatives by I4 I4, I6 I6, I4 I6
     mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
 
 

@@ -71,8 +71,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     Example
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
-    material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(1, 1, 0))
-    material(ring, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 1e6*(I4 - 1)^2, fibre=(-y0, x0, 0))
+    material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 5e5*(I4 - 1)^2, fibre=(1, 1, 0))
+    material(ring, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 5e5*(I4 - 1)^2, fibre=(-y0, x0, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
     material(warm, hyperelastic, 1000, 700*T*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2, cp=2000, kappa=0.2)
 

@@ -20,6 +20,7 @@ SPACE = Space()
 
 class HyperelasticMaterial(ElasticMaterial):
     script_kind = "the ID of a hyperelastic material"
+    purpose = "soften"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:

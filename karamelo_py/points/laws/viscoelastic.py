@@ -36,13 +36,15 @@ SMALL = 0.01  # step over relaxation time, below which a series is exact
 
 class ElasticMaterial:
     script_kind: ClassVar[str] = "the ID of an elastic material"
+    purpose: ClassVar[str] = "relax"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         material = look_up(hub.materials, argument)
         if not law_traits(material.whole).rebounds or not is_isotropic(material.whole):
             raise ScriptError(
-                f"material '{material.id}' is no isotropic elastic solid, whose stress could relax",
+                f"material '{material.id}' is no isotropic elastic solid, whose stress could "
+                f"{cls.purpose}",
                 mark=argument.mark,
                 expected="a material such as neo-hookean, ogden, hyperelastic, hencky or linear",
             )
@@ -167,7 +169,7 @@ class Viscoelastic(NamedTuple):
             raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
         if not sum(pairs[::2]) < 1:
             message = f"the fractions g sum to {sum(pairs[::2]):g}: no stiffness would remain"
-            raise ScriptError(message, argument="pairs", expected="g and tau alternately")
+            raise ScriptError(message, argument="pairs", expected="a sum of g below 1")
         branches, G = Absent(), strained(elastic.whole, 1)[3]
         for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
             branches = Branch(g, tau, 0.25 / (g * G), branches)
