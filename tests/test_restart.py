@@ -21,6 +21,7 @@ from combinations import BASES, MESHED, SCHEMES, TRANSFERS, fits, refused, scene
 from going_on import CURVE, FLY, OUTPUTS, SCENES, SERIAL, arrays, goes_on, same_files, with_files
 from scenes import block
 from selection import covering, few
+from test_rigid_body import HULL
 
 from karamelo_py.language import registry
 from karamelo_py.run.checkpoint.arrays import opened, reading
@@ -90,7 +91,7 @@ def test_every_style_is_in_some_scene(family):
     """What the program registers, and a step may change, goes on above."""
     meshes = ["m.vtk" if way[3] in MESHED else None for way in ways()]
     scenes = [scene(*way, mesh=mesh) for way, mesh in zip(ways(), meshes, strict=True)]
-    text = "\n".join([*SCENES.values(), *SERIAL.values(), OUTPUTS, *scenes])
+    text = "\n".join([*SCENES.values(), *SERIAL.values(), OUTPUTS, HULL, *scenes])
     begin = CHANGING[family].format(family=family)
     found = {
         style

@@ -428,17 +428,19 @@ run(30)
 """
 
 
+HULL = (
+    CUBE.format(region="skin")
+    .replace("(0.1, 0, -1)", "(0.1, 0, 0), spin=(0, 0, 2)")
+    .replace("run(30)", "dump(hull, all, surface/vtk, 10, hull.*.vtu)\nset_dt(0.01)\nrun(20)")
+)
+
+
 def test_the_surface_of_a_body_is_written_where_it_is(run_interpreted, tmp_path):
     """Read back by meshio: a cube that translates and turns about z, before anything touches it."""
-    (tmp_path / "run").mkdir()
+    (tmp_path / "whole").mkdir()
     points, triangles = cube_surface(1.2, 2.8)
-    write(tmp_path / "run" / "cube.stl", points, {"triangle": triangles}, binary=True)
-    script = (
-        CUBE.format(region="skin")
-        .replace("(0.1, 0, -1)", "(0.1, 0, 0), spin=(0, 0, 2)")
-        .replace("run(30)", "dump(hull, all, surface/vtk, 10, hull.*.vtu)\nset_dt(0.01)\nrun(20)")
-    )
-    folder = run_interpreted(script, folder="run").folder
+    write(tmp_path / "whole" / "cube.stl", points, {"triangle": triangles}, binary=True)
+    folder = goes_on(run_interpreted, with_files(HULL))
     before, after = (meshio.read(folder / f"hull.{step}.vtu") for step in (0, 20))
     assert before.cells_dict["triangle"].shape == (len(triangles), 3)
     a, arm = 0.4, before.points - 2
@@ -448,7 +450,7 @@ def test_the_surface_of_a_body_is_written_where_it_is(run_interpreted, tmp_path)
     assert np.unique(before.points.round(6)) == pytest.approx([1.2, 2.8])
     assert "hull.20.vtu" in (folder / "hull.pvd").read_text("utf-8")
     none = CUBE.format(region="box").replace("run(30)", "dump(d, all, surface/vtk, 1, d.*.vtu)")
-    assert "has a surface from a file" in run_interpreted(none, folder="run", status=1).err
+    assert "has a surface from a file" in run_interpreted(none, folder="whole", status=1).err
 
 
 def test_faces_of_a_file_touch_as_the_shape_does(run_interpreted, tmp_path):
