@@ -165,6 +165,7 @@ def test_a_scheduler_that_has_gone_ends_the_case(folder):
     with Losing(1) as pool:
         place = elsewhere.Elsewhere(lambda: next(packages), pool, 1, ExitStack())
         outcome = place.submit({"a": "1"}, folder / "case").result(60)
+        assert place.submit({"a": "2"}, folder / "2").result(1).status == "killed"
     assert outcome.status == "killed"
     assert outcome.reason.startswith("MemoryError: worker is gone; not sent again: StopIteration")
 

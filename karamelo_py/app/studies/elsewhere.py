@@ -143,6 +143,7 @@ class Elsewhere:
         # Callbacks run in the thread that talks to the machines, which must not wait.
         self.retries = ThreadPoolExecutor(1)
         self.closing = False
+        self.gone = False  # Dask accepts cases then, and never ends them
         self.machines: dict[Path, str] = {}  # machine by folder
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
@@ -167,6 +168,10 @@ class Elsewhere:
             except Exception as error:  # a full disk here
                 outer.set_exception(error)
 
+        if self.gone:
+            reason = "not started: the connection is lost"
+            outer.set_result(CaseOutcome("killed", reason, {}, folder))
+            return
         try:
             chosen: dict[str, Any] = {}
             if self.refusing:  # a preference: Dask would wait for ever for a worker that has gone
@@ -204,6 +209,7 @@ class Elsewhere:
                     outer.set_result(CaseOutcome("killed", lost, {}, folder))
             except Exception as error:  # the scheduler does not answer, or a full disk here
                 words = f"{reason}; not sent again: {type(error).__name__}: {error}".splitlines()[0]
+                self.gone = True
                 outer.set_result(CaseOutcome("killed", words, {}, folder))
 
         if self.closing:
