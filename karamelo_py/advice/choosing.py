@@ -8,6 +8,7 @@ import copy
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import cached_property
+from itertools import chain
 from math import inf, pi
 from typing import NamedTuple
 
@@ -36,7 +37,6 @@ NEUTRAL = (
     "method(ulmpm, FLIP, linear, 1, thermo-mechanical)",
     "method(ulmpm/contacts, FLIP, linear, 1, thermo-mechanical)",
 )
-
 
 CROSSED = 0.1  # cells that stressed material moves through
 FAST = 0.005  # fraction of the wave speed above which impacts give shocks
@@ -85,11 +85,12 @@ class Scouted(SceneFacts):
 
     @property
     def liquid(self) -> bool:
-        return any(not (holds_shape(law) or has_solid_eos(law)) for law in self.laws)
+        return any(not (holds_shape(law) or eos_traits(law).of_solids) for law in self.laws)
 
     @property
     def soil(self) -> bool:
-        return any(holds_shape(law) and any(map(flows, law_kind(law))) for law in self.laws)
+        kinds = [law_kind(law) for law in self.laws if holds_shape(law)]
+        return any(law_traits(kind).flows for kind in chain.from_iterable(kinds))
 
     @property
     def dilates(self) -> bool:
@@ -166,10 +167,6 @@ def is_round(solid: Solid) -> bool:
     return bool(away.max() < 1.1 * radius)
 
 
-def flows(kind: type) -> bool:
-    return law_traits(kind).flows
-
-
 def holds_shape(law: tuple) -> bool:
     strength = parameter(law, "strength", None)
     return strength is None or shear_modulus(strength) > 0
@@ -177,10 +174,6 @@ def holds_shape(law: tuple) -> bool:
 
 def eos_traits(law: tuple) -> LawTraits:
     return law_traits(parameter(law, "eos", None))
-
-
-def has_solid_eos(law: tuple) -> bool:
-    return eos_traits(law).of_solids
 
 
 def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:

@@ -35,12 +35,17 @@ class Seam(NamedTuple):
     shear: tuple = ()  # or `sheared.Shear`
 
 
+def position_on(axis, n):
+    """Return the number of a node along an axis, ghosts included."""
+    return (int(n) - axis.first) // axis.stride % axis.count
+
+
 @counts.on(Seam)
 def _counts_seam(ranks, n):
     """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
-        position = (int(n) - axis.first) // axis.stride % axis.count - GHOSTS
+        position = position_on(axis, n) - GHOSTS
         counted = counted & (position >= 0) & (position < axis.period)
     return counted
 
@@ -78,7 +83,7 @@ def _is_lowest(axis, nodes, n):
     """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    position = (int(n) - axis.first) // axis.stride % axis.count
+    position = position_on(axis, n)
     lowest = position >= 0
     for k in range(1, int(position // axis.period) + 1):
         if used[index(int(n - k * step)), 0] > 0:
@@ -89,7 +94,7 @@ def _is_lowest(axis, nodes, n):
 def _join(axis, nodes, array, n):
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    position = (int(n) - axis.first) // axis.stride % axis.count
+    position = position_on(axis, n)
     more = int((axis.count - 1 - position) // axis.period)
     for c in range(int(array.shape[1])):
         total = array[n, c]

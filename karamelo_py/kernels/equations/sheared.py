@@ -13,7 +13,7 @@ from karamelo_py.compiler.fields import SummedField, field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import MASS, TIME
 from karamelo_py.kernels.equations.node_updates import node_task
-from karamelo_py.kernels.equations.periodic import GHOSTS, Axis, InUse
+from karamelo_py.kernels.equations.periodic import GHOSTS, Axis, InUse, position_on
 
 
 class Shear(NamedTuple):
@@ -39,7 +39,7 @@ def images_of(s):
 
 
 def _place(axis, n):
-    return int((int(n) - axis.first) // axis.stride % axis.count) - GHOSTS
+    return int(position_on(axis, n)) - GHOSTS
 
 
 def _is_home(images, n):

@@ -26,16 +26,17 @@ from karamelo_py.points.kinematics import (
     unit,
 )
 from karamelo_py.points.laws.eos_strength import Strength
-from karamelo_py.points.laws.leaning import warn_of_leaning
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.orthotropic import (
     INDEX,
+    OUT_OF_SCENE,
     STIFFNESS,
     VOIGT,
     Directional,
     fastest,
     rotated,
+    warn_of_axes,
 )
 from karamelo_py.points.laws.orthotropic import axes as rotation
 from karamelo_py.points.laws.parameters import ByName
@@ -283,17 +284,12 @@ def matrices(law: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def couples(law: Any, scene: Any) -> bool:
     """Return True if a body in 2D or 1D would shear out of its plane or line."""
-    inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
+    inside, outside = OUT_OF_SCENE[scene.d]
     parts = [np.abs(m[np.ix_(inside, outside)]).max(initial=0) / m.max() for m in matrices(law)]
     return max(parts) > COUPLED
 
 
-warn_of_leaning(
-    YieldingByHill,
-    "axes",
-    couples,
-    cure="a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)",
-)
+warn_of_axes(YieldingByHill, couples)
 
 
 @laws.is_round.on(YieldingByHill)

@@ -1,6 +1,7 @@
 """Orthotropic and transversely isotropic elasticity: wood, plies, slate."""
 
 from collections import namedtuple
+from collections.abc import Callable
 from itertools import combinations_with_replacement
 from math import cos, radians, sin
 from typing import Any, NamedTuple
@@ -211,9 +212,13 @@ def fastest(C: np.ndarray) -> float:
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 
+# By dimension: components of stress in a body's plane or line, and shears out of it.
+OUT_OF_SCENE = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}
+
+
 def couples(law: Any, scene: Any) -> bool:
     """Return True if a body in 2D or 1D would shear out of its plane or line."""
-    inside, outside = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}[scene.d]
+    inside, outside = OUT_OF_SCENE[scene.d]
     shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
     return max(shears, default=0) > COUPLED * law.fastest
 
@@ -226,12 +231,12 @@ def _is_round_directional(law):
     return max(map(abs, (*apart, *coupled))) <= COUPLED * law.fastest
 
 
-warn_of_leaning(
-    Directional,
-    "axes",
-    couples,
-    cure="a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)",
-)
+def warn_of_axes(law: type, couples: Callable) -> None:
+    cure = "a 3D scene, or axes along x, y and z (in 2D, tilt 0 or 90 with spin 0)"
+    warn_of_leaning(law, "axes", couples, cure=cure)
+
+
+warn_of_axes(Directional, couples)
 
 
 def stress_of(law, E):
