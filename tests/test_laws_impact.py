@@ -8,7 +8,7 @@ from conftest import INPUTS
 from laws import isochoric, mises, pressure_of, start, stress, stretched, worked
 from tensors import flat as matrix
 
-from karamelo_py.advice.choosing import has_solid_eos
+from karamelo_py.advice.choosing import eos_traits
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import seeded, slopes_of
 from karamelo_py.points.kinematics import Space
@@ -421,7 +421,7 @@ def test_a_shock_in_one_step_is_on_the_hugoniot():
     exact = 8.94 * 3.933**2 * 0.2 / (1 - 1.5 * 0.2) ** 2
     assert pressure(copper, 0.8, memory, ()) == pytest.approx(exact, rel=1e-12)
     assert pytest.approx(0.1 * exact, rel=1e-12) == memory.E
-    assert has_solid_eos(EosStrength(copper, Elastic(8.0)))
+    assert eos_traits(EosStrength(copper, Elastic(8.0))).of_solids
 
 
 FORMULAS = (
