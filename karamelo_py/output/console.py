@@ -1,6 +1,6 @@
 """Terminal output: banner, log lines, progress, warnings, summary.
 
-Rich draws a progress bar on a terminal; pipes and files get plain lines. Every line is flushed.
+Rich draws a progress bar on a terminal; pipes and files get plain lines, flushed at once.
 """
 
 import contextlib
@@ -14,7 +14,7 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms: after BURST lines faster than QUICK (seconds),
+# Rich redraws the bar after every line, in 0.25 ms. After BURST lines faster than QUICK seconds,
 # further ones are written every LINES seconds.
 QUICK = 0.02
 BURST = 8
@@ -112,7 +112,7 @@ class Console:
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
-            # `progress` redraws it: a refresh thread would wait for compiled loops.
+            # A refresh thread would wait for compiled loops.
             self._progress = Progress(
                 BarColumn(bar_width=30), TextColumn("{task.description}"),
                 console=self._rich, auto_refresh=False, transient=True,
@@ -125,7 +125,7 @@ class Console:
     ) -> None:
         """Show progress, and the activity `within` a step; fast enough to call in each step.
 
-        `fraction` is None if the end is unknown (run_until, run_while).
+        `fraction` is None if the end is unknown.
         """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
@@ -178,7 +178,7 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run continues without errors at exit.
+            # The reader (head, less) has closed the pipe; the run continues.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())

@@ -1,4 +1,4 @@
-"""Points and nodes of a scene for output, ordered by id; formulas of their columns."""
+"""Points and nodes for output, by id, and formulas of their columns."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -32,7 +32,7 @@ from karamelo_py.points.laws.further import has_rate
 from karamelo_py.script.errors import ScriptError, one_of, table, unknown
 from karamelo_py.script.expressions import Expression
 
-LAST = 2**62  # above all point numbers
+LAST = 2**62
 PIECE = 1 << 17
 
 
@@ -83,7 +83,7 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: PointGroup) -> np.ndarray:
-        """Return the 0-based ids of existing points."""
+        """Return 0-based ids of existing points."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
@@ -121,8 +121,8 @@ class Fields(PointTable):
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
         """Sum terms exactly over the points of a part's group.
 
-        The method `name` of `part`, called with tables of some points and `arguments`, returns rows
-        of terms (k, n), or the number of sums, the sum (n,) of each term, and terms.
+        ``owner.name(points, *arguments)`` returns terms (k, n), or the number of sums, the sum (n,)
+        of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(owner.group):
@@ -157,7 +157,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Return numbers of the points within `half` (n, d) of one of `x` (n, d) along all axes."""
+        """Return the points within `half` (n, d) of one of `x` (n, d) along all axes."""
         size, found = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -216,7 +216,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
+        """Names for `particle`, then groups and solids."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -224,7 +224,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """True if a dump or compute uses ``epdot``, which points then store."""
+        """True if an output uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -287,7 +287,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial energy of a gas; stored energy is relative to it, to retain digits."""
+    """Initial energy of a gas, subtracted from its stored energy to save digits."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))

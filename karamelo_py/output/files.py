@@ -188,7 +188,7 @@ class Claim:
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# By device and inode: simulations of one process have one claim.
+# By device and inode, since simulations of one process have one claim.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 

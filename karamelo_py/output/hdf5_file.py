@@ -1,7 +1,7 @@
 """Read HDF5 files that were not closed: being written, left by a killed program, or damaged.
 
-HDF5 opens them only in SWMR mode, which retries damaged data for minutes to years. Here the header
-is read as if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
+HDF5 opens them only in SWMR mode, which retries damaged data for years. Here the header is read as
+if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
 """
 
 from __future__ import annotations

@@ -19,11 +19,10 @@ NUMBER_WIDTH = 16  # as -1.234567891e-05
 
 
 class Log(Rhythmic):
-    r"""Table: a header, then rows.
+    r"""A header, then rows, for ``numpy.loadtxt("log.mpm", skiprows=1)`` or
+    ``pandas.read_csv("log.mpm", sep=r"\\s+")``; with commas in .csv.
 
-    Columns start at the margin, separated by blanks for ``numpy.loadtxt("log.mpm", skiprows=1)``
-    and ``pandas.read_csv("log.mpm", sep=r"\\s+")``; by commas in .csv. Later runs append; if the
-    columns change, a comment line (``#``) names the new ones.
+    Later runs append. If the columns change, a comment line (``#``) names the new ones.
     """
 
     remembers = ("_header", "_end")

@@ -25,7 +25,7 @@ class NodeTable(NamedTuple):
     kin: Any
     arrays: dict[str, np.ndarray]  # by name, as in a restart
     brought: dict[str, np.ndarray]  # sums over points, see `BROUGHT`
-    loaded: dict[str, int]  # nodes with mass under each force fix, by ID
+    loaded: dict[str, int]  # nodes with mass, by ID of force fixes
 
     def node(self, name: str) -> np.ndarray:
         if name == "T" and self.hub.update.thermal:
@@ -72,10 +72,10 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 
 
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Return the kind of each node along one axis.
+    """Return the kind of each node along an axis.
 
     Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
-    Bernstein: 1 in the middle of a cell. Else 0.
+    Bernstein: 1 in the middle of a cell. Otherwise 0.
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
@@ -128,7 +128,7 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
     }
 
 
-# None: the column is 0 in scenes without it.
+# None: 0 in scenes without it.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(

@@ -13,7 +13,7 @@ FINE = 300  # steps along the longest side of a tool's outline
 # sections between these.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines between faces
-# Smallest and largest number of points to measure spacing, and distances per batch.
+# Smallest and largest sample to measure spacing, distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # (n,) in a tool, at (n, d)
@@ -42,8 +42,7 @@ class Tool(NamedTuple):
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Points are scattered to nodes of cells of their size, over three cells: a node at the surface
-    gets half as much as nodes inside.
+    Points are scattered over three cells, so that surface nodes get half as much as inner nodes.
     """
     cell = spacing(x, 4)
     if not cell > 0:
@@ -70,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Sums at nodes of `at` (in cells), with linear weights."""
+    """Scatter to nodes with linear weights; `at` is in cells."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -104,8 +103,8 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Lines (m, 3) on a tool's surface between two corners (3,).
 
-    Sections across each axis: at the ends, where faces meet, and between if the surface is curved.
-    A box gets its edges, a ball circles.
+    Sections across each axis are at the ends, where faces meet, and between on curved surfaces:
+    edges of a box, circles of a ball.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -127,7 +126,7 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Depths on a lattice tightly around the surface between corners (3,); None without one."""
+    """Depths on a lattice tightly around the surface; None without one."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -217,9 +216,9 @@ def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarra
 
 
 class Front:
-    """Height of the surface nearest to the eye in each cell, from projected points x (n, 3).
+    """Height of the surface nearest to the eye by cell, from projected points x (n, 3).
 
-    A point fills its cell and the adjacent ones; up to twice as many `gaps` are closed.
+    A point fills its cell and adjacent ones; up to twice as many `gaps` are closed.
     """
 
     def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):

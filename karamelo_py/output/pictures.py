@@ -1,4 +1,4 @@
-"""Pictures of the points of a snapshot in 1D, 2D and 3D, by Matplotlib."""
+"""Pictures of points in 1D, 2D and 3D, by Matplotlib."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from karamelo_py.output.outlines import (
 from karamelo_py.output.snapshots import Snapshot
 from karamelo_py.output.units import LENGTHS, labelled, suited
 
-# Colour-blind safe (Okabe and Ito 2008).
+# Colour-blind safe (Okabe & Ito 2008).
 SOLIDS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
 MOST_IN_LEGEND = 16
 MARGIN = 4
@@ -66,12 +66,12 @@ class Options(NamedTuple):
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # unit
-    mirror: bool = False  # draw points on both sides of x = 0
+    mirror: bool = False
     window: Window = ()  # x, y, z; None: the domain
-    log: bool = False  # logarithmic colours; values <= 0 get the lowest
+    log: bool = False  # values <= 0 get the lowest colour
     quantile: float = 0.0  # fraction of values at each end beyond the limits
     fontsize: float = 9.0
-    pointsize: float = 1.0  # diameter relative to the size of a point
+    pointsize: float = 1.0  # diameter over the size of a point
     outlines: bool = False
 
 
@@ -86,14 +86,14 @@ class DrawnPoints(Artist):
         picture.axes.add_collection(self.lines, autolim=False)
         self.lines.set_visible(False)
         self.set_zorder(picture.artist.get_zorder())
-        picture.artist.set_visible(False)  # by this artist only
+        picture.artist.set_visible(False)
 
     def draw(self, renderer: RendererBase) -> None:
         if not self.get_visible():
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # also rasterised in .pdf and .svg: viewers cannot show as many circles
+        if many:  # rasterised in .pdf and .svg, too: viewers cannot show as many circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.draw(self.rows[:, first : first + MARKS])
@@ -107,9 +107,9 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes, labels and colour bar, with the points of a state on top.
+    """Axes, labels and colour bar, with points on top.
 
-    Matplotlib spends most time on axes: their pixels are stored until the limits change.
+    Matplotlib spends most time on axes, so their pixels are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -134,18 +134,17 @@ class Picture:
             self.axes.set_axis_off()
         self._add_legend()
 
-    cuts = False  # the window cuts bodies
-    _prepare: Callable[[], Any]  # sets up the axes; returns the artist of the points
+    cuts = False
+    _prepare: Callable[[], Any]  # returns the artist of the points
     # Visible rows of points x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
-    draw: Callable[[np.ndarray], None]  # passes visible points to the artist
+    draw: Callable[[np.ndarray], None]
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
         """Mark the ends of the colour bar that values exceed."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label lengths in a unit that suits the numbers; without a unit, with a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -210,7 +209,7 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Lines around the points (n, 3) of bodies, and around tools."""
+        """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
         self.title.set_text(text)
@@ -293,7 +292,7 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Limits grown to the finite values, rounded outwards to 2^k / 8 to change rarely."""
+    """Extend limits to the finite values, rounded outwards to 2^k / 8 to change rarely."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -402,7 +401,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # At least this size: more for few points.
+        # Few points are drawn larger.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -432,7 +431,6 @@ class SpacePicture(PlanePicture):
         self.lo, self.hi = np.asarray(self.domain.lo, float), np.asarray(self.domain.hi, float)
         a, e = np.radians([self.options.azimuth, self.options.elevation])
         ca, sa, ce, se = np.cos(a), np.sin(a), np.cos(e), np.sin(e)
-        # Rows: right, up, towards the eye.
         self.view = np.array([[-sa, ca, 0.0], [-se * ca, -se * sa, ce], [ce * ca, ce * sa, se]])
         self.middle = 0.5 * (self.lo + self.hi)
         seen = self._project(np.array(list(product(*zip(self.lo, self.hi, strict=True)))))[:, :2]
@@ -500,7 +498,7 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Mask of points that are not completely hidden: the surface of a large body."""
+        """Mask points that are not hidden completely."""
         # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5

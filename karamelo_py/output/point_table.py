@@ -1,4 +1,4 @@
-"""Tables of points: of a whole scene, of a range of ids, or of part of a block."""
+"""Tables of points: of a scene, of a range of ids, or of part of a block."""
 
 from collections.abc import Callable, Iterator, Set
 from functools import partial
@@ -56,7 +56,7 @@ class Rows(NamedTuple):
     parts: list[Part]
     ids: np.ndarray
     present: np.ndarray
-    comm: Any = None  # of the processes with parts of the table, or None
+    comm: Any = None  # of the processes with parts of the table
 
     def of_all(self, local: list[tuple]) -> Iterator[tuple]:
         if self.comm is None:
@@ -65,7 +65,6 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather a field; zero for deleted points."""
         local = [(piece.places, piece.taken(of(piece.block.points))) for piece in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -80,8 +79,7 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components), initial where laws lack it; None if no block stores
-        it."""
+        """A declared field (n, components), initial where laws lack it; None if no block has it."""
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -90,7 +88,7 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Values (n, *columns) of ``of(laws)(matter, rows)``; 0 if it is None."""
+        """Values (n, *columns) of ``of(laws)(matter, rows)``; 0 where it is None."""
         local, s = [], self.s
         for piece in self.parts:
             points = known_to_laws(piece.points)
@@ -169,7 +167,7 @@ class PointTable:
     def velocity_moment(self) -> np.ndarray | None:
         """Sums N v (X - x), (n, d d), for transfers that store them, else None.
 
-        In present coordinates: in the total frame, the arms X - x are F times the reference arms.
+        In the total frame, the arms X - x are F times the reference arms.
         """
         rows = self._rows
         have = [
@@ -210,7 +208,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # Components of this kinematics: in 2D the fourth is 12, as in 3D.
+        # In 2D the fourth component is 12, as in 3D.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -242,7 +240,6 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """Columns that are 1 for the points of a group or solid, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
@@ -331,7 +328,7 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 
 
 def _total_stress(k: int, table: PointTable) -> np.ndarray:
-    """Stress of soil and water (n,), of which the saturation's fraction of p acts (Bishop 1959)."""
+    """Stress of soil and water (n,), with the saturated fraction of p (Bishop 1959)."""
     load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
     return table._exported[:, k] - load
 

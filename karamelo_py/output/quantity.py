@@ -89,7 +89,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Look the source up again: the script may redefine a variable between runs."""
+        """Look the source up again, as the script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula

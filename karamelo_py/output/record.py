@@ -1,6 +1,6 @@
-"""The record of a script's runs: run.json next to the log (fields: docs/run-record.md).
+"""The record of a script's runs: run.json next to the log (docs/run-record.md).
 
-Banner and closing table are printed from it; studies read it. Numbers that are not finite are null.
+Banner and closing table are printed from it. Numbers that are not finite are null.
 """
 
 import hashlib
@@ -39,7 +39,6 @@ def _machine() -> Json:
 
 
 def surroundings() -> dict[str, Any]:
-    """Return versions, machine and date."""
     return {"date": datetime.now().astimezone().isoformat(timespec="seconds"), **_machine()}
 
 

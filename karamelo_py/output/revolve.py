@@ -19,8 +19,7 @@ def revolved(
 ) -> list[np.ndarray]:
     """Return columns (n,) of a copy at an angle from x to z, in 3D.
 
-    `column` gives the columns of the half plane. Positions and tensors also rotate by twist,
-    reference positions do not.
+    `column` gives the columns of the half plane. Positions and tensors also rotate by twist.
     """
     made: dict[str, np.ndarray] = {}
     twist = column("twist")

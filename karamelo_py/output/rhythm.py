@@ -15,7 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step from each multiple of `span` on; `passed` counts those written."""
+    """Output at the first step from each multiple of `span` on; `passed` counts them."""
 
     def __init__(self, span: float):
         self.span = span

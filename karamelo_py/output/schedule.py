@@ -1,4 +1,4 @@
-"""Schedule of output: log, dumps, plots."""
+"""Schedule of output."""
 
 import os
 import re
@@ -20,9 +20,8 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    The first and last state of every run are due, and multiples of `every` in absolute steps or
-    time: further runs continue the sequence. No state is written twice to a file, and nothing in a
-    rehearsal.
+    Due are the first and last state of every run, and multiples of `every` in absolute steps or
+    time. No state is written twice to a file, and none in a rehearsal.
     """
 
     def __init__(self, hub: Scene):

@@ -14,7 +14,7 @@ from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.units import LENGTHS, Units
 from karamelo_py.script.errors import ScriptError
 
-TEXTS = ("element", "typelabel")  # columns of LAMMPS that are no numbers
+TEXTS = ("element", "typelabel")  # columns of LAMMPS
 
 
 class Snapshot(NamedTuple):

@@ -1,12 +1,9 @@
 """Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
 
-The nine digits of x are the rounded digits of x 10^k. The product has twice the digits of a double:
-exact if 10^k is (0 <= k <= 22), else undecided only within `DOUBT` of a tie. Python formats
-undecided numbers, numbers near the ends of the range of doubles, and all numbers without
-compilation or on big-endian machines.
-
-Digits are written eight at a time; surplus ones are overwritten, because mispredicted branches cost
-more than bytes.
+The nine digits of x are the rounded digits of x 10^k, in twice the precision of a double. They are
+undecided within `DOUBT` of a tie unless 10^k is exact (0 <= k <= 22). Python formats undecided and
+extreme numbers, and all without compilation or on big-endian machines. Surplus digits are written
+and overwritten, since mispredicted branches cost more.
 """
 
 import sys
@@ -19,13 +16,13 @@ from numba import config, types
 
 from karamelo_py.compiler import fma, index, intrinsic, kernel, llvm
 
-ROWS = 1024  # written at a time
-# The longest: -1.23456789e-308 and -4611686018427387903, a blank, and surplus digits.
+ROWS = 1024
+# -1.23456789e-308 or -4611686018427387903, a blank, and surplus digits.
 NUMBER_BYTES = 32
 
 DIGITS = 9
 DOUBT = 1e-12
-EXACT = 22  # the largest power of ten that a double holds
+EXACT = 22  # largest power of ten that a double holds
 SMALLEST, LARGEST = 1e-280, 1e280
 LARGEST_INTEGER = 2**62
 FIRST = -280  # number of powers in POWERS
@@ -73,11 +70,9 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(table, start, text, at):
     """Write rows up to the first number that Python must format.
 
-    Returns the index of that number, or the count, and the end of the text.
-
-    `table`: numbers (rows, columns), the same memory as integers, and which columns are integers.
-    `start`: index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and
-    continues at `at`.
+    Returns the index of that number, or the count, and the end of the text. `table`: numbers (rows,
+    columns), the same memory as integers, and a mask of integer columns. `start`: index of the
+    first number, along the rows. `text` has `NUMBER_BYTES` per number.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -157,7 +152,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Nine digits of x > 0 as an integer (0 if undecided), and the power of ten of the first.
+    """Nine digits of x > 0 as an integer (0 if undecided), and its power of ten.
 
     `binary`: the power of two.
     """
@@ -177,7 +172,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """The eight digits of n < 10^8: halves, quarters, eighths."""
+    """The eight digits of n < 10^8, by halves, quarters and eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

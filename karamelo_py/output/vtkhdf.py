@@ -15,9 +15,10 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write `path` with the ending .vtkhdf: positions, columns and vectors of its points.
+    """Write `path` with the ending .vtkhdf: views of the positions, columns and vectors in the
+    dump.
 
-    It has no data. Deleted points have positions NaN, which VTK does not draw.
+    Positions of deleted points are NaN, which VTK does not draw.
     """
     import h5py
 

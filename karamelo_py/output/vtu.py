@@ -1,7 +1,7 @@
 """Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-The file has one array after another, but rows arrive with all columns: compressed blocks wait in
-unnamed temporary files until the last row.
+Rows arrive with all columns, but the file has one array after another: compressed blocks wait in
+temporary files.
 """
 
 import sys

@@ -19,8 +19,8 @@ class Backend(SceneState, Protocol):
     steps: StepSize
     energy_watch: EnergyWatch
     rollback: RollbackPoint | None
-    states_every: int  # steps between stored states
-    repeats_steps: bool  # repeats steps from a stored state
+    states_every: int
+    repeats_steps: bool
     remedy: str  # changes that may prevent a failed step
 
     def begin(self, end_time: float) -> None: ...

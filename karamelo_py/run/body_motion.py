@@ -12,15 +12,15 @@ from karamelo_py.run.state import SceneState
 
 
 class BodyMotion(NamedTuple):
-    number: int  # number of the solid in the scene
+    number: int
     mass: float
-    centre: np.ndarray  # (d,) centre of mass
-    velocity: np.ndarray  # (d,) velocity of the centre
+    centre: np.ndarray  # (d,) of mass
+    velocity: np.ndarray  # (d,) of the centre
     spread: np.ndarray  # (d, d) sum m X X, with X from the centre
     shear: np.ndarray  # (d, d) sum m X V, relative to the centre
-    low: np.ndarray  # (d,) bounding box of the points
+    low: np.ndarray  # (d,) bounding box
     high: np.ndarray
-    slow: np.ndarray  # (d,) range of velocities
+    slow: np.ndarray  # (d,)
     fast: np.ndarray
 
     @property
@@ -46,7 +46,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance from the rotation axis, for an ellipsoid in the bounding box."""
+        """Largest distance from the rotation axis, of an ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)

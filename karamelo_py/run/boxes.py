@@ -1,4 +1,4 @@
-"""Boxes of nodes, spans of node numbers, and buffers for the contributions of points."""
+"""Boxes and spans of nodes, and buffers for contributions of points."""
 
 from typing import NamedTuple
 
@@ -11,25 +11,25 @@ from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.corrected_acceleration import Acceleration
 from karamelo_py.kernels.heat import Conducting
 
-SPAN = 256  # maximum nodes of a span
+SPAN = 256  # nodes
 
 
 class Boxes(NamedTuple):
-    order: np.ndarray  # (b,) order of summation
+    order: np.ndarray  # of summation
     grid: np.ndarray  # (b,)
-    lo: np.ndarray  # (b, d) first nodes
-    hi: np.ndarray  # (b, d) last nodes
+    lo: np.ndarray  # (b, d)
+    hi: np.ndarray  # (b, d)
     rows: np.ndarray  # (b, r, 2) as `Tiling.rows`
 
 
 class Reached(NamedTuple):
-    """Pairs of a box and a tile of nodes that it overlaps."""
+    """Pairs of a box and a tile of nodes that overlap."""
 
-    box: np.ndarray  # (k,) box
-    tile: np.ndarray  # (k,) tile of nodes
-    begin: np.ndarray  # (k, d) first nodes of the overlap
-    end: np.ndarray  # (k, d) last nodes
-    size: np.ndarray  # (k,) nodes in it
+    box: np.ndarray  # (k,)
+    tile: np.ndarray  # (k,)
+    begin: np.ndarray  # (k, d) nodes of the overlap
+    end: np.ndarray  # (k, d)
+    size: np.ndarray  # (k,) number of nodes
 
 
 def rows_of(boxes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """List number and index in the list of each item of k lists."""
+    """Return list number and index in the list of each item of k lists."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -128,7 +128,7 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def read_beside(nodes: Nodes) -> list[np.ndarray]:
-    """Return the arrays that must be zero at nodes next to those in use."""
+    """Return the arrays that must be zero next to nodes in use."""
     beside = field(nodes.fields, Acceleration)
     return summed(nodes) + ([] if beside is None else [beside])
 

@@ -27,7 +27,6 @@ class RunCondition(NamedTuple):
         return bool(holds) != self.until
 
     def warn_of_no_step(self, hub: Hub) -> None:
-        """A forgotten or reversed comparison would end the run at once."""
         holds = "holds" if self.until else "does not hold"
         hub.warn(
             f"the condition {holds} before the first step of this run, which has no steps",

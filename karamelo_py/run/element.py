@@ -1,7 +1,4 @@
-"""One material point under prescribed strains and stresses (commands load_path, element).
-
-Runs the point functions of the law in plain Python, without compilation.
-"""
+"""One material point under prescribed strains and stresses, in plain Python."""
 
 from __future__ import annotations
 
@@ -22,14 +19,13 @@ from karamelo_py.points import laws
 from karamelo_py.points.kinematics import tensor
 from karamelo_py.script.errors import ScriptError
 
-# Tensor components in the order of the point functions.
 COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 NORMAL = COMPONENTS[:3]
 
 
 @dataclass
 class LoadPath(Named):
-    """Targets at the end of a load path; other strains do not change."""
+    """Targets at the end of a load path; other strains stay constant."""
 
     increments: int
     duration: float
@@ -79,9 +75,9 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
-DIVISIONS = 8  # maximum divisions of an increment that does not converge
+DIVISIONS = 8  # of an increment that does not converge
 TOLERANCE = 1e-10  # relative to the stress, or to its change if elastic
-UNRESOLVED = 1e-13  # unresolved stress over modulus
+UNRESOLVED = 1e-13  # stress over modulus
 
 
 class Unreachable(Exception):
@@ -89,10 +85,10 @@ class Unreachable(Exception):
 
 
 class Loading(NamedTuple):
-    strain: np.ndarray  # (6,) strain change; 0 where the stress is prescribed
+    strain: np.ndarray  # (6,) change; 0 where the stress is prescribed
     turn: float
     shear: tuple[int, ...]
-    prescribed: np.ndarray  # components with prescribed stress
+    prescribed: np.ndarray  # components
     begin: np.ndarray  # their stress
     end: np.ndarray
 
@@ -141,7 +137,7 @@ class Point:
                 rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
-            # Not a sum of increments: tables get round numbers.
+            # Not summed, so that tables get round numbers.
             self.time = begun + b * path.duration
             observe()
 
@@ -201,8 +197,7 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """Tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains), engineering
-        shear."""
+        """d(Cauchy stress) / d(free strains) (n, m) of the last increment, engineering shear."""
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
         return self._slopes(*self.last, ways)[: len(self.kin.symmetric_names)]
@@ -243,7 +238,7 @@ class Point:
             tangent = slopes(unknown)
             if not np.isfinite(tangent).all():
                 break
-            # Least squares: components without stiffness do not move.
+            # Components without stiffness do not move.
             step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
             for halving in range(SEARCH_HALVINGS):
                 trial = unknown + step / 2**halving
@@ -266,8 +261,7 @@ class Point:
     def _turned(self, angle: float, dt: float) -> np.ndarray:
         """dt grad v (3, 3) of a rotation about z that the law sees as rigid.
 
-        To first order it is skew. To second order laws differ: strain from the symmetric part,
-        volume from det F, or all from F.
+        Skew to first order; to second order it depends on how the law computes strain and volume.
         """
         if angle == 0:
             return np.zeros((3, 3))
@@ -305,7 +299,7 @@ WIDTH = 17  # ten digits, sign, exponent, blank
 
 
 def shown(point: Point) -> dict[str, float]:
-    """Output columns; q is the von Mises stress, sqrt(3/2 s:s)."""
+    """Output columns; q is the von Mises stress sqrt(3/2 s:s)."""
     law, kin, state, stress = point.law, point.kin, point.state, point.stress
     names = COMPONENTS[: len(kin.symmetric_names)]
     xx, yy, zz, *shear = stress
@@ -361,7 +355,7 @@ class Response:
         right.set_ylabel("von Mises stress q")
         for axes in (left, right):
             tidy(axes)
-            # Room for labels such as 0.0025; powers of ten for longer ones.
+            # Labels such as 0.0025 fit; longer ones get powers of ten.
             axes.locator_params(axis="x", nbins=6)
             axes.ticklabel_format(scilimits=(-3, 4))
             if axes.get_legend_handles_labels()[0]:

@@ -1,4 +1,4 @@
-"""The energy balance of a run: whether it is tracked, its growth, its losses."""
+"""The energy balance of a run: tracking, growth and losses."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import moved
 
-GROWING = 2  # consecutive windows of growth before a warning
+GROWING = 2  # windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
     """Name the source of work that is not tracked, or "".
 
     Loops sum the work of compiled hooks; Python fixes declare by `Fix.conserves` that they do no
-    other work.
+    other.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -61,13 +61,11 @@ def unknown_heat(hub: Hub) -> bool:
 
 
 class EnergyWatch:
-    """Monitors the energy balance and the range of temperatures."""
-
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
         self.watch, self.heat = self.control.energy[0], self.control.heat[0]
-        self.followed = False  # the balance is up to date
-        self.told_of_growth = False  # since tracking began
+        self.followed = False
+        self.told_of_growth = False
         self.told_of_loss = False
 
     def begin(self, *, set_anew: bool) -> None:
@@ -153,18 +151,16 @@ class EnergyWatch:
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
     def growth_since(self, before: float) -> float:
-        """Energy growth relative to `before`; NaN if not tracked."""
         unit = max(abs(before), float(self.watch.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 
     def change(self) -> float | None:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
-        # From the first balance, not `first_few`, which `forget_growth` changes.
+        # From the first balance, which `forget_growth` does not change.
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:
-        """Measure growth from the present state, after a warning."""
         watch = self.watch
         watch.first_few = watch.first_mean = watch.largest_mean
         watch.windows, watch.grown = 0, 0.0

@@ -1,4 +1,4 @@
-"""Steps of a scene on a GPU: device memory and kernel launches."""
+"""Steps of a scene on a GPU."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: arrays.Setup) -> arrays.Setup:
-    """Return the setup without tiles and buffers, which a GPU does not use."""
+    """Remove what a GPU does not use."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, own = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(own, heat.Conducting):
@@ -64,15 +64,14 @@ def as_rows(image: np.ndarray) -> np.ndarray:
 def _no_formula(*_): ...
 
 
-def _no_hook(m, v, star, force, *_):  # the loop of loads has a call that it never makes
+def _no_hook(m, v, star, force, *_):  # loops contain a call that is never made
     return v, star, force, force
 
 
 class StepsOnCard:
     """Steps of a lowered scene on a GPU.
 
-    `program`: classes of the scheme and its visits; `hooks`: compiled hooks and functions, in table
-    order.
+    `program`: classes of the scheme and its visits; `hooks`: by row.
     """
 
     def __init__(
@@ -90,11 +89,11 @@ class StepsOnCard:
         self.images.of((self.fate, self.use, self.copies, self.heavy))
         self.images.send([self.copies, self.heavy])
         self.corners = int(support(s.basis, s.kin)) // gpu.nodes_in_cell(s.basis, s.kin)
-        self.visits: dict[int, gpu.Stage] = {}  # sweeps, by id
+        self.visits: dict[int, gpu.Stage] = {}
         first, rows = (list(self.plain(of(*program))) for of in (first_rows, rows_of))
         self.cells = [self._cells(block) for block in s.blocks]
         self.begin: list[KernelLaunch] = []
-        self._ahead: list[KernelLaunch] = []  # sums for the next step
+        self._ahead: list[KernelLaunch] = []
         self.begin = self._launches(first)
         self.step, self.last_step = self._steps(rows)
         self.end = self.launch(gpu.end_step, 1, s)
@@ -113,10 +112,7 @@ class StepsOnCard:
             [*begin, *last, *end, *self._publish(last=True)],
         )
 
-    # --- device memory
-
     def _cells(self, block: Any) -> gpu.CellLists:
-        """Make the lists of points by cell, and room for the largest sums and loads."""
         nodes, new, points = self.nodes, self.images.new, block.points.mass.size * self.corners
         boxes = min(nodes, points) + 1
         self.levels = [-(-nodes // gpu.CHUNK)]
@@ -136,12 +132,10 @@ class StepsOnCard:
             new(sums, np.int64), new(sums, np.int64), new(loads, real), new((most, boxes), real),
         )  # fmt: skip
 
-    # --- launches
-
     def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
-        """Launch ``function(i, fate, *arguments)`` in `count` threads while steps continue."""
+        """Launch ``function(i, fate, *arguments)`` in `count` threads."""
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
@@ -149,7 +143,7 @@ class StepsOnCard:
         return self.launch(function, block.points.mass.size, self.s, block, *rest, **more)
 
     def _launches(self, rows: list) -> list[KernelLaunch]:
-        self._acted: set[int] = set()  # hook stages so far
+        self._acted: set[int] = set()
         return [one for row in rows for one in take.find((type(row), Card))(row, self)]
 
     def plain(self, rows: Iterable) -> Iterator:
@@ -168,7 +162,7 @@ class StepsOnCard:
         if not row.gathers:
             for block, cells in pairs:
                 yield self.of_points(visit.load_point, block, cells)
-        # Reference positions are listed once, before the first step if it has a launch.
+        # Reference positions are listed once.
         if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
                 yield self.of_points(visit.count, block, cells)
@@ -185,7 +179,7 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
-        """Sort a block's points by cell (counting sort, prefix sums by chunks)."""
+        """Counting sort by cell, with prefix sums by chunks."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -200,7 +194,7 @@ class StepsOnCard:
         yield self.launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[KernelLaunch]:
-        """Reorder points in memory as threads read them; not with several corners."""
+        """Reorder points in memory as threads read them."""
         if self.corners > 1:
             return
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
@@ -216,10 +210,7 @@ class StepsOnCard:
                 yield self.launch(gpu.take_rows, size, rows, come_from, own)
                 yield self.launch(gpu.put_rows, size, rows, own)
 
-    # --- hooks of fixes
-
     def _hook(self, h: int) -> tuple[fixes.Act, dict]:
-        """Return a hook for launches, and the functions that it calls by address."""
         called = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
         called[EVALUATE] = evaluate_in_table if self._has_formulas(h) else _no_formula
         return fixes.Act(self.hooks, h, self.heavy, self.copies), called
@@ -228,7 +219,6 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Count published values copied per thread: for formulas, one step old."""
         if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max(self._slots_read(), default=0)
@@ -262,7 +252,6 @@ class StepsOnCard:
                 yield from self._publish_at_once(h)
 
     def _whole(self, h: int) -> tuple[arrays.Tag, ...]:
-        """Return the tag of a hook on whole points or nodes."""
         return tuple(one for one in self.hooks.whole if one.row == h)
 
     def _act(self, function: Callable, h: int, s: arrays.Setup, *tag: arrays.Tag) -> KernelLaunch:
@@ -292,8 +281,6 @@ class StepsOnCard:
             called[NODE_FUNCTION] = _no_hook
             yield self.launch(fixes.work_of_loads, self.nodes, self.s, about, target, called=called)
 
-    # --- totals, and the energy monitor
-
     def _rows_of(self, h: int) -> tuple[int, int]:
         row = self.table[h]
         return int(row.slot), int(row.slot) + max(3, int(row.totals))
@@ -303,7 +290,7 @@ class StepsOnCard:
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, own: list[int]) -> Iterator[KernelLaunch]:
-        """Clear totals of hooks whose stage repeats within a step: the last time counts."""
+        """Clear totals of hooks whose stage repeats within a step."""
         if stage in self._acted:
             for h in own:
                 if self.table[h].slot >= 0:
@@ -321,7 +308,6 @@ class StepsOnCard:
         ]
 
     def collect(self, first: int, end: int) -> list[KernelLaunch]:
-        """Sum totals over their copies."""
         sums = self.s.control.totals
         size = (end - first) * sums.shape[1]
         return [self.launch(fixes.collect_total, size, self.copies, sums, first)] if size else []
@@ -336,7 +322,6 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish a hook's totals right after it, if formulas read hooks."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
@@ -360,21 +345,17 @@ class StepsOnCard:
         )
         return [*found, before], [*found, behind]
 
-    # --- steps
-
     def send(self) -> None:
         self.use[:] = 2  # nodes may hold values of any step
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy the state back except nodes; clock and values are current."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])
 
     def fetch_nodes(self) -> None:
-        """Copy back the nodal output, which steps do not need."""
         self.images.fetch(self._of_nodes())
 
     def _of_nodes(self) -> list[np.ndarray]:
@@ -383,7 +364,6 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
-        """Return the lowest number of a failed point."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
@@ -396,7 +376,7 @@ class StepsOnCard:
         begun, watched = int(control.values[arrays.TIMESTEP]), control.energy[0].watch_energy
         do = self._do
         do["begin"]()
-        if self.begin:  # else points are listed in the first step
+        if self.begin:
             self._order_if_due()
         for n in range(count):
             do["step" if n + 1 < count else "last step"]()
@@ -420,19 +400,15 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Return the median time of each launch of a step, over a few steps after the last."""
+        """Return the median time of each launch of a step."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]
         return list(zip(self.step, map(median, zip(*times, strict=True)), strict=True))
 
 
-# --- rows ---------------------------------------------------------------------------------------
-
-
 @functools.singledispatch
 def _on_card(row: object, steps: StepsOnCard) -> Iterable:
-    """Return the rows that a row becomes on a card; prepare visits of the points."""
     return (row,)
 
 

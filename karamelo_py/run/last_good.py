@@ -1,4 +1,4 @@
-"""The end of a failed run: its last good state in a file, and the last rows of log and dumps."""
+"""End of a failed run: its last good state in a file, last rows of log and dumps."""
 
 import os
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 LAST_GOOD = Path("last_good.*.h5")
-MOST_REPEATED = 100  # maximum steps repeated for the last rows of log and dumps
+MOST_REPEATED = 100  # steps, for the last rows of log and dumps
 
 
 class OthersWait(Exception):
@@ -30,7 +30,6 @@ class LastGood(NamedTuple):
     good: RollbackPoint
 
     def keep_start(self, status: int, *, writes: bool) -> str:
-        """End the outputs of a step that was too large; `writes` the initial state, too."""
         simulation, good = self.simulation, self.good
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
@@ -72,7 +71,7 @@ class LastGood(NamedTuple):
                 good.again(simulation.advance, step)
         path = path or self._write()
         if simulation.step < step:
-            present.give(self.hub)  # their files are unchanged, with later rows
+            present.give(self.hub)
         self._end_outputs()
         change = "boundary(delete)" if code == "left-domain" else simulation.remedy
         return self._resume(path, f"{'before energy grew; ' * grown}with {change}")

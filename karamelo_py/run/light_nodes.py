@@ -1,9 +1,8 @@
 """The stable step of total-frame bodies, limited by nodes with little mass.
 
-Edge nodes with little material may be stiffer per mass than inner nodes. FLIP averages their motion
-away; transfers with moments or velocity gradients do not, since their points follow any linear
-field. Stable below 2 / w, where w^2 is the largest eigenvalue of M^-1 K with lumped masses: known
-at set-up in the total frame.
+Edge nodes may be stiffer per mass than inner ones. FLIP averages their motion away; transfers with
+moments or velocity gradients do not. Stable below 2 / w, with w^2 the largest eigenvalue of M^-1 K
+with lumped masses.
 """
 
 from collections.abc import Callable
@@ -27,9 +26,9 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT_SHARE = 0.9  # fraction of an inner node's mass
+LIGHT_SHARE = 0.9  # of an inner node's mass
 MOST_PAIRS = 100_000  # target number of point-node pairs
-LANCZOS_STEPS = 24  # iterations: within 1 % of the highest frequency
+LANCZOS_STEPS = 24  # within 1 % of the highest frequency
 
 
 class _Line(NamedTuple):
@@ -41,7 +40,7 @@ class _Line(NamedTuple):
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
     """Return the stable step over h/c allowed by the nodes of all solids; inf if unknown.
 
-    Rounded down to four digits: independent of the order of sums.
+    Rounded down to four digits, so that the order of sums does not matter.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
@@ -88,7 +87,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
         limit *= 0.7
     if not near.any():
         return inf
-    mass = filled  # of all points, not only near ones
+    mass = filled
     if radius is not None:
         mass = sum((np.bincount(nodes(k), volume * weight(k), count) for k in pairs), none)
     number = np.cumsum(seen) - 1
@@ -143,7 +142,7 @@ def _shear_share(law: Tag, kin: Tag) -> float:
 
 
 def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
-    """Largest eigenvalue of a symmetric operator by Lanczos iteration (1950)."""
+    """Largest eigenvalue of a symmetric operator, by Lanczos iteration."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

@@ -7,7 +7,7 @@ from karamelo_py.script.errors import Mark
 
 
 class Trouble(NamedTuple):
-    """A failure: message, fix, code for programs, likely cause, line of the script."""
+    """A failure; `code` is for programs."""
 
     message: str
     fix: str
@@ -25,10 +25,10 @@ def where(x: Iterable[float]) -> str:
 
 
 class Listener:
-    """Receives the events of a run; subclasses override what they need."""
+    """Receives the events of a run."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step is chosen, nothing compiled yet; `resumed` from a file."""
+        """The first step is chosen; `resumed` from a file."""
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
         """Compilation is done."""

@@ -1,8 +1,4 @@
-"""One run: steps in chunks, outputs when due, events for listeners.
-
-`output.schedule` writes log and dumps, `run.rollback` checks steps and stops a run, and
-`run.step_size` chooses the step.
-"""
+"""One run: steps in chunks, outputs when due, events for listeners."""
 
 import signal
 import time
@@ -24,7 +20,7 @@ from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
 
-SECONDS_PER_CHUNK = 0.3  # approximate seconds per chunk, for Ctrl-C and the progress bar
+SECONDS_PER_CHUNK = 0.3  # for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
@@ -45,9 +41,9 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signalled = 0  # signal to this process
+    signalled = 0  # of this process
     resumed_from: Path | None = None
-    interrupted = 0  # signal that ends all processes
+    interrupted = 0  # ends all processes
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
@@ -97,7 +93,7 @@ class RunLoop:
                         # Before the final state, which a longer run would not have.
                         hub.output.write_last()
                     hub.output.end()
-                self._agree(simulation)  # a signal may have come: start no further run
+                self._agree(simulation)  # after a signal, start no further run
             except BaseException as error:
                 hub.console.end_run()
                 hub.output.abort()

@@ -13,7 +13,6 @@ from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 
 def _first_bad(simulation: SceneState) -> tuple | None:
-    """Return ((fix, formula, point or node), value, position) of the first bad value here."""
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix in simulation.begun

@@ -28,15 +28,14 @@ def alike(hooks: Tag, others: Tag) -> bool:
 class SimulationOnCard(Simulation):
     """Takes the steps on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so that
-    arrays are sent again. Fetched points are in GPU order and tiles out of date: users of tiles
-    sort first.
+    `setup` fetches the arrays after steps, with points in GPU order and tiles out of date. Changes
+    on the CPU call `changed` or `sort`, to send arrays again.
     """
 
     states_every = 1000  # states must be fetched
     notes_temperatures = False
     _steps: StepsOnCard | None = None
-    _known: Sequence = ()  # arrays and hooks of these steps
+    _known: Sequence = ()  # of these steps
     _ahead = False  # arrays here lack steps
     _nodes_ahead = False  # nodes here lack steps
     _sent = False  # the GPU has the present arrays
@@ -64,7 +63,6 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """Nodes after the last step; fetched on access only, as they may be many."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False
@@ -94,7 +92,7 @@ class SimulationOnCard(Simulation):
         self._sent = False
 
     def restore(self, snapshot: dict[str, np.ndarray]) -> None:
-        self._ahead = self._nodes_ahead = False  # the GPU state is obsolete
+        self._ahead = self._nodes_ahead = False
         super().restore(snapshot)
 
     def sort_if_due(self) -> None:
@@ -120,7 +118,7 @@ class SimulationOnCard(Simulation):
         if not self.hub.checking:
             self.refuse()
         super()._make_ready()
-        if self._setup.contact or self.hub.update.method.corrected:  # prepared for the fixes
+        if self._setup.contact or self.hub.update.method.corrected:
             self._sent = False
 
     def compile(self) -> None:
@@ -129,7 +127,7 @@ class SimulationOnCard(Simulation):
     def launches(self) -> StepsOnCard:
         steps, hooks, functions = self._steps, self.hooks, self.fixes.lasting.functions
         if steps is not None and functions == steps.functions and alike(hooks, steps.hooks):
-            hooks = steps.hooks  # of an earlier run
+            hooks = steps.hooks
         key = [type(self.visits), *map(id, arrays_in((there(self._setup), hooks)))]
         if steps is None or key != self._known:
             self._fetch()

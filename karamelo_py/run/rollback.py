@@ -1,4 +1,4 @@
-"""Return to the last good state of a run: to halve the step, or to end."""
+"""Return to the last good state of a run, to halve the step or to end."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 5  # per run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
-RETURNS = 2  # returns per state before an energy gain: two halvings without effect are enough
+RETURNS = 2  # per state before an energy gain; two halvings without effect are enough
 
 
 class Stopped(ScriptError):
@@ -24,7 +24,7 @@ class Stopped(ScriptError):
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Decide what follows `status` or `grown` energy, after `returns` to the last good state."""
+    """Return what follows after `status` or `grown` energy."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -36,7 +36,7 @@ class RollBack:
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or the state of a file, which may be `ruined`.
+        """Begin with the present state, or a file's state, which may be `ruined`.
 
         `looks`: a condition may read parts' values between any two steps.
         """
@@ -50,9 +50,8 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
-        """Store the present state if due and good; else note the memory of parts."""
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
-            return  # only the first state is good, and its rows are not rewound
+            return  # only the first state is good
         step = self.simulation.step
         # Runs return to these states, so the schedule must not depend on speed.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
@@ -63,7 +62,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Handle steps that ended with `status`; return False if the run went back."""
+        """Return False if the run went back."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, self._repeat):
             self._keep()
@@ -97,7 +96,7 @@ class RollBack:
         while point.halvings < HALVINGS:
             point.halvings += 1
             simulation.steps.halve(point.halvings)
-            if not simulation.steps.above_limit():  # steps above it would fail again
+            if not simulation.steps.above_limit():  # steps below it would fail again
                 break
         self.hub.warn(
             f"{trouble.message}. Back to {when(simulation)}, "
@@ -122,7 +121,6 @@ class RollBack:
         present.give(self.hub)
 
     def _points_only_leave(self) -> bool:
-        """Return True if points leave without an energy gain: smaller steps do not help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
         if not (moves and len(simulation.leaving()) and watch.grown_little()):
@@ -139,8 +137,8 @@ class RollBack:
     def _stop(self, status: int) -> NoReturn:
         """Return to the last good state, write it, and raise the user's error.
 
-        After an energy gain: the last state before it; log and dumps end with the last faultless
-        state. If the step was too large from the start, only the initial state is good.
+        Log and dumps end with the last faultless state. If the step was too large from the start,
+        only the initial state is good.
         """
         simulation = self.simulation
         too_large = self.too_large and simulation.steps.too_large

@@ -82,7 +82,7 @@ class SceneArrays:
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
         check_room(hub, copied=previous is None and bool(hub.in_run))
-        # Processes begin with equal ranges of ids; sorting distributes points by tiles.
+        # Sorting later distributes points by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
@@ -209,7 +209,7 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile, after handing over those in other processes' tiles."""
+        """Sort the points by tile, after exchange with other processes."""
         self.setup = self.domain.migrate(self.setup)
         domain = self.hub.domain
         if domain.periodic:
@@ -224,15 +224,15 @@ class SceneArrays:
             self.sort()
 
     def bring(self) -> None:
-        """Bring the whole state here, with points in the order of their tiles."""
+        """Bring the whole state here, in the order of tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
         if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift
         ):
-            self.sort()  # points have gone or come since
+            self.sort()
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes unless a step has done so."""
+        """Map the present state to the nodes, unless a step has."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -249,7 +249,7 @@ class SceneArrays:
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy all arrays that a step changes, and the published values; see `copied`."""
+        """Copy all arrays that a step changes; see `copied`."""
         self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 

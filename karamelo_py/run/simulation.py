@@ -1,4 +1,4 @@
-"""Time integration of a lowered scene: chunks of compiled steps, controlled from Python."""
+"""Time integration of a lowered scene."""
 
 from __future__ import annotations
 
@@ -35,24 +35,23 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import set_columns
 
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # energies and mass of deleted points
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # of deleted points
 
 
 class Simulation(SceneArrays):
-    """Steps a scene, or one process's subdomain, on the CPU.
+    """Steps a scene or one process's subdomain on the CPU.
 
-    Subclasses override how: on a GPU (`run.on_card`), or by Newton's method
-    (`run.implicit.load_steps`).
+    See `run.on_card` for GPUs, `run.implicit.load_steps` for Newton's method.
     """
 
     states_every = 100  # steps between stored states
     remedy = "a smaller time step (set_dt, dt_factor)"
-    repeats_steps = True  # repeats steps from a stored state; not load steps, which take too long
+    repeats_steps = True  # from a stored state; load steps take too long
     implicit = False
     failure = ""  # why a load step found no equilibrium
     notes_temperatures = True
     between: Callable[[str], bool] | None = None
-    _called: Tag = None  # Python hooks that compiled steps call
+    _called: Tag = None  # Python hooks
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
@@ -107,9 +106,9 @@ class Simulation(SceneArrays):
         self.steps.measured = self.energy_watch.followed = False
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
-        """Delete points (ascending ids), without renumbering; return their mass and energy.
+        """Delete points (ascending ids) and return their mass and energy.
 
-        The energy balance books their energy as work.
+        The balance counts their energy as work.
         """
         group = ParticleGroup(self.hub)
         group.take([ids])
@@ -121,7 +120,7 @@ class Simulation(SceneArrays):
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)
-        # Balance and rate remain from the last step: the same whether or not a run begins here.
+        # Balance and rate remain from the last step, whether or not a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
@@ -129,8 +128,7 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change their velocities and positions, block by block. The energy balance
-        books their energy as work.
+        `prepare` may change their velocities and positions by block.
         """
         if self.comm.leads:  # the next sort hands them over
             blocks = []
@@ -158,19 +156,18 @@ class Simulation(SceneArrays):
 
     @property
     def scheme(self) -> Tag:
-        """The scheme of the steps: another one if fixes lead points that deform."""
         scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
         led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
         leading = scheme.traits.leading
         return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
-        """Take up to `count` steps, to the end time at most; return DONE, or why it stopped.
+        """Take up to `count` steps, at most to the end time; return DONE or why it stopped.
 
-        Load steps call `between` with a progress message and end if it returns True.
+        Load steps call `between` with a progress message, and end if it returns True.
         """
         self.between = between
-        self.control.motion[0].wrong = 0  # from earlier steps that were not undone
+        self.control.motion[0].wrong = 0  # from earlier steps
         with self.comm.joint():
             from_python = bool(self.fixes.lasting.in_python) or self.begins
             self.domain.begin(self.hooks, from_python=from_python)
@@ -202,7 +199,7 @@ class Simulation(SceneArrays):
         self.begun |= set(first.fixes) & set(self.fixes.new)
         self.fixes = self.fixes._replace(first=None)
         self.clear_forces()  # later steps may have no hook for it
-        return SORT  # unfinished, unless all steps are done
+        return SORT
 
     def _take(self, hooks: Tag, count: int) -> int:
         if isinstance(hooks, ActingFixes):
@@ -222,7 +219,7 @@ class Simulation(SceneArrays):
         return self.fixes.first is not None
 
     def refuse(self) -> None:
-        """Refuse no scene: the CPU runs all."""
+        """The CPU runs all scenes."""
 
     def compile(self) -> None:
         hooks = self._acting

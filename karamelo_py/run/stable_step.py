@@ -29,14 +29,14 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-BOX_WEIGHT = 6.0  # weight of a common drift in steps with boxes
+BOX_WEIGHT = 6.0  # of the common drift in steps with boxes
 SLOWED = 1.2  # fraction of the wave speed above which viscosity limits the step
-LONE = 0.9  # fraction of an isolated point's stable step: expanded points are stiffer
-# Of the stable step with corrected accelerations in the total frame: blocks with one point per cell
-# gain energy at 0.73.
+LONE = 0.9  # of an isolated point's stable step: expanded points are stiffer
+# With corrected accelerations in the total frame, blocks with one point per cell gain energy at
+# 0.73 of the stable step.
 CORRECTED_TOTAL = 0.7
-# Fraction of an isolated point's stable step, instead of LONE: a dam break with two points per cell
-# gained energy where its water splashed at 0.43 h/c, and none at 0.38.
+# Replaces LONE: a dam break with two points per cell gained energy in splashes at 0.43 h/c, none at
+# 0.38.
 CORRECTED_LONE = 0.55
 DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
 
@@ -52,8 +52,8 @@ def sparse(hub: Hub) -> bool:
 def keeping_share(hub: Hub) -> float:
     """Return the largest fraction of the stable step that conserves a drifting body's energy.
 
-    With FLIP and similar transfers, gradient jumps add energy to points that cross cells, about as
-    the third power of the step. Fractions from docs/energy.md: at most 10 % in 50 periods.
+    With FLIP, gradient jumps add energy to points that cross cells, about as the step cubed.
+    Fractions from docs/energy.md: at most 10 % in 50 periods.
     """
     update = hub.update
     alpha = flip_coefficient(update.transfer)
@@ -69,7 +69,6 @@ def keeping_share(hub: Hub) -> float:
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """Return True if FLIP-like points move through the grid, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
@@ -112,9 +111,8 @@ def lone_point(hub: Hub) -> float:
 def bears_drift(hub: Hub) -> bool:
     """Return True if a drifting body is as stable and conservative as one at rest.
 
-    With cubic splines hardly any energy depends on the position in the cells; usavg adds none with
-    smooth bases (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks fracture
-    sooner with these steps.
+    So it is with cubic splines, and with usavg and a smooth basis (50 periods at 0.05 to 0.5 of the
+    wave speed, in 2D). Colliding disks fracture sooner with these steps.
     """
     basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
@@ -129,11 +127,10 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """Return the weight of the common velocity in the default step.
+    """Return the weight of the common velocity in the default step; 1 in h/(c + |v|).
 
-    1 in the standard rule h/(c + |v|). Drifting boxes (ugimp, cpgimp), two or more per cell, gain
-    more energy at higher speed: at edges of shaken bars and blocks, at 0.05 to 0.5 of the wave
-    speed.
+    Boxes (ugimp, cpgimp), two or more per cell, gain more energy at higher speed at the edges of
+    shaken bars and blocks (0.05 to 0.5 of the wave speed).
     """
     if bears_drift(hub):
         return 0.0
@@ -153,10 +150,7 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step over h/c; `longer` for points that stay in their cells.
-
-    In the total frame, nodes of thin and round bodies limit points with moments.
-    """
+    """Return the stable step over h/c; `longer` for points that stay in their cells."""
     update = hub.update
     total = not (update.scheme.traits.implicit or update.method.frame.moves)
     courant = _courant_of_scheme(hub, longer=longer)
@@ -168,7 +162,7 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
 
 
 def corrected_share(hub: Hub) -> float:
-    """Return the fraction of the stable step that corrected accelerations leave."""
+    """Return the fraction of the stable step with corrected accelerations."""
     method = hub.update.method
     if not method.corrected:
         return 1.0
@@ -193,10 +187,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the stable step over h/c, and the default fraction of it.
-
-    `still`: no point has moved as far as `STILL`.
-    """
+    """Return the stable step over h/c and the default fraction; `still` before points move."""
     method, share = hub.update.method, keeping_share(hub)
     # Moment transfers are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
@@ -226,8 +217,8 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 def stable_conduction(hub: Hub) -> float:
     """Return the smallest stable step of conduction in undeformed bodies.
 
-    h^2 / (4 d) capacity / conductivity: half of the bound of lumped finite elements, since points
-    are anywhere in a cell.
+    h^2 / (4 d) capacity / conductivity, half the bound of lumped finite elements, since points are
+    anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf
@@ -243,7 +234,7 @@ def stable_conduction(hub: Hub) -> float:
 
 
 def ruling_limit(state: SceneState) -> str:
-    """Name of the present limit of the step (docs/energy.md); of stability but set_dt, end."""
+    """Name the present limit of the step (docs/energy.md)."""
     step, motion = state.control.step[0], state.control.motion[0]
     dt, heat = state.control.values[DT], state.control.heat[0]
     if step.fixed_dt > 0:

@@ -29,16 +29,16 @@ class SceneState(Protocol):
     tiles: Tiles
     domain: WholeDomain
     present: np.ndarray  # (N,) bool by id, False for deleted points
-    begun: set[Fix]  # fixes of the first step that have acted
+    begun: set[Fix]  # of the first step
     mode: Tag
     threads: int
-    count: int  # of points
+    count: int
     points: Fields
     mapped: bool  # nodes show the present state
     moved_in_step: bool  # a step replaces the arrays after its first stage
     implicit: bool
     notes_temperatures: bool
-    flags: tuple[bool, ...]  # state besides the arrays, for restart files
+    flags: tuple[bool, ...]  # besides the arrays, for restart files
 
     @property
     def hooks(self) -> Hooks | NoHooks: ...

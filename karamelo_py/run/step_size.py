@@ -1,4 +1,4 @@
-"""The step size: a policy chosen once per run, applied by the clock of the kernels."""
+"""The step size: a policy per run, applied by the clock of the kernels."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ NO_STRIDE = 1e9  # cells, further than points ever move
 
 
 class StepPolicy(NamedTuple):
-    """Choice of the steps of a run, made at its beginning."""
+    """The steps of a run, chosen at its beginning."""
 
-    still: tuple[float, float]  # stable step over h/c, fraction of it: at rest
-    moving: tuple[float, float]  # once points have moved
-    weight: float  # of the common velocity in the default step
-    fixed_dt: float  # 0: follows the fastest point; implicit steps: 1 by default
-    heat_factor: float  # fraction of the conduction limit
+    still: tuple[float, float]  # stable step over h/c, fraction of it
+    moving: tuple[float, float]
+    weight: float  # of the common velocity
+    fixed_dt: float  # 0: follows the fastest point
+    heat_factor: float  # of the conduction limit
 
     @classmethod
     def of(cls, hub: Hub) -> StepPolicy:
@@ -50,7 +50,6 @@ class StepPolicy(NamedTuple):
         return cls(asked, asked, 1.0, fixed, heat or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
-        """Return clock fields after a `path` of the points, in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
@@ -66,13 +65,12 @@ Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Last steps, of motion and of contact, and path: for the next lowering."""
+    """Last steps of motion and contact, and path, for the next lowering."""
     step = control.step[0]
     return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
-    """Set the clock of new arrays, continuing after the `last` steps."""
     step, heat = control.step[0], control.heat[0]
     if last is not None:
         step.last_dt, step.last_contact_dt, control.motion[0].path = last
@@ -83,7 +81,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Chooses the steps; the only Python code that writes them to the clock."""
+    """Chooses the steps; only this code writes them to the clock."""
 
     policy: StepPolicy
 
@@ -100,7 +98,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose the first step again, as initial values may change the fastest point."""
+        """Choose the first step again after initial values are set."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
@@ -169,7 +167,7 @@ class StepSize:
 
     def _choose(self) -> None:
         if not self.measured:
-            # A run in pieces takes the steps of a whole run: the last step has measured.
+            # The last step has measured, so a run in pieces takes the steps of a whole run.
             simulation, motion = self.simulation, self.motion
             self._measure(float(motion.weight))
             motion.wave = motion.speed = 0.0
@@ -210,7 +208,7 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """True if the step exceeded the stability limit from the start of the run."""
+        """True if the step exceeded the stability limit from the start."""
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:

@@ -1,4 +1,4 @@
-"""Grids cut into tiles: their points, the nodes these reach, the nodes in use."""
+"""Tiles of grids, to sort points and to sum at nodes on threads."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -34,37 +34,34 @@ from karamelo_py.points.kinematics import planar
 from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
-# By dimension: cells per direction of a tile of points, and nodes of a tile of nodes. Small boxes
-# fit in caches, large ones have fewer common nodes.
+# Cells per direction of a tile of points, nodes of a tile of nodes. Small boxes fit in caches,
+# large ones have fewer nodes in common.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
-LONGER = 16  # times, along the rows of nodes in 3D, if cells have one point: otherwise boxes have
-#             more nodes than points, and many tiles have few points
-SHARES = 64  # nearly equal parts of a block's points, divided among threads
-# Times the nodes: boxes with fewer rows are allocated at once, aligned with cache lines (untouched
-# pages cost no memory). Larger ones grow.
+LONGER = 16  # times as long along rows in 3D with one point per cell, to get more points per tile
+SHARES = 64  # parts of a block with about equal numbers of points, for threads
+# Boxes with fewer rows, in numbers of nodes, are allocated at once (untouched pages take no
+# memory).
 ALLOCATED_UP_TO = 8
 DIRECT_UP_TO = 2000  # points; below, clearing and summing boxes costs more than threads save
-PART = 2000  # points per part when threads sort
-MOST_DRIFT = 1.0  # maximum cells that points move between sorts
-# Minimum by dimension: smaller boxes, and more neighbouring points with the same nodes; in 2D
-# sorting costs more than this gains.
+PART = 2000  # points per part in threaded sorting
+MOST_DRIFT = 1.0  # cells that points may move between sorts
+# Smaller boxes, and neighbouring points with the same nodes; not worth more sorting in 2D.
 LEAST_DRIFT = {1: MOST_DRIFT, 2: MOST_DRIFT, 3: 0.25}
-SORT_STEPS = 32  # desired steps between sorts, if points may move further for it
-# If points scatter directly to the nodes: this only brings more nodes into use.
+SORT_STEPS = 32  # desired steps between sorts
+# Points that scatter directly to the nodes only get more nodes into use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts a setup's points by tile, and finds the nodes that each tile may reach."""
+    """Sorts points by tile, and finds the nodes that each tile may reach."""
 
-    threads = 1  # for sums at nodes and sorting
+    threads = 1
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO  # scatter directly to the nodes, by tile
+        self.direct = points <= DIRECT_UP_TO  # scatter directly to the nodes
         self.dimension = d = lattices[0].dimension
-        # By direction: cells of a tile of points, nodes of a tile of nodes.
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
         if self.long:
@@ -73,17 +70,16 @@ class Tiles:
         self.per_cell = basis.traits.nodes_per_cell
         self.least_nodes = basis.traits.least_nodes
         self.beyond = basis.traits.cells // 2  # nodes of the stencil beyond a cell's
-        self.sorts = self.sets = 0  # numbers of sorts, and of buffer sets
-        self.rows = 0  # of the buffers, for all boxes
+        self.sorts = self.sets = 0
+        self.rows = 0  # of the buffers
         self.occupied = 0  # tiles with points
-        # By grid and direction: nodes, cells, and so on.
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
         self._first_node = np.array([x.first for x in lattices], np.int64)
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points without a domain reach at most two cells beyond their tile; contact adds one.
+        # Points in the total frame reach at most two cells beyond their tile; contact adds one.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
@@ -91,16 +87,14 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # If rows of nodes are tiles, reach is stored per row of a box: around a bar that spreads at
-        # one end, points reach little at the other.
+        # Reach is stored per row of a box if tiles are rows: a bar may spread at one end only.
         by_rows = self.long and not shaped and not self.direct
-        self._most_in_box = int(rows) if by_rows else 0  # maximum rows of a box
-        self.count = int(self.first[-1])  # tiles of all grids
+        self._most_in_box = int(rows) if by_rows else 0
+        self.count = int(self.first[-1])
         self._cut = sorting.TileGrid(self.size, self.shapes, self.first)
         tiles = -(-self._nodes // self.node_size)
         self._tile_steps = grid_boxes.steps_of(tiles)
         self._first_of_nodes = grid_boxes.numbered(tiles)
-        # Of all buffers of a scene: count, first and parts.
         self._layout = np.zeros(2, np.int64), np.zeros(1, np.int64), np.zeros((0, 10), np.int64)
 
     def empty_tiling(self) -> Tiling:
@@ -145,15 +139,12 @@ class Tiles:
             motion.drift_limit = limit
 
     def sort(self, s: Setup) -> None:
-        """Sort all points by tile, find the nodes in use, and zero the sums at all others.
-
-        The next step zeroes used nodes; boxes are zero between steps.
-        """
+        """Sort all points by tile, find the nodes in use, and zero the sums at all others."""
         before = grid_boxes.used(s.spans)[1:].copy()
         motion = s.control.motion[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (MOST_DRIFT, SORT_STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * motion.pace), most)
-        # Deleted points leave an infinite drift, in the total frame too.
+        # Deleted points leave an infinite drift.
         motion.drift_limit = limit if s.frame.moves else np.finfo(float).max
         motion.drift = motion.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
@@ -163,7 +154,6 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        """Bound the distance in cells from present positions to nodes, until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
             at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
@@ -188,8 +178,8 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Several parts per thread, as tiles differ in size and a core may be busy. With few points,
-        # or fewer than tiles, one thread is done before several have started.
+        # Several parts per thread, since tiles differ in size. With few points, one thread is done
+        # before others start.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
@@ -243,7 +233,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Divide as `_parts_to_sum`, for few points: one set, one part per span."""
+        """As `_parts_to_sum`, for few points."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -255,14 +245,13 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
+        """Return spans and ranges of nodes in boxes, and the parts to sum.
 
-        Nodes follow the sets of points that reach most of them: a thread finds its contributions in
-        its caches; fetching them from another thread's takes longer than the sum.
+        Nodes go with the points that reach most of them, whose thread has the contributions in its
+        cache.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
-        # The largest part first: mostly it has all the nodes of the rest.
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
         local = order[reached.box[order] < len(shares)][::-1]  # the largest last
@@ -292,10 +281,10 @@ class Tiles:
         return grid_boxes.joined_spans(local), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """Return the first of the tiles of nodes (n,) in the same set as each.
+        """Return the first tile of nodes (n,) in the same set as each.
 
-        Access with gaps of some thousand bytes takes twice as long: one thread has one set, and
-        long tiles join tiles in the same rows of nodes.
+        Long tiles join tiles in the same rows: access with gaps of some thousand bytes is twice as
+        slow.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -342,7 +331,6 @@ class Tiles:
         return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
     def _number(self, s: Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
-        """Assign buffer rows to boxes: return the row of node 0, and strides (k, d)."""
         steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
@@ -369,13 +357,10 @@ class Tiles:
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        """Note the tiles of nodes in use, and their nodes from `begin` to `end`."""
+        """Note nodes in use."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
-        """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of the grids.
-
-        Their rows in boxes: `first` + sum of `steps` (k, d) times indices.
-        """
+        """Return `Buffers.parts` of nodes (k, d) from `begin` to `end`."""
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
         parts[:, 9] = CLEAR
@@ -392,7 +377,7 @@ class HasSetup(Protocol):
 
 
 class WholeDomain:
-    """All tiles on a single process; several divide them (`mpi.subdomain`)."""
+    """All tiles on one process; `mpi.subdomain` divides them."""
 
     parted = False
 
@@ -400,14 +385,14 @@ class WholeDomain:
         self.simulation = simulation
 
     def migrate(self, s: Setup) -> Setup:
-        """Hand over the points that left the own tiles; sort afterwards."""
+        """Hand points to the process of their tile."""
         return s
 
     def share_memory(self) -> None:
-        """Send contact memory and kept fields of the own nodes to all processes."""
+        """Send contact memory and stored fields of the nodes to all processes."""
 
     def share_kept(self) -> None:
-        """Send the kept fields of the own nodes to all processes."""
+        """Send the stored fields of the nodes to all processes."""
 
     def counted(self) -> np.ndarray:
         return grid_boxes.numbers(self.simulation.setup.spans)
@@ -437,11 +422,9 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
+    """Divide used nodes (n, 10) of tiles into SHARES sets (n,) of about equal numbers of nodes.
 
-    `parts` (n, 10) are the used nodes of each tile (see `Buffers`). A set gets the tiles whose
-    middle, counted in nodes, lies in its equal part. Neighbours with equal `beside` (n,) get the
-    first one's set.
+    Neighbours with equal `beside` (n,) get the same set.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -457,7 +440,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Return where nearly equal sets of tiles with point ranges (T, 2) begin: (size,)."""
+    """Return the beginnings (size,) of about equal sets of tiles with point ranges (T, 2)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:

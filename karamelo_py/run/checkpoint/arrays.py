@@ -1,4 +1,4 @@
-"""The state of a simulation as named arrays: to return to, write and read."""
+"""The state of a simulation as named arrays, to restore, write and read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 ALL_HAVE, EACH_HAS = ("clock", "work", "values"), ("touched/", "kept/")
 
-# Name and shape of an array, index of a piece of it, and the piece.
+# Name and shape of an array, index of a piece, and the piece.
 Index = EllipsisType | slice | tuple
 Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
@@ -43,15 +43,15 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
     for name, array in kept_at_nodes(s):
         yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
-        now = s.control.motion[0].now  # known once the clock is restored
+        now = s.control.motion[0].now  # valid once the clock is restored
         for name, array in arrays_of(block.points):
-            # The other positions belong to the step before.
+            # The other positions belong to the last step.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
 
 
 def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     copies = {}
-    # One by one: at most one array exists twice if the number of points changes.
+    # One by one, so that only one array exists twice.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -63,10 +63,7 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Nodes where contact acted lately, and its memory of them; processes list the nodes in use.
-
-    Liquids may return to nodes not in use now.
-    """
+    """Nodes with recent contact, and its memory there."""
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
         return {}
@@ -89,7 +86,7 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield the content of a restart file for the present state, or the `kept` one.
 
-    Collective: rank 0 gets the arrays, in the order and with the bits of a serial run.
+    Collective: rank 0 gets the arrays, with the order and bits of a serial run.
     """
     if not kept:
         simulation.bring()
@@ -106,7 +103,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
     comm, counted = simulation.comm, simulation.domain.counted()
     nonzero = np.zeros(len(counted), np.bool_)
     for _, array in of_nodes(simulation.setup):
-        for first in range(0, len(counted), PIECE):  # avoids a copy of all
+        for first in range(0, len(counted), PIECE):
             piece = slice(first, first + PIECE)
             nonzero[piece] |= array[counted[piece]].any(axis=1)
     parts = comm.gather(counted[nonzero])
@@ -122,7 +119,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as stored in files, with the digits of exact sums normalised."""
+    """Yield a state as files store it, with normalised digits of exact sums."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -150,7 +147,7 @@ class InFile:
             return self._data[where]
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
-        # At once: NumPy would read one number after the other.
+        # At once, since NumPy would read number by number.
         return np.asarray(self[()], dtype)
 
 
@@ -203,7 +200,7 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        # The lay-out has ordered the tiles for other processes.
+        # Tiles are already laid out for other processes.
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:
@@ -212,10 +209,10 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
         s.control.values[:] = state["values"]
     for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
         memory[memory != 0] = 0
-        if "touched/nodes" in state:  # a process without points uses no nodes
+        if "touched/nodes" in state:  # without points, no nodes
             memory[state["touched/nodes"][()]] = state["touched/rows"]
     if isinstance(simulation.hooks, Hooks):
-        simulation.hooks.loads[:] = 0  # of a step that did not end
+        simulation.hooks.loads[:] = 0  # of an incomplete step
     simulation.changed()
 
 
@@ -224,14 +221,13 @@ def take_snapshot(simulation: SceneState, path: Path) -> dict[str, np.ndarray]:
         check_numbers(simulation, arrays)
         if simulation.domain.parted:
             return dict(simulation.domain.own_part(arrays))
-        # In the order in which copies are made and written.
         names = [*(name for name, _ in changing(simulation)), "values", *arrays]
         return {name: arrays[name][()] for name in dict.fromkeys(names)}
 
 
 def take_stored(simulation: SceneState, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
-        # Check first: a file of another scene must not change the arrays.
+        # Check first, so that a file of another scene changes nothing.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
@@ -281,7 +277,7 @@ def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
 def rows_at(
     simulation: SceneState, nodes: np.ndarray, gather: Callable
 ) -> dict[str, np.ndarray] | None:
-    """Gather node rows of all arrays (ascending numbers), zero if not in use; or None."""
+    """Gather rows of all nodal arrays at ascending `nodes`, 0 if not in use."""
     counted, kinds = simulation.domain.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
@@ -343,7 +339,7 @@ def check_numbers(simulation: SceneState, arrays: ArraysByName) -> None:
         ends[points + "material"] = len(flat(block.laws)[0])
         ends[points + "id"] = simulation.count
         ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
-        # Ranges still hold points deleted since the last sort; the next step sorts first.
+        # Ranges may hold deleted points until the next sort.
         sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["motion"]["drift"]).all()
         number = arrays[points + "id"].size if sorted_since else simulation.count
         ends[tiling + "range"] = number + 1
@@ -432,7 +428,7 @@ def _points(
         if of_piece is not None:
             tiles = stripped(local, f"tiling/{k}/")
             gathered = comm.gather(points_of_tiles(tiles, arrays, *of_piece))
-        else:  # not sorted yet: equal ranges of the ids
+        else:  # not sorted yet
             gathered = comm.gather({"points": arrays})
         if gathered is None:
             continue
@@ -465,7 +461,7 @@ def own_share(
         result["work"] = np.zeros_like(result["work"])
     for k, tiling in enumerate(tilings):
         points, of_tiles = share_of_tiling(k, tiling, owner == comm.rank)
-        if not tiling.count[0]:  # not sorted yet: an equal range
+        if not tiling.count[0]:  # not sorted yet
             count = state[f"points/{k}/id"].size
             points = np.arange(count * comm.rank // comm.size, count * (comm.rank + 1) // comm.size)
         names = [f"points/{k}/{name}" for name, _ in arrays_of(blocks[k].points)]

@@ -1,15 +1,14 @@
 """States of the parts of a scene, for rollback and restart files.
 
-A part names the attributes of its state::
+A class names the attributes of its state, in addition to its bases'::
 
     class Dose(Compute):
         remembers = ("total",)
 
 They may be numbers, texts, bytes, arrays, NumPy's random generators, lists, tuples, sets and
-dictionaries of these, and objects whose class has ``remembers``. Classes add to the names of their
-bases. The optional method ``resumed()`` is called after a part is restored, ``filed()`` before a
-file stores it. In another script (read_restart), writers of files start afresh: only the names in
-``carries`` are restored.
+dictionaries of these, and objects whose class has ``remembers``. The optional methods ``resumed()``
+and ``filed()`` are called after a part is restored and before a file stores it. In another script
+(read_restart), writers of files restore only the names in ``carries``.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from karamelo_py.script.errors import ScriptError
 
 WITH_STYLE = (Publisher, Rhythmic)
 OUTPUTS = ("dump", "log", "curve", "restart")
-CLOCK_VALUES = ("time", "timestep", "dt")  # values that belong to the arrays of a state
+CLOCK_VALUES = ("time", "timestep", "dt")  # belong to the arrays of a state
 
 Key = tuple[str, str, str]  # family, ID and style
 Memory = dict[str, Any]  # of a part, in JSON types
@@ -96,7 +95,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-        # Last, since it shows the state of other parts.
+        # Last, as it shows other parts.
     yield ("log", "", ""), hub.output.log
 
 
@@ -143,7 +142,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of a value that no file can store, with the warning for it."""
+    """A value that no file can store, with its warning."""
 
     kept: object
     fault: ScriptError
@@ -158,7 +157,7 @@ class Unwritable:
 def _copied(value: object) -> object:
     try:
         return copy.deepcopy(value)
-    except Exception:  # any object
+    except Exception:
         return value
 
 
@@ -193,7 +192,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: object, arrays: list[np.ndarray]) -> Any:
-    """Convert to JSON types; arrays are copied into `arrays` and numbered."""
+    """Convert to JSON types; arrays go to `arrays` and become numbers."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -220,7 +219,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
-        self.hub, self.halve = hub, halve  # the run may return to it
+        self.hub, self.halve = hub, halve
         self.halvings = self.returns = 0  # halvings of the step so far; returns to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
@@ -231,7 +230,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Make the present state the last good one; `forget` the states of parts at other steps."""
+        """Make the present state the last good one; `forget` other steps' parts."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -246,14 +245,13 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
-        """Return to that state; with `cut`, outputs are cut there and continue."""
+        """Return to that state; with `cut`, outputs continue from there."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps up to `end` with the states of parts; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

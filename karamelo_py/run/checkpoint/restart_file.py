@@ -1,8 +1,7 @@
-"""Restart files: the whole scene at one time, in HDF5.
+"""Restart files: the state of a scene at one time, in HDF5.
 
-They contain arrays as fields declare them, the states of parts
-(:mod:`karamelo_py.run.checkpoint.parts`) and the statements executed so far. The script repeats the
-set-up.
+They contain arrays, states of parts (:mod:`karamelo_py.run.checkpoint.parts`) and the executed
+statements. The script repeats the set-up.
 """
 
 import json
@@ -40,10 +39,10 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "chosen",
     "scene", "values", "begun", "parts", "run",
 )  # fmt: skip
-# From this version on HDF5 stores checksums of all but arrays, which have one as an attribute.
+# HDF5 stores checksums of all but arrays; arrays get theirs as an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
-READ_AT_ONCE = 1 << 22  # bytes per read
+READ_AT_ONCE = 1 << 22  # bytes
 
 
 class Restarts(Rhythmic):
@@ -59,7 +58,7 @@ class Restarts(Rhythmic):
         self.last_step = hub.update.step
 
     def write(self) -> None:
-        self.last_step = self.hub.update.step  # goes into the file
+        self.last_step = self.hub.update.step  # stored in the file
         write(self.hub, self.file, within=True)
 
 
@@ -130,7 +129,7 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
     """Compare checksums of the arrays of points and nodes (`large`), or of the others.
 
-    Processes divide the arrays.
+    Raises ScriptError if they differ. Processes divide the arrays.
     """
     import h5py
 
@@ -175,7 +174,7 @@ def is_restart(path: Path) -> bool:
     try:
         with h5py.File(path, "r", locking=False) as root:
             return root.attrs.get("format") == FORMAT
-    except (OSError, KeyError, TypeError):  # a damaged file
+    except (OSError, KeyError, TypeError):
         return False
 
 
@@ -231,9 +230,9 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the file's state; with `outputs`, these continue in their files.
+        """Restore the file's state; with `outputs`, their files continue.
 
-        Within a run, `point` becomes the file's last good state.
+        `point` becomes the file's last good state.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content

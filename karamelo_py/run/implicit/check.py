@@ -1,4 +1,4 @@
-"""Refusal of scenes that implicit schemes do not support, before the run."""
+"""Refusal of scenes that implicit schemes do not support."""
 
 import importlib.util
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
-# Fix hooks in implicit steps; plug-in hooks may run several times per step.
+# Plug-in hooks may run several times per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_ROTATION = "post_update_grid_rotation", "post_rotation_to_grid"
@@ -129,7 +129,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:
-    """Return True if a law resists slow shear; in 1D all do."""
     places = kin.Tensor.places
     rest = kin.Tensor._make([0.0] * len(places))
     state = initial_state(law, kin, 1.0)

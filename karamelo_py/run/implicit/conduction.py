@@ -15,9 +15,9 @@ from karamelo_py.scene.modify import Fix
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
     """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
-    Nodal capacities C, conductances K: C (T' - T) / dt = q - K T'. Linear: one solution is exact.
-    The split from an adiabatic step is of first order in the step (Armero & Simo 1992). In this
-    order a load step ends in equilibrium.
+    Nodal capacities C, conductances K: C (T' - T) / dt = q - K T'. The split from an adiabatic step
+    is of first order in the step (Armero & Simo 1992). In this order a load step ends in
+    equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)

@@ -1,10 +1,9 @@
 """Contact between solids with separate fields, within Newton's method.
 
-Where bodies meet at a node, the relative displacement u may close the gap g along the common normal
-N. The penalty pressure is p = max(0, k (N u - g)). Tangentially the same spring holds while |k s|
-<= mu p for the slip s of the step; then bodies slide at mu p (Coulomb; Wriggers 2006,
-"Computational Contact Mechanics", chapter 10). Derivatives are exact. Normals and gaps are from the
-beginning of the step.
+Where bodies meet at a node, the relative displacement u may close the gap g along the normal N,
+with penalty pressure p = max(0, k (N u - g)). The tangential spring sticks while |k s| <= mu p for
+the slip s of the step, and then slides at mu p (Wriggers 2006, "Computational Contact Mechanics",
+chapter 10). Derivatives are exact; normals and gaps are from the beginning of the step.
 """
 
 import numpy as np
@@ -19,16 +18,16 @@ from karamelo_py.run.implicit.equations import Equations
 
 STIFF = 1e3  # spring over cell stiffness of the softer body
 LIGHT = 0.01  # fraction of an inner node's mass
-SLIPPERY = 0.05  # the same: lighter spline nodes next to a body are too weak to stick
+SLIPPERY = 0.05  # the same, below which nodes do not stick
 CLOSE = 1e-4  # gap in cells below which contact is first assumed
 
 
 class Contact:
-    """Pairs (c) of nodes where bodies meet, and the forces between them.
+    """Pairs (c) of nodes where bodies meet, and their forces.
 
-    `first`, `second` (c,) are unknown nodes, `normal` (c, d) points from the first body to the
-    second, `close` (c,) masks pairs in contact before the step; `push` (c,) and `drag` (c, d) act
-    on the second body. `moduli` (g,) are Young's moduli by grid, 0 of rigid bodies.
+    `first`, `second` (c,) are unknown nodes, `normal` (c, d) points to the second body, `close`
+    (c,) masks pairs in contact before the step, `push` (c,) and `drag` (c, d) act on the second
+    body. `moduli` (g,) are Young's moduli by grid, 0 for rigid bodies.
     """
 
     def __init__(self, equations: Equations, moduli: np.ndarray):
@@ -40,7 +39,7 @@ class Contact:
         normal = np.zeros((room, self.d))
         listed = ListedPairs(pairs, normal, gap)
         count = list_pairs(Bodies(tag, s.kin, s.nodes), s.grids, s.spans, listed)
-        # Nodes with almost no mass sustain nothing: contact would only disturb them.
+        # Nodes with almost no mass carry no load.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)
         count = len(chosen)
@@ -78,12 +77,10 @@ class Contact:
         return stiffness * self._around(self.equations.positions[self.first, 0], h)
 
     def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """Return length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Mask (c,) of pairs in contact at the end of the last step; with -1, of those that
-        stuck."""
+        """Mask (c,) of pairs in contact at the last step; with -1, of sticking pairs."""
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
@@ -92,7 +89,7 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and their derivatives.
 
-        If `supposed`, contact and sticking come from the last step: no displacements are known.
+        With `supposed`, contact and sticking are from the last step.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -106,10 +103,8 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Compute the drag and its derivatives by return mapping of friction.
-
-        Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
-        "An augmented Lagrangian treatment of contact problems involving friction").
+        """Return mapping on Coulomb's cone (Simo & Laursen 1992, "An augmented Lagrangian treatment
+        of contact problems involving friction").
         """
         k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
         glued = np.isinf(self.mu)
@@ -142,7 +137,7 @@ class Contact:
         return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
     def constraints(self, motions: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Constraints (r, k) of closed pairs on rigid `motions` (m, d, k) of nodes."""
+        """Constraints (r, k) of closed pairs on rigid `motions` (m, d, k)."""
         rows = []
         for nodes in (self.first, self.second):
             chosen = self.close & mask[nodes]
@@ -152,7 +147,7 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Remove the relative normal velocities of pressed pairs from `v` (m, d).
+        """Remove the normal approach velocity of pressed pairs from `v` (m, d).
 
         Conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
         """
@@ -161,8 +156,7 @@ class Contact:
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
         """Add the effect of contact at the beginning of the step to accelerations (m, d).
 
-        It stops touching pairs that approach, and all that stuck; others slide with velocities `v`
-        (m, d).
+        Pairs that approach or stuck are stopped; others slide with velocities `v` (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # others may separate

@@ -1,4 +1,4 @@
-"""Equations of an implicit step: unknown nodes, sparse matrix, ghost stabilisation."""
+"""Equations of an implicit step: unknowns, sparse matrix, ghost stabilisation."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -23,9 +23,9 @@ from karamelo_py.run.implicit.averaging import AveragedVolumes
 from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.scene.modify import Fix
 
-BATCH = 8192  # points per batch of assembly
-MOST_MOVED = 0.5  # cells that nodes may move at once towards others, per cell of distance
-# The second ones are reused from the previous step if the first are the same.
+BATCH = 8192  # points assembled at a time
+MOST_MOVED = 0.5  # cells that nodes may move towards others, per cell of distance
+# The second are reused while the first do not change.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
@@ -57,11 +57,10 @@ class Moduli(NamedTuple):
 class Equations:
     """Forces at the nodes of a step, and their derivatives.
 
-    `nodes` (m,) are in stencils of points: `mass` (m,) is 0 where there are gradients only,
-    `places` (m, d) are grid indices, `per_node` unknowns at each (d, and the angle of a rotation
-    around the axis), `deforming` (m,) masks nodes of points that deform (`blocks`,
-    with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
-    d). `cached` is from the previous step, or empty.
+    `nodes` (m,) are in stencils of points. There, `mass` (m,) is 0 with gradients only, `places`
+    (m, d) are grid indices, `per_node` is the number of unknowns (d, and an angle about the axis),
+    `deforming` (m,) masks nodes of deforming points (`blocks` with stencils `parts`), and `led`
+    (m,) nodes of rigid points with `velocity_of_rigid` (m, d). `cached` is from the last step.
     """
 
     def __init__(self, s: Setup, mode: Tag, cached: dict[str, np.ndarray], stabilised: bool):
@@ -69,7 +68,6 @@ class Equations:
         self.per_node = len(s.kin.Unknown._fields)
         self.blocks = [block for block in s.blocks if not can(block.laws, constrained_velocity)]
         self.parts = [self._seen(block) for block in self.blocks]
-        # Points on cell boundaries have gradients at nodes without weight.
         counts = [seen.nodes[valid(seen)] for seen, _ in self.parts]
         soft = distinct(counts)
         tools = [(b, self._seen(b)[0]) for b in s.blocks if can(b.laws, constrained_velocity)]
@@ -142,10 +140,6 @@ class Equations:
         return seen
 
     def _find_pairs(self, stabilised: bool) -> None:
-        """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
-
-        Includes pairs of the ghost stabilisation, and each node with itself.
-        """
         d, k, m = self.d, self.per_node, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
@@ -205,10 +199,10 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
-        """Largest move in cells of a node towards others that move differently.
+        """Return the largest move, in cells, of a node towards others.
 
-        Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
-        `fixed` (nodes, d) without points.
+        Counted are nodes that move differently by more than rotation or strain, and `fixed` (nodes,
+        d) ones without points.
         """
         cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -259,7 +253,7 @@ class Equations:
 
     @cached_property
     def levers(self) -> np.ndarray:
-        """Lengths (m, k) that make displacements of unknowns: 1, or the radius of a rotation."""
+        """Lengths (m, k) per unit of the unknowns: 1, or the radius for an angle."""
         levers = np.ones((len(self.nodes), self.per_node))
         levers[:, self.d :] = self.positions[:, :1]
         return levers
@@ -331,10 +325,10 @@ class Equations:
         return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
-        """Return the matrix (m, m) that penalises gradient jumps at the border of bodies.
+        """Return the ghost penalty (m, m) on gradient jumps at the border of bodies.
 
-        In units of the mean modulus: at a node the volume mean over its points, for a difference
-        the smallest of its nodes.
+        Unit: the mean modulus. Nodes have volume means of their points, differences the smallest of
+        their nodes.
         """
         lines, size, D = self.differences
         weights = size**self.d
@@ -345,7 +339,7 @@ class Equations:
             ):
                 young, volume = of_laws[:, block.points.material]
                 loops.scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
-            none = np.full(len(sums), np.inf)  # nodes with gradients only
+            none = np.full(len(sums), np.inf)
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)
             weights = weights * np.where(np.isfinite(least), least, 0.0) / moduli.mean
@@ -356,8 +350,8 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        A linear basis has them across faces of border cells (Coombs 2023). Splines have no such
-        jumps, but the differences still hold their border nodes.
+        With a linear basis, these are gradient jumps across faces of border cells (Coombs 2023).
+        With splines they still hold the border nodes.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)
@@ -385,7 +379,7 @@ class Equations:
         return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-        """Nodes next to corners along an axis (rows, 3); -1 if not in use."""
+        """Nodes next to `corner` along an axis (rows, 3), or -1."""
         shifts = np.array([-1, 0, 1])
         steps = self._steps(g)
         first = self.s.grids.first[g] + (corner * steps).sum(1)

@@ -13,7 +13,7 @@ from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
-    diagonal = 0.0  # added to the stiffness, in units of a nodal mass
+    diagonal = 0.0  # added to the stiffness, in units of nodal mass
 
     def __init__(self, equations: Equations):
         self.blocks = equations.blocks
@@ -39,9 +39,9 @@ class Motion:
     """Inertia by the Newmark rules and generalized-alpha.
 
     With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points store a
-    minus the acceleration of the forces, initially 0: this is stable with what the transfer to the
-    nodes and back removes. `before` (m, d) are the initial residual forces; `fixed` and
-    `prescribed` (m, d) mask held components and give their velocities.
+    minus the acceleration of the forces, initially 0, which is stable with the losses of the
+    transfer. `before` (m, d) are the initial residual forces; `fixed` and `prescribed` (m, d) mask
+    held components and give their velocities.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Motion:
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Forces per mass (m, d) that balance accelerations at the end of the step."""
+        """Forces per mass (m, d) that balance accelerations `a`."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 

@@ -1,4 +1,4 @@
-"""Steps of implicit schemes, by Newton's method."""
+"""Steps of implicit schemes by Newton's method."""
 
 from math import ceil
 from typing import NamedTuple
@@ -33,12 +33,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Mark, ScriptError
 
-SUBSTEP_HALVINGS = 10  # maximum, of a load step
+SUBSTEP_HALVINGS = 10
 LONG_WAY = 1.0  # cells
 
 
 class PointsWrong(Exception):
-    """A point left the domain, or failed."""
+    """A point left the domain or failed."""
 
 
 class NoEquilibrium(Exception):
@@ -51,14 +51,13 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
-        self.cached: dict[str, np.ndarray] = {}  # data of the last equations
-        self.parts = 0  # substeps done of the present step
+        self.cached: dict[str, np.ndarray] = {}  # from the last equations
+        self.parts = 0
         self.failure = ""  # why a step has no equilibrium
-        self.unknowns = self.corrections = 0  # of the last equilibrium, and of all steps so far
-        self.seconds: dict[str, float] = {}  # by stage, so far
+        self.unknowns = self.corrections = 0  # of the last equilibrium; of all steps
+        self.seconds: dict[str, float] = {}  # by stage
 
     def advance(self, hooks: Tag, count: int) -> int:
-        """Take up to `count` load steps; return the status, as `run_steps` does."""
         control = self.simulation.setup.control
         step, motion, energy = control.step[0], control.motion[0], control.energy[0]
         s, mode = self.simulation.setup, self.simulation.mode
@@ -111,7 +110,7 @@ class LoadSteps:
                     self.simulation.restore(before)
                 raise
             except Failed as reason:
-                if before is None:  # the user may end the step between substeps
+                if before is None:
                     before = self.simulation.snapshot()
                 if fraction <= 2.0**-SUBSTEP_HALVINGS:
                     if self.scheme.limit == "error":
@@ -170,10 +169,7 @@ class LoadSteps:
         return time
 
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
-        """Take a substep, with the loads at its end; return corrections and residual.
-
-        Raises `Failed` without equilibrium; the points have not moved then.
-        """
+        """Take a substep; return corrections and residual. Raises `Failed` before points move."""
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])
@@ -182,7 +178,7 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         simulation.steps.load_step(dt)
         try:
-            # Heat flows by these masses, and changes the stress that is summed after it.
+            # Heat flows by these masses and changes the stress.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             loaded = simulation.hooks if self.dynamic else None
             loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
@@ -191,7 +187,7 @@ class LoadSteps:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
-                # Their work uses the mean of both, like Newmark's velocities.
+                # Loads do work with their mean, as in Newmark's rule.
                 loaded.loads[:] = 0.5 * (loads + loaded.loads)
             equilibrium = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(equilibrium)
@@ -229,13 +225,12 @@ class LoadSteps:
             ) from None
 
     def _forces(self, hooks: Tag) -> np.ndarray:
-        """Sum mass, momentum and forces at the nodes; return the forces (nodes, d)."""
         simulation = self.simulation
         s = simulation.setup
         simulation.clear_forces()
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        # Points with prescribed velocity start a step earlier; use the present value.
+        # Prescribed velocities otherwise start from the last step.
         with simulation.steps.altered(last_dt=0.0):
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
@@ -247,9 +242,9 @@ class LoadSteps:
     def _equilibrium(
         self, hooks: Tag, dt: float, before: np.ndarray | None, after: np.ndarray
     ) -> "Equilibrium":
-        """Find the displacements at which forces balance.
+        """Find the displacements in equilibrium.
 
-        `before` (None without inertia) and `after`: nodal forces of the present stress and the
+        `before` (None without inertia) and `after` are nodal forces of the present stress, with the
         loads at the beginning and the end.
         """
         simulation = self.simulation
@@ -329,11 +324,7 @@ class LoadSteps:
             raise self._error(trouble.message, trouble.fix, trouble.mark)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
-        """Let fixes publish the reactions at their nodes; set nodal velocities.
-
-        Fixes get the velocity that a node would have without them. Rigid solids take the remaining
-        forces.
-        """
+        """Publish reactions and set nodal velocities; rigid solids take the remaining forces."""
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
         mass = result.equations.mass[:, None]
@@ -407,7 +398,7 @@ class LoadSteps:
         )
 
     def refuse_all_loose(self) -> None:
-        """Refuse, before any step, a scene in which fixes hold no node near points."""
+        """Raise ScriptError if no node near points is held."""
         s, bound = self.simulation.setup, np.any(self.fixed_nodes(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         can_move = free_from(s.kin) < s.kin.dimension
@@ -433,7 +424,7 @@ class Equilibrium(NamedTuple):
     pushing: list[Contact | PushingTool]
     seepage: Seepage | None
     u: np.ndarray
-    fixed: np.ndarray  # components held by fixes
+    fixed: np.ndarray  # held components
     reaction: np.ndarray
     iterations: int
     residual: float
@@ -459,4 +450,4 @@ class ImplicitSimulation(Simulation):
         return self.load_steps.advance(hooks, count)
 
     def compile(self) -> None:
-        """Do nothing: Newton's method calls kernels one by one."""
+        """Newton's method needs no compiled step."""

@@ -15,9 +15,9 @@ from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.pore_water import Seepage
 from karamelo_py.run.implicit.tools import PushingTool
 
-ROUNDING = 50 * float(np.finfo(float).eps)  # rounding error of sums of some dozens of terms
+ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
 SINGULAR = "the equations are singular"
-ASTRAY = 1e4  # times as far as points may go: nothing holds them
+ASTRAY = 1e4  # times as far as points may go
 
 
 @contextmanager
@@ -30,7 +30,7 @@ def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 class Failed(Exception):
-    """No equilibrium found; `at` is a node, a point or a distance."""
+    """No equilibrium; `at` is a node, a point or a distance."""
 
     def __init__(self, reason: str = "", at: float = 0):
         super().__init__(reason)
@@ -38,11 +38,11 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would move `at` times further than allowed at once."""
+    """Points would move `at` times as far as allowed at once."""
 
 
 class Loose(Failed):
-    """The equations are singular: hardly anything holds node `at`."""
+    """The equations are singular at node `at`."""
 
 
 class Wrong(Failed):
@@ -56,9 +56,8 @@ class Broken(Failed):
 class Newton:
     """The balance of forces after displacements, and its solution.
 
-    `free` (m, d) masks the unknown components, `external` (m, d) are all forces but internal ones,
-    `pushing` are contact and tools. `seconds` collects the time of the stages stress, assembly and
-    solution; `fixed` returns the components (nodes, d) that fixes hold.
+    `free` (m, d) masks unknowns, `external` (m, d) are all but internal forces, `pushing` are
+    contact and tools; `fixed` returns the held components (nodes, d).
     """
 
     def __init__(
@@ -95,8 +94,8 @@ class Newton:
     ) -> tuple[np.ndarray, int, float]:
         """Return displacements (m, d), the number of corrections and the residual.
 
-        `jump` (m, d) has the prescribed components. Raises `Failed` if the iterations do not
-        suffice, `Broken` if `interrupted` (called with corrections and residual) returns True.
+        `jump` (m, d) has the prescribed components. Raises `Failed` without convergence, `Broken`
+        if `interrupted(corrections, residual)` returns True.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -138,18 +137,16 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
-        """Return the norm of forces; torques count with the largest radius as lever."""
+        """Norm of forces, and of torques over the largest radius."""
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
-        """Estimate the rounding of forces: of strains relative to 1, and of u."""
         far = np.abs(u) + self.spacing / self.lever
         return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
-        """Solve the linear equations for the change of all displacements (m, d).
-
-        With the accuracy that retains quadratic convergence (Eisenstat & Walker 1996).
+        """Solve for the change of displacements (m, d), as accurately as quadratic convergence
+        requires (Eisenstat & Walker 1996).
         """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):

@@ -1,13 +1,13 @@
-"""Pore water in load steps: displacements of the soil and nodal pressures together (u-p).
+"""Displacements of the soil and nodal pore pressures of a load step (u-p).
 
-Per node i and step, with the content w of water, Darcy's flux and the volume V of points:
-sum N_i V0 (w' - w) - dt sum V grad N_i . q = 0, q = -k (grad p - rho g). The pressure loads the
-soil with sum V p grad N_i. Backward Euler: stable for any step, of first order.
+Balance of water at node i, with content w, volume V and Darcy's flux q of the points: sum N_i V0
+(w' - w) - dt sum V grad N_i . q = 0, q = -k (grad p - rho g). The pressure loads the soil with sum
+V p grad N_i. Time integration is backward Euler.
 
-Displacements and pressures of one basis oscillate where nothing drains. The difference of a
-pressure increment from its mean in the cell gets a compliance per volume, max(0, 3 / M -
-12 k dt / h^2) (Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements
-for coupled solid-deformation/fluid-diffusion"; Zhao & Choo 2020). It sums to 0: no water is lost.
+Equal bases for displacement and pressure oscillate without drainage. Hence the difference of a
+pressure increment from its cell mean gets a compliance per volume, max(0, 3 / M - 12 k dt / h^2)
+(Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for coupled
+solid-deformation/fluid-diffusion"; Zhao & Choo 2020). It sums to 0 and conserves water.
 """
 
 from collections.abc import Iterable
@@ -33,7 +33,7 @@ from karamelo_py.run.implicit.equations import Equations, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
-OUTLET = 1e3  # conductance of a seepage face over the conductance of its cells
+OUTLET = 1e3  # conductance of a seepage face relative to its cells
 CAVITATION = -1e5  # Pa
 EPS = 50 * float(np.finfo(float).eps)
 
@@ -45,7 +45,7 @@ def is_wet(equations: Equations) -> bool:
 class Seepage:
     """Nodal pressures `p` (m,) of a step, and their equations.
 
-    Arrays of points have one entry per wet point, in the order of `wet`: blocks and their stencils.
+    Point arrays have an entry per wet point, in the order of `wet`: blocks and their stencils.
     """
 
     def __init__(self, equations: Equations, hooks: Tag, dt: float):
@@ -59,7 +59,7 @@ class Seepage:
         self._read_points()
         self._read_stencils()
         of_water, first = field(s.nodes.fields, WaterSums), of_force(s.kin)
-        of_water[equations.nodes, first : first + self.d] = 0.0  # of the step before
+        of_water[equations.nodes, first : first + self.d] = 0.0
         take_rows((AtWater(),), s, equations.mode, hooks)
         sums = of_water[equations.nodes]
         self.weight = sums[:, first : first + self.d].astype(float)
@@ -98,10 +98,10 @@ class Seepage:
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
         self.V0, self.content, self.pores, self.n, self.K, self.rho, *more = every
         self.suction, self.mobility, M, h = more
-        self.drains = self.suction < self.K  # whether pores empty
+        self.drains = self.suction < self.K
         ratio = self.content / self.pores
-        self.before = self._scale(ratio - 1) * np.log(ratio)  # pressure
-        # The water of full pores: its density gives weight and mobility.
+        self.before = self._scale(ratio - 1) * np.log(ratio)
+        # Weight and mobility follow from the water in full pores.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)
@@ -120,7 +120,6 @@ class Seepage:
         return sp.csr_matrix((data, self.of, self.starts), (len(self.starts) - 1, self.m))
 
     def _lay_out_flow(self) -> None:
-        """Find matrices of flow and of departures from cell means, and the pull of gravity."""
         cells = np.concatenate([_cells(self.equations, block) for block, _ in self.wet])
         cells = np.unique(cells, axis=0, return_inverse=True)[1].ravel()
         points = np.arange(len(cells))
@@ -132,7 +131,6 @@ class Seepage:
         self._conduct(np.ones(len(points)))
 
     def _conduct(self, saturation: np.ndarray) -> None:
-        """Find the flow by pressures and gravity, and how it changes with the saturation."""
         pairs = [*zip(self.G, self.gravity.T, strict=True)]
         flow = self.dt * self.volume * (self.mobility * saturation)
         self.L = sum((g.T @ sp.diags(flow) @ g for g in self.G), sp.csr_matrix((self.m, self.m)))
@@ -143,7 +141,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Return the volume (m,) given to nodes; store the mass per time, as `MakeFlux` does."""
+        """Return the volume (m,) supplied to nodes; store the mass rate, as `MakeFlux` does."""
         given = field(self.equations.s.nodes.fields, GivenFlux)
         if given is None:
             return np.zeros(self.m)
@@ -163,7 +161,7 @@ class Seepage:
         at = self.N @ self.p
         self._strain(u)
         self.lift = self.volume * (1 + self.growth)
-        # Where water drains, a fraction of the pressure acts on the soil (Bishop 1959).
+        # Bishop (1959): the saturated fraction of the pressure acts on the soil.
         dry = self.drains & (at < 0)
         self.filled = np.where(dry, np.exp(np.minimum(at, 0) / self.suction), 1.0)
         self.acting = self.filled * (1 + np.where(dry, at / self.suction, 0.0))
@@ -189,7 +187,7 @@ class Seepage:
         d = self.d
         H = np.stack([np.stack([g @ u[:, i] for g in self.G], 1) for i in range(d)], 1)
         trace = np.trace(H, axis1=1, axis2=2)
-        # det(I + H) - 1, which loses no digits of small strains
+        # det(I + H) - 1 without cancellation
         growth = trace + 0.5 * (trace * trace - np.einsum("pij,pji->p", H, H))
         self.growth = growth + (np.linalg.det(H) if d == 3 else 0.0)
         back = np.repeat(np.linalg.inv(np.eye(d) + H), np.diff(self.starts), axis=0)
@@ -235,7 +233,7 @@ class Seepage:
         return x[: len(b)]
 
     def _change(self, step: np.ndarray) -> None:
-        """Add a change of the pressures; where water drains, one of the saturation exp(p/a)."""
+        """Change pressures by `step`; where pores empty, through the saturation exp(p/a)."""
         a, whole = self.softest, self.p + step
         S = np.exp(np.minimum(self.p, 0) / a)
         left = np.where(self.p < 0, S * (1 + step / a), 1 + whole / a)
@@ -243,11 +241,10 @@ class Seepage:
         self.p = np.where((a < np.inf) & (left < 1), dried, whole)
 
     def cavitates(self) -> bool:
-        """Return True if water that fills its pores is below -1 bar."""
+        """Return True if water in full pores is below -1 bar."""
         return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:
-        """Write the water of the points; let fixes publish what left through their nodes."""
         first = 0
         for block, seen in self.wet:
             some = slice(first, first := first + len(seen.count))

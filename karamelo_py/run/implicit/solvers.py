@@ -16,7 +16,7 @@ MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
 
 
 class Singular(Exception):
-    """No solution: something is not held, or a limit load is reached."""
+    """Something is not held, or a limit load is reached."""
 
 
 class Unconverged(Exception):
@@ -36,7 +36,7 @@ def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
 def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, np.ndarray]:
     if A.format == "bsr":
         A = A.tocsr()
-        A.eliminate_zeros()  # decoupled components may be many
+        A.eliminate_zeros()
     if s is None:
         diagonal = np.abs(A.diagonal())
         if not np.all(diagonal > 0):
@@ -50,7 +50,7 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # first: factors take most of the memory
+    release(kept)  # first, since factors take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -83,9 +83,8 @@ def amg(
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
     `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: the near null space of
-    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy`: final residual over b. The
-    hierarchy takes most of the time, so similar later matrices use it (`kept`) while few iterations
-    suffice.
+    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy`: final residual over b. `kept`
+    stores the hierarchy, reused while few iterations suffice.
     """
     import pyamg
 
@@ -130,7 +129,7 @@ def from_one_seed() -> Iterator[None]:
     np.random.seed(0)
     try:
         yield
-    except ValueError:  # numbers of a level are infinite
+    except ValueError:  # infinite numbers on a level
         raise Unconverged from None
     finally:
         np.random.set_state(state)

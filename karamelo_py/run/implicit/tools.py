@@ -1,4 +1,4 @@
-"""Forces of tools on points, which depend on positions, within Newton's method."""
+"""Forces of tools on points within Newton's method."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ class PushingTool:
         pairs = zip(equations.blocks, equations.parts, strict=True)
         seen_by = {id(block): seen for block, (seen, _) in pairs}
         for piece in self.view._rows.parts:
-            if id(piece.block) in seen_by:  # others are rigid
+            if id(piece.block) in seen_by:
                 seen = seen_by[id(piece.block)]
                 rows.append(np.repeat(piece.places, seen.nodes.shape[1]))
                 columns.append(seen.nodes[piece.rows].ravel())
@@ -62,7 +62,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force; apply the mean, which has done the work, to the points."""
+        """Publish the force; apply its mean, which has done the work."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()

@@ -1,4 +1,4 @@
-"""Lowering of free rigid bodies, and unsupported combinations."""
+"""Free rigid bodies, and unsupported combinations."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ from karamelo_py.styles.fixes.rigid_body import (
 from karamelo_py.styles.fixes.rigid_links import contacts, joints
 from karamelo_py.styles.methods.base import LOADS, slots_of_loads
 
-APART = 1e-3  # cells between a point and its place in a rigid body: round-off is far smaller
+APART = 1e-3  # cells between a point and its place in a rigid body, well above round-off
 
 
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
@@ -107,12 +107,9 @@ def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
-    """Refuse bodies whose points are not where the state of the fix has them.
-
-    Warn of rigid solids that rotate without a fix: their points fly straight on.
-    """
+    """Refuse bodies displaced from the state of the fix; warn of rotation without a fix."""
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
-    x, v = np.full((2, count, d), np.nan)  # of deleted points
+    x, v = np.full((2, count, d), np.nan)
     for block in blocks:
         if is_rigid(block.laws):
             x[block.points.id] = block.points.x[now, :d].T
@@ -172,14 +169,14 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
 
 
 def _driven(hub: Hub, moving: list[RigidBody]) -> set:
-    """Return the bodies on which something acts, directly or through contacts and joints."""
+    """Return the bodies on which something acts."""
     driven = set()
     for fix in moving:
         if fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix):
             driven.add(fix.body)
     links = [fix.linked for fix in (*contacts(hub), *joints(hub))]
     for joint in joints(hub):
-        if joint.spring and joint.spring[2] is not None:  # its length without force
+        if joint.spring and joint.spring[2] is not None:  # length without force
             driven.update(joint.linked)
     driven -= {None}  # the ground
     while more := {s for some in links if driven & set(some) for s in some} - driven - {None}:

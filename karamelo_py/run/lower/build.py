@@ -1,7 +1,6 @@
-"""Lowering: the scene becomes the smallest set of arrays and tags that can run it.
+"""Lowering: the smallest set of arrays and tags that can run a scene.
 
-Kinematics, basis, transfer, scheme, laws and fixes decide which fields exist (`karamelo-py check`
-prints them) and, by their types, what is compiled.
+Fields exist if the method, laws or fixes need them; `karamelo-py check` lists them.
 """
 
 import copy
@@ -59,17 +58,17 @@ SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
 
 
 class State(NamedTuple):
-    """State of all points after a run, ordered by id; arrays (components, N)."""
+    """All points after a run, by id; arrays (components, N)."""
 
     count: int  # type: ignore[assignment]  # number of points, N
     present: np.ndarray  # (N,) bool, False for deleted points
     places: np.ndarray
     v: np.ndarray
-    laws: dict[tuple, np.ndarray]  # by kind of law
-    fields: dict[type, np.ndarray]  # declared fields to retain
+    laws: dict[tuple, np.ndarray]
+    fields: dict[type, np.ndarray]
     grids: NamedTuple
-    node_fields: dict[type, np.ndarray]  # of the nodes of `grids`, (nodes, components)
-    contact: NamedTuple  # contact tag with its memory
+    node_fields: dict[type, np.ndarray]  # (nodes of `grids`, components)
+    contact: NamedTuple
     clock: Carried
 
 
@@ -291,8 +290,8 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 def returns_loss(hub: Hub) -> bool:
     """Return True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 dissipates only energy that vanishes with the step, unless it stores moments; XPIC is
-    handled in `kernels.equations.loss.reflect`.
+    FLIP 1 without moments dissipates only energy that vanishes with the step. See
+    `kernels.equations.loss.reflect` for XPIC.
     """
     transfer = hub.update.transfer
     keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)
@@ -345,7 +344,7 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[arrays.Points]:
-    """Return the points `ids` (ascending) in their initial state, as in the blocks of `setup`."""
+    """Return points `ids` (ascending) in their initial state, by block."""
     span = int(ids[0]), int(ids[-1]) + 1
     real = PRECISIONS[hub.settings.precision]
     kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")
@@ -376,10 +375,7 @@ def lower_points(
     count = int(ends[-1])
 
     def joined(values: Iterable, dtype: type) -> np.ndarray:
-        """Join a number or column per solid, or a value per point: (n,) or (k, n).
-
-        Makes no further array as long as all points.
-        """
+        """Join a number or column per solid, or a value per point: (n,) or (k, n)."""
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
             if not array.size:
@@ -398,7 +394,7 @@ def lower_points(
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
-    # A law that hides the F of the one within has none.
+    # A law that hides the F of its inner law has none.
     elastic = laws.elastic_law(used) if laws.deformation.defined(type(used)) else used
     stored = [kind for kind in kinds if kind.needed(elastic)]
     points = arrays.Points(

@@ -1,4 +1,4 @@
-"""Trial calls of plug-in parts on some points in plain Python, before compilation."""
+"""Trial calls of plug-ins in plain Python, before compilation."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -28,7 +28,7 @@ from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
 STRAINS = (0, 1e-3, 0.05)  # the last exceeds the yield strain of metals
-TRIED = 8  # minimum points, if the scene has enough
+TRIED = 8  # points, if the scene has enough
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
@@ -78,7 +78,7 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
         ):
             try:
                 result = results(sample.tag, sample, Member(p, law, state, values, 1.0))
-            except ArithmeticError:  # caused by the sample numbers
+            except ArithmeticError:  # from sample numbers
                 continue
         expected = len(hook.writes) + hook.publishes
         if not isinstance(result, tuple) or len(result) != expected:
@@ -105,14 +105,14 @@ def _one(setup: Setup) -> Number:
 
 @contextmanager
 def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
-    """Report faults, except numbers that are invalid for the sample point only."""
+    """Report faults, except invalid numbers of sample points."""
     with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield
         except ArithmeticError:
             return
         except ValueError as error:
-            if str(error) != "math domain error":  # the returned value has another shape
+            if str(error) != "math domain error":  # another shape is a fault
                 raise
 
 
@@ -142,7 +142,7 @@ def _numbers(plugin: PartInUse, name: str, values: Iterable, one: Number) -> Non
 def try_law(
     hub: Hub, material: Material, kin: Tag = None, law: Tag = None, one: Number = 1.0
 ) -> None:
-    """Try a plug-in's law, as a solid has it or in a cell of size 1 at 293 K."""
+    """Try a plug-in's law, as in its solid or in a cell of size 1 at 293 K."""
     kinds = laws.law_kind(material.law)
     if not any(map(registry.is_foreign, kinds)):
         return

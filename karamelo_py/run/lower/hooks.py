@@ -1,4 +1,4 @@
-"""Hooks of the fixes: tables of compiled ones for kernels, and those in Python."""
+"""Hooks of fixes: compiled ones in tables, and those in Python."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -55,7 +55,7 @@ def lower_hooks(
         rigid_fields=builder.rigid_fields,
         torques=hub.values.torques,
         mode=mode or Serial(),
-        # Values per thread, with padding in between.
+        # Padded, so that threads do not write to the same cache line.
         apart=arrays.Apart(
             chosen=np.zeros((copies, BLOCK), np.int64),
             scratch=np.zeros((copies, STACK + ROWS + 1, BLOCK)),
@@ -92,18 +92,17 @@ class _Builder:
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
         self.holding: list[Fix] = []
-        self.loaded_nodes = 0  # the number of nodes, if hooks add forces
+        self.loaded_nodes = 0  # 0 if no hook adds forces
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
-        self.whole: list[Tag] = []  # of hooks on whole points
+        self.whole: list[Tag] = []  # on whole points
         self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
         begin, end = self._members(fix, hook)
         slot = -1
         if hook.publishes and fix.published:
-            # Components are contiguous from x on; a total without direction is separate.
             first = "x" if "x" in fix.published else fix.published[0]
             slot = self.hub.values.slot(f"{fix.id}_{first}")
         if hook.tag is not None:
@@ -160,7 +159,7 @@ class _Builder:
     def _program(self, formula: Expression | None) -> tuple:
         if formula is None:
             return NO_PROGRAM
-        if formula.is_constant:  # without code: the number
+        if formula.is_constant:
             return 0, 0, *_put(self.constants, np.array([formula.constant]))
         program = formula.program(self.hub.values)
         return *_put(self.code, program.code), *_put(self.constants, program.constants)
@@ -173,12 +172,10 @@ def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:
 
 
 class ActingFixes:
-    """The fixes of a step; also its tag, if some act from Python between rows of the scheme."""
-
     def __init__(self, simulation: SceneState, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
         wet = is_wet(simulation.hub)
-        self.functions = [  # of the rows of the table
+        self.functions = [  # by row
             hook.function
             for fix, _, hook in compiled_hooks(fixes)
             for _ in range(1 + (fix.accelerates and wet))
@@ -207,7 +204,6 @@ class ActingFixes:
         return called.CalledHooks(self.compiled, address_of_python(act, called.CALL))
 
     def act(self, function: Callable, s: Setup, stage: int, *arguments: object) -> None:
-        """Call Python hooks of a stage, on the setup of all processes if they need all points."""
         if stage not in self.in_python:
             return
         if all(fix.point_by_point for fix, _ in self.in_python[stage]):
@@ -217,11 +213,7 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Call a hook; if each process calls it for its own points, check that all agree.
-
-    Collective calls must match, else processes deadlock; published values must be equal, else they
-    are partial sums.
-    """
+    """Call a hook; check that processes agree, since collective calls would deadlock."""
     try:
         hook(view)
         if fix.point_by_point:
@@ -255,7 +247,7 @@ def _on_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
 
 
 def _on_heat_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
-    # Temperature is to capacity as velocity to mass: the same view shows it.
+    # Temperature and capacity replace velocity and mass in the view.
     nodes = s.heat.nodes._replace(fields=s.nodes.fields)
     _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
@@ -330,12 +322,10 @@ def _sets_initial_state(fix: Fix) -> bool:
 
 
 class FixesOfRun(NamedTuple):
-    """The fixes of a run in the order of each stage, made once at its beginning."""
-
-    once: list[Fix]  # set the initial state, before the first step
-    new: list[Fix]  # act for the first time
+    once: list[Fix]  # set the initial state
+    new: list[Fix]
     first: ActingFixes | None  # of the first step, if some act only in it
-    lasting: ActingFixes  # of all later steps
+    lasting: ActingFixes
 
     @property
     def acting(self) -> list[Fix]:

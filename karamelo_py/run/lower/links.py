@@ -1,4 +1,4 @@
-"""Lowering of contacts and joints between rigid bodies."""
+"""Contacts and joints between rigid bodies."""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations, product
@@ -55,7 +55,9 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
             still = not (free[[one.body, other.body]] >= 0).any()
             twice = _is_ball(one.shape) and _is_ball(other.shape) and a > b
             if still or twice or {fix.parts[a].solid, fix.parts[b].solid} in apart:
-                one = one._replace(balls=one.balls[:0])  # kernels of scenes alike are the same
+                one = one._replace(
+                    balls=one.balls[:0]
+                )  # scenes that differ in this only need the same kernels
             sign = 1 if a == 0 else -1 if b == 0 else 0
             slots = np.array([slot, int(hub.values.torques[slot]), sign])
             touch = kernel.Meeting(one, other, np.array([fix.mu, fix.restitution]), slots)
@@ -138,18 +140,15 @@ def _error(fix: Fix, message: str, hint: str) -> ScriptError:
     return error
 
 
-# --- balls in corners -------------------------------------------------------------------------
-
-
 def _is_ball(shape: Tag) -> bool:
     return isinstance(shape, Convex) and bool(shape.across.all())
 
 
 def balls_of(region: Region, h: float) -> np.ndarray:
-    """Return balls (n, 4), with radii, that touch the surface of `region` from inside.
+    """Return balls (n, 4) with radii that touch the surface of `region` from inside.
 
-    A disk or sphere is one ball; other shapes have small ones in convex corners, and in 3D along
-    edges and on round faces, a cell apart.
+    A disk or sphere is one ball. Other shapes have small balls, a cell apart, in convex corners and
+    in 3D along edges and on round faces.
     """
     d, shape = region.dimension, region.outline()
     if _is_ball(shape):
@@ -184,7 +183,7 @@ def balls_of(region: Region, h: float) -> np.ndarray:
 
 
 def _planes(shape: Tag, sign: float) -> Iterator[np.ndarray]:
-    """Outward normals of plane faces, and their products with a position (d + 1,)."""
+    """Outward normals and offsets of plane faces (d + 1,)."""
     if isinstance(shape, Outside):
         yield from _planes(shape.inner, -sign)
     elif isinstance(shape, Convex):
@@ -210,7 +209,6 @@ def _along_edge(
 def _on_round_faces(
     shape: Tag, box: tuple[np.ndarray, np.ndarray], radius: float, h: float
 ) -> Iterator[np.ndarray]:
-    """Positions below convex round faces."""
     if isinstance(shape, Convex) and np.isfinite(shape.radius):
         R, d, across = shape.radius - radius, len(shape.centre), np.flatnonzero(shape.across)
         count = max(16, int(np.ceil(2 * np.pi * R / h)))
@@ -248,7 +246,7 @@ def _faces(shape: Tag) -> Iterator[np.ndarray]:
 
 
 def _in_corners_of(faces: np.ndarray, radius: float, h: float) -> np.ndarray:
-    """Positions below the corners of `faces` (m, d, d), and in 3D along their sharp edges."""
+    """Positions below corners of `faces` (m, d, d), and in 3D below their sharp edges."""
     m, d = len(faces), faces.shape[2]
     side = faces[:, 1:] - faces[:, :1]
     normals = (

@@ -1,7 +1,4 @@
-"""Memory of a scene or a process's part of it; scenes that do not fit are refused.
-
-Only the minimum that a run needs is compared, so nothing that would run is refused.
-"""
+"""Memory of a scene or a process's part."""
 
 import gc
 from math import ceil
@@ -22,13 +19,13 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
 LARGE, PAGE = 1 << 22, 1 << 21  # bytes above which NumPy uses large pages; their size
-THERE = 1  # bytes per point of the whole scene, in `present`
+THERE = 1  # bytes per point, in `present`
 
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # bytes of the last good state, with present positions only
-    common: int  # bytes of data about the whole scene in each process
+    copied: int  # bytes of the last good state
+    common: int  # bytes about the whole scene in each process
 
 
 def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTaken:
@@ -65,7 +62,7 @@ def _held(item: object, seen: set[int]) -> int:
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     """Bytes of array rows in ascending spans (k, 2).
 
-    For large arrays Linux uses pages of 2 MiB, which include gaps between used nodes.
+    Linux uses pages of 2 MiB for large arrays, with gaps between used nodes.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row
@@ -98,7 +95,7 @@ def bytes_per_point(simulation: SceneState) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-FITS_EVERYWHERE = 100_000  # points; this number fits everywhere
+FITS_EVERYWHERE = 100_000  # points
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
@@ -132,7 +129,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def _ways(hub: Hub, need: float, free: float, copied: bool) -> str:
-    # Bytes scale with that power of the cells per side; two digits, rounded up.
+    # Two digits, rounded up.
     larger = ceil(10 * (need / max(free, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)

@@ -1,4 +1,4 @@
-"""Held nodes, and walls inside the grid: faces of cells all of whose nodes are held."""
+"""Held nodes, and walls inside the grid: faces of cells with all nodes held."""
 
 import math
 from collections.abc import Iterator
@@ -46,8 +46,8 @@ def with_walls(fixes: list[Fix], lattices: list[Lattice], basis: NamedTuple) -> 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """Yield the direction of walls, and the cells (n, d) above them.
 
-    A face is a wall if its nodes are held, except within a block of held nodes, where the next
-    faces on both sides are held, too. The ends of the grid are walls anyway.
+    A face with held nodes is no wall within a block of held nodes, where the next faces are held,
+    too.
     """
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]
@@ -69,7 +69,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
 
 
 def mark_sides(hub: Hub, s: Setup) -> None:
-    """Mark the nodes at edges of grids, and the nodes that fixes hold in this run (`Sides`)."""
+    """Mark nodes at edges of grids and nodes held by fixes."""
     sides = field(s.nodes.fields, Sides)[:, 0]
     if sides.any():  # pages that are never written take no memory
         sides[:] = 0

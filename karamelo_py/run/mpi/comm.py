@@ -23,10 +23,10 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-# Answers of processes besides step numbers, which are positive.
+# Answers besides step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 RankArray = tuple[int, np.ndarray]
-PAUSE = 0.005  # seconds between checks for the other processes
+PAUSE = 0.005  # seconds between checks for other processes
 
 
 def launched() -> tuple[int, int]:
@@ -37,10 +37,7 @@ def launched() -> tuple[int, int]:
 
 
 class MpiComm(SerialComm):
-    """All processes of a run, through mpi4py; the first writes.
-
-    `ends` reports an error and ends all of them.
-    """
+    """All processes of a run; `ends` reports an error and ends them."""
 
     parted = False
     _ends: Callable[[BaseException], None] | None = None
@@ -146,7 +143,6 @@ class MpiComm(SerialComm):
             request.Free()
 
     def fail(self, error: BaseException) -> None:
-        """End all processes because of an error that cannot be raised here."""
         if self._ends is not None:
             self._ends(error)
             return

@@ -1,7 +1,6 @@
-"""Tiles divided among processes, and the messages between these.
+"""Tiles divided among processes, and their messages.
 
-Each process has the points of neighbouring tiles. Nodes in reach of several processes are summed by
-each of them, from the same boxes in the same order.
+A node in reach of several processes is summed by each of them, in the same order.
 """
 
 from collections.abc import Sequence
@@ -34,11 +33,9 @@ from karamelo_py.scene.lattice import Lattice
 def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
     """Divide tiles by recursive bisection across the longest direction; return the part (T,).
 
-    After Berger, M. J. and Bokhari, S. H. (1987), "A partitioning strategy for nonuniform problems
-    on multiprocessors", IEEE Transactions on Computers C-36, 570-580. A layer of tiles whose work
-    must be divided is cut across the next longest direction. `places` (T, d) are lower corners,
-    `work` (T,) integers; tiles without work fill the parts. The last direction is cut only if
-    `rows` times as long as the others.
+    Berger & Bokhari (1987), "A partitioning strategy for nonuniform problems on multiprocessors",
+    IEEE Transactions on Computers C-36, 570-580. `places` (T, d) are lower corners, `work` (T,)
+    integers. The last direction is cut only if `rows` times as long as the others.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -51,22 +48,21 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
             continue
         busy = places[tiles[work[tiles] > 0]]
         lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
-        # The longest last; of equal ones the direction with the largest stride in memory.
+        # Of equally long directions, the one with the largest stride in memory.
         long = np.argsort(-lengths / least, kind="stable")[::-1]
         tiles = tiles[np.lexsort([places[tiles, k] for k in long])]
         ends = np.cumsum(work[tiles])
         half = count // 2
-        # A tile goes to the part with its middle.
         cut = np.searchsorted(ends - 0.5 * work[tiles], ends[-1:].sum() * (half / count))
         left += [(tiles[:cut], first, half), (tiles[cut:], first + half, count - half)]
     return share
 
 
-IMBALANCE = 1.1  # repartitioning must lower the largest work by this factor
-# Times longer than across, from which on bodies are cut along long tiles: passing through rows of
-# nodes with gaps takes twice as long, and longer than sending more nodes.
+IMBALANCE = 1.1  # factor by which repartitioning must lower the largest work
+# Ratio of lengths above which bodies are cut along long tiles: rows of nodes with gaps take twice
+# as long to pass through.
 ROWS = 4
-OF_TILES = ("number", "range", "grid", "box", "rows")  # with a row per tile
+OF_TILES = ("number", "range", "grid", "box", "rows")
 FINE = 1000  # integer work per unit of cost
 
 
@@ -104,14 +100,14 @@ class SharedTiles(Tiles):
             ]
         )
         self.owner = np.zeros(self.count, np.int64)
-        # Memory of the points by block and field; free memory by shape and type.
+        # Memory of points by block and field; free memory by shape and type.
         self._rooms: dict[tuple[int, str], np.ndarray] = {}
         self._spare: dict[tuple, np.ndarray] = {}
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
         self._marked = np.empty(0, np.int64)
         self.sent: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
-        self._links: dict[tuple[int, int], tuple[list, Any]] = {}  # by number of buffers, arrays
+        self._links: dict[tuple[int, int], tuple[list, Any]] = {}
         self._from = np.empty(0, np.int64)  # ranks of other processes' boxes
 
     def share_out(self, work: np.ndarray) -> None:
@@ -144,7 +140,7 @@ class SharedTiles(Tiles):
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         tiles = [self.tiles_of(s, block.points) for block in s.blocks]
-        # Nodes in reach are known from the last sort.
+        # The last sort knows the nodes in reach.
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
@@ -168,9 +164,8 @@ class SharedTiles(Tiles):
         return s._replace(blocks=blocks)
 
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
-        """Join the points that stay and those that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
-        # Fresh memory for all fields would cost more than the rest of a sort.
+        # Fresh memory would take longer than the rest of a sort.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]
@@ -187,7 +182,7 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
-            give_up(old)  # one field at a time exists twice
+            give_up(old)  # only one field exists twice at a time
             for parts in come:
                 parts[i] = None
         return made_of(points, arrays)
@@ -271,7 +266,6 @@ class SharedTiles(Tiles):
         )
         pieces = others[which]
         self._from, box = of[pieces], reached.box[pieces]
-        # Their rows were cut in `_reached` of the base.
         more = Boxes(boxes.order[box], boxes.grid[box], low, high, boxes.rows[box])
         count = np.count_nonzero(self._of == me)
         result = Reached(*(array[np.append(local, pieces)] for array in reached))
@@ -290,7 +284,6 @@ class SharedTiles(Tiles):
         }
 
     def _widened(self, boxes: Boxes) -> Boxes:
-        """Return the boxes with all next nodes; their rows are whole."""
         lo = np.maximum(boxes.lo - 1, 0)
         hi = np.minimum(boxes.hi + 1, self._nodes[boxes.grid] - 1)
         shape = hi - lo + 1
@@ -299,7 +292,6 @@ class SharedTiles(Tiles):
         return boxes._replace(lo=lo, hi=hi, rows=rows)
 
     def _inner_boxes(self, boxes: Boxes) -> dict[int, tuple]:
-        """Shrink boxes to nodes whose neighbours are in them, too, by process."""
         low = np.where(boxes.lo > 0, boxes.lo + 1, 0)
         end = self._nodes[boxes.grid] - 1
         high = np.where(boxes.hi < end, boxes.hi - 1, end)
@@ -356,7 +348,6 @@ class SharedTiles(Tiles):
         return nodes
 
     def give(self, s: Setup, number: int, kinds: int) -> None:
-        """Begin to exchange the contributions of tiles to other processes' nodes."""
         link = self._links.get((number, kinds))
         if link is None:
             of = next(one for one in buffers_of(s) if one.number == number)
@@ -431,7 +422,7 @@ def share_of(s: Setup, mine: np.ndarray) -> dict[str, np.ndarray]:
 def share_of_tiling(
     k: int, tiling: Tiling, mine: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the points in the tiles marked in `mine`, and these tiles, packed."""
+    """Return the points in the tiles marked in `mine`, and these tiles."""
     which = np.flatnonzero(mine[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)

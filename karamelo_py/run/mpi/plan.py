@@ -1,4 +1,4 @@
-"""The division of a scene among processes, predicted by one: memory, messages per step."""
+"""Predicted division of a scene among processes: memory, messages per step."""
 
 from typing import NamedTuple
 
@@ -17,22 +17,20 @@ from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
-MAY_CHANGE = 1.25  # acceptable largest number of points over the mean
+MAY_CHANGE = 1.25  # largest number of points over the mean
 
 
 class ProcessShare(NamedTuple):
     points: int
-    tiles: int  # occupied tiles of points
-    nodes: int  # nodes in use
+    tiles: int  # of points
+    nodes: int
     others: int  # processes to which it sends
-    sent: int  # bytes sent per step
+    sent: int  # bytes per step
     memory: int  # bytes touched in steps, and of a copy of the last good state
-    common: int  # bytes of data about the whole scene
+    common: int  # bytes about the whole scene
 
 
 class _Sums(NamedTuple):
-    """Instead of sweeping, note which nodal arrays a step sums."""
-
     sums: list
 
 
@@ -71,7 +69,7 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
     s, method = simulation.setup, simulation.hub.update.method
     lattices, one_space = method.lattices(simulation.hub), method.fields_per_solid
     few = simulation.count, sparse(simulation.hub)
-    boxes: list[Boxes] = []  # boxes of all processes
+    boxes: list[Boxes] = []
     of_all = [
         SharedTiles(
             _PretendedComm(rank, ranks, boxes), lattices, s.basis, *few, one_space=one_space
@@ -91,7 +89,7 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
 def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> ProcessShare:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
-    )  # empty rows: only positions matter
+    )  # only positions matter
     tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
     tilings = [block.tiling for block in s.blocks]
     memory = memory_of(simulation, s, tiles.box_bytes(simulation.setup))

@@ -1,4 +1,4 @@
-"""The part of a scene on one of several processes, and its measured work."""
+"""The part of a scene on one process, and its measured work."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -25,10 +25,10 @@ LEARN_EVERY = 100  # steps between checks of the balance
 
 
 class Load:
-    """Time in sweeps over each block's points, and in everything else but waiting."""
+    """Time spent on each block's points, and on everything else but waiting."""
 
     def __init__(self, blocks: int):
-        # Per step: of a point of each block, and of a node in reach of a tile.
+        # Per step, of a point of each block and of a node in reach.
         self.costs = np.append(np.ones(blocks), 0.0)
         self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds; points times steps
         self._rest = self._at = blocks
@@ -59,7 +59,7 @@ class Load:
 
 
 class Subdomain(WholeDomain):
-    """The part of a scene on one of several processes, balanced with the others.
+    """The part of a scene on one of several processes.
 
     Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
     """
@@ -171,7 +171,6 @@ class Subdomain(WholeDomain):
         return self.load.costs
 
     def rebalance(self) -> None:
-        """Hand over whole tiles if due: points may never be sorted again."""
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
         motion = s.control.motion[0]
@@ -197,7 +196,7 @@ class Subdomain(WholeDomain):
                 self.load.resume(0 if request in {ranks.SWEEP, ranks.GIVE} else None)
             return result
         except BaseException as error:
-            # Exceptions cannot pass through a kernel, and the others wait.
+            # Exceptions cannot pass through a kernel, and other processes wait.
             self.comm.fail(error)
             raise
 
@@ -212,7 +211,7 @@ class Subdomain(WholeDomain):
             self.comm.allreduce_max(self.control.answer[:a])
         elif request == ranks.NUMBER:
             return int(self.comm.allreduce(np.array([a]))[0])
-        return 0  # the other calls only mark the time
+        return 0  # other requests only mark the time
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)

@@ -27,7 +27,6 @@ class PointsMoved(Exception):
 class Whole:
     def __init__(self, simulation: SceneState, subdomain: Any):
         self.simulation, self.subdomain = simulation, subdomain
-        # It has arrays of nodes, and one point.
         s, self.tiles = lower(simulation.hub, ids=(0, 1), comm=SerialComm())
         control = simulation.control._replace(ranks=s.control.ranks)
         self.setup = s._replace(control=control, contact=simulation.setup.contact)
@@ -36,7 +35,7 @@ class Whole:
     def act(self, function: Callable[[Setup], None]) -> None:
         """Call a function of the whole scene on rank 0, and send its changes to all ranks.
 
-        If it moved points, the step must begin again (`PointsMoved`).
+        Raises `PointsMoved` if it moved points.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
