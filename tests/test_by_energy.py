@@ -482,7 +482,12 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ("if(I1 < 3, 0, I1 - 3)", "< has no derivative", "sqrt"),
         ("3", "constant", "a formula of I1"),
         ("x*(I1 - 3)", "cannot depend on x", "a formula of I1"),
-        ('"I1 - 3"', "is text", "without quotes"),
+        ('"I1 - 3"', "a stress of 2 at rest", "least for I1 = I2 = 3"),
+        ('"k*(I1 - 3)"', "unknown name 'k'", "k=..., after the formula"),
+        ("k*(I1 - 3), k=mu, c9=1", "no argument is named 'c9'", "rho=..., energy=..., fibre="),
+        ("k*(I1 - J), k=-mu, J=1", "J is a variable of the formula", "by another name"),
+        ('k*(I1 - 3), k="mu"', 'k = "mu" is not a number', "a number"),
+        ("k*(I1 - 3), k=1, k=2", "k is given twice", ""),
         ("log(I1 - 3)", "no value at rest", ""),
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2", "I4 needs a direction", "fibre=(x, y, z)"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + I4, fibre=(1, 0, 0)", "the fibres have a stress",
@@ -502,6 +507,19 @@ def test_energies_that_make_no_law(run_interpreted, words, says, instead):
     line = f"mu = 1\nmaterial(m, hyperelastic, 1000, {words})\n"
     error = run_interpreted(line, status=1).err
     assert says in error and instead in error and ":2:" in error
+
+
+def test_numbers_of_a_formula_are_named_in_its_line(run_interpreted):
+    """s1 - s2 = mu J^(-5/3) (l1^2 - l2^2), with s2 = 0 (Holzapfel 2000, section 6.5)."""
+    text = """rho = 1000
+    material(rubber, hyperelastic, rho, energy="mu/2*(I1*J^(-2/3) - 3) + K/2*(J - 1)^2", mu=4e5, K=2e7)
+    load_path(pull, 20, exx=0.02*20, syy=0, szz=0)
+    element(t, rubber, pull)
+    """  # noqa: E501
+    t = pandas.read_csv(run_interpreted(text).folder / "element_t.txt", sep=r"\s+")
+    along = 1.02 ** np.arange(21)
+    across = t.J / along
+    assert np.allclose(t.sxx, 4e5 * t.J ** (-5 / 3) * (along**2 - across), rtol=1e-8)
 
 
 @pytest.mark.parametrize(

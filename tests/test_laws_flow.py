@@ -177,7 +177,8 @@ def test_names_in_a_formula_are_its_own(run_interpreted):
         ("0.4*eq", "unknown name 'eq'"),
         ("0.4*epp", "expected: one of ep, epdot, T, p, J, or a number that the script has set"),
         ("0.4*ep_dot", "did you mean 'epdot'?"),
-        ('"linear"', "is text"),
+        ('"linear"', "unknown name 'linear'"),
+        ('"k*ep - 1", k=1', "not above 0"),
         ("0.4 + atan(ep)", "atan is not possible in a law"),
     ],
 )

@@ -131,7 +131,7 @@ def test_conversion(hub, annotation, text, expected):
         (InputFile, "nofile.txt", "does not exist"),
         (OutputFile, "nofolder/a.txt", "folder nofolder does not exist"),
         (float, "2 3", "operator is missing"),
-        (float, "value=3", "no argument is named 'value'"),
+        (float, "weight=3", "no argument is named 'weight'"),
     ],
 )
 def test_misfits_mark_the_argument(hub, annotation, text, message):
@@ -204,6 +204,8 @@ def test_classes_defaults_varargs_and_keywords(hub):
     assert (style.group.name, style.vx.constant, style.vy, style.velocity) == ("g", 1.0, None, ())
     style = call(hub, Style, "g, 1, NULL, time, NULL, glue = h")
     assert style.vy is None
+    named = call(hub, Style, "vx=1, g, glue=h")
+    assert (named.group.name, named.vx.constant, named.vy, named.glue.name) == ("g", 1, None, "h")
     assert len(style.velocity) == 2
     assert style.glue.name == "h"
 
@@ -214,7 +216,7 @@ def test_classes_defaults_varargs_and_keywords(hub):
         ("g", "vx is missing", None),
         ("", "group, vx are missing", None),
         ("g 1", "vx is missing", 3),
-        ("g, 1, vz=2", "no argument is named 'vz'", 9),
+        ("g, 1, vw=2", "no argument is named 'vw'", 9),
         ("g, 1, glue=a, glue=b", "glue is given twice", 17),
         ("broken, 1", "it is broken", 11),
         ("gone, 1", "x.txt: No such file", None),

@@ -28,6 +28,7 @@ class Argument:
         start = raw.start + len(code) - len(code.lstrip())
         self._raw = Raw(raw.source, start, start + len(code.strip()))
         self._interpreter = interpreter
+        self._numbers: dict[str, Argument] = {}
         self.text = code.strip()
         if "\n" in raw.source.text[self._raw.start : self._raw.end]:
             self.text = re.sub(r"\s+", " ", self.text)
@@ -90,19 +91,38 @@ class Argument:
             )
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
+    def take(self, numbers: dict[str, Argument]) -> list[str]:
+        """Take `numbers` of the same call for a formula; return names that it does not contain."""
+        self._numbers = numbers
+        return [name for name in numbers if name not in _NAME.findall(self.text)]
+
     def value_with(self, seeds: Sequence[str]) -> Value:
+        """Return the value of a formula of `seeds`, in quotes or not, with numbers of its call."""
+        if _QUOTED.fullmatch(self.text):
+            inside = self._from(self._raw.start + 1, self._raw.end - 1)
+            inside.take(self._numbers)
+            return inside.value_with(seeds)
         interpreter = self._interpreter
         script = copy(interpreter)
-        script.variables = interpreter.variables | {name: Expression.seed(name) for name in seeds}
+        numbers = {}
+        for name, argument in self._numbers.items():
+            numbers[name] = argument.value(None)
+            if name in seeds or not isinstance(numbers[name], float):
+                message = f"{name} = {argument.text} is not a number"
+                if name in seeds:
+                    message = f"{name} is a variable of the formula"
+                raise ScriptError(message, mark=argument.mark, expected="a number by another name")
+        script.variables = interpreter.variables | numbers
+        script.variables |= {name: Expression.seed(name) for name in seeds}
         try:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
             if error.code == "unknown-name":
-                name, numbers = error.name or "", self.numbers()
-                others = ", ".join(numbers) or "none so far"
+                name, known = error.name or "", [*self.numbers(), *numbers]
+                others = ", ".join(known) or "none so far"
                 few = one_of(name, seeds)
                 choices = f"{few}, or a number that the script has set ({others})"
-                hint = meant(name, [*seeds, *numbers]) or f"set it first: {name} = ..."
+                hint = meant(name, [*seeds, *known]) or f"{name}=..., after the formula"
                 error.expected, error.hint = choices, hint
             raise
 

@@ -80,9 +80,7 @@ def unknown_keyword(
     hint = turned or meant(word, by_name) or longer or table()["otherwise"].get(owner)
     if expected and not (hint or by_name):
         hint = f"leave out '{word} ='; a comparison is written =="
-    if any(p.name == word for p in expected):
-        hint = f"arguments are given by position: leave out '{word} ='"
-    choices = ", ".join(f"{n}=..." for n in by_name) or "arguments by position, without names"
+    choices = ", ".join(f"{p.name}=..." for p in expected if not p.variadic)
     message = f"no argument is named '{word}'"
     mark = argument.mark
     code = "arguments"

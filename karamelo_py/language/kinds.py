@@ -155,7 +155,8 @@ class Unfit(Exception):
 class Kind:
     """Description and conversion of an argument.
 
-    With `words`, only these fit; `family` is the family of the styles it names.
+    With `words`, only these fit; `family` is the family of the styles it names. Other arguments
+    ``name=value`` of the call are numbers of an argument `with_numbers`.
     """
 
     text: str
@@ -163,6 +164,11 @@ class Kind:
     words: tuple[str, ...] = ()
     nullable: bool = False
     family: str | None = None
+    with_numbers: bool = False
+
+
+class WithNumbers:
+    """Base of kinds of formulas that may contain numbers from the same call."""
 
 
 def _shown(value: Value) -> str:
@@ -315,7 +321,8 @@ def kind_of(annotation: Any) -> Kind:
             name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", annotation.__name__).lower()
             text = f"the ID of a {name}"
         family = annotation.family if isinstance(annotation, StyleOf) else None
-        return Kind(text, annotation.from_script, family=family)
+        numbers = isinstance(annotation, type) and issubclass(annotation, WithNumbers)
+        return Kind(text, annotation.from_script, family=family, with_numbers=numbers)
     raise TypeError(f"a signature cannot have the annotation {annotation!r}")
 
 

@@ -9,7 +9,8 @@ remaining ones define the arguments::
 Supported annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile,
 OutputFile, Argument (left to the callee), classes with a classmethod ``from_script(cls, hub,
 argument)``, and unions of these, with None for the word NULL. Annotated adds constraints. ``*args``
-take any number; keyword-only parameters are written ``name=value``.
+take any number, ``**numbers`` are names for formulas; all others may be written ``name=value``,
+keyword-only parameters must be.
 """
 
 import inspect
@@ -121,18 +122,20 @@ def call(
         _bind(target, expected, arguments, name, bound)
         values: list[Any] = []
         named: dict[str, Any] = {}
+        in_order = True
         for parameter in expected:
+            in_order &= parameter.name in bound and not parameter.keyword
             for argument in bound.get(parameter.name, ()):
-                number = None if parameter.keyword else len(values) + 1
+                number = len(values) + 1 if in_order else None
                 try:
                     value = convert(hub, parameter, argument, number)
                 except ScriptError as error:
                     error.hint = explain.swapped(hub, expected, bound, parameter) or error.hint
                     raise
-                if parameter.keyword:
-                    named[parameter.field or parameter.name] = value
-                else:
+                if in_order:
                     values.append(value)
+                else:
+                    named[parameter.field or parameter.name] = value
                 if converted is not None:
                     before = converted.get(parameter.name, ())
                     converted[parameter.name] = (*before, value) if parameter.variadic else value
@@ -240,29 +243,39 @@ def _bind(
     name: str,
     bound: dict[str, list[Argument]],
 ) -> None:
-    by_name = {p.name: p for p in expected if p.keyword}
     slots = [p for p in expected if not p.keyword]
     variadic = next((p for p in slots if p.variadic), None)
+    formula = next((p.name for p in expected if p.kind.with_numbers), None)
+    numbers: dict[str, Argument] = {}
     positional: list[Argument] = []
     # Styles know the names of raw arguments.
     passed_on = variadic is not None and is_raw(variadic.kind)
+    by_name = {p.name for p in expected if p.keyword or not (p.variadic or passed_on)}
     for argument in arguments:
         word, value = argument.keyword() or ("", argument)
         if not word or (passed_on and word not in by_name):
             positional.append(argument)
-        elif word not in by_name:
-            raise explain.unknown_keyword(word, argument, expected, name)
-        elif word in bound:
+        elif word in bound or word in numbers:
             raise ScriptError(f"{word} is given twice", mark=argument.mark)
-        else:
+        elif word in by_name:
             bound[word] = [value]
+        elif formula:
+            numbers[word] = value
+        else:
+            raise explain.unknown_keyword(word, argument, expected, name)
+    slots = [p for p in slots if p.name not in bound]
     needed = sum(not (p.optional or p.variadic) for p in slots)
-    missing = [p.name for p in by_name.values() if not p.optional and p.name not in bound]
+    missing = [p.name for p in expected if p.keyword and not p.optional and p.name not in bound]
     if len(positional) < needed or missing or (variadic is None and len(positional) > len(slots)):
-        raise explain.wrong_count(syntax(target, name), name, expected, positional, missing)
+        rest = [p for p in expected if p.keyword or p in slots]
+        raise explain.wrong_count(syntax(target, name), name, rest, positional, missing)
     for argument, parameter in zip(positional, chain(slots, repeat(variadic)), strict=False):
         if parameter is not None:
             bound.setdefault(parameter.name, []).append(argument)
+    if formula and numbers:
+        for word in bound[formula][0].take(numbers):
+            wrong = next(one for one in arguments if (one.keyword() or ("",))[0] == word)
+            raise explain.unknown_keyword(word, wrong, expected, name)
 
 
 def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:

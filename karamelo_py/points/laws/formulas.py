@@ -16,6 +16,7 @@ from karamelo_py.compiler import importable, real, where
 from karamelo_py.compiler.powers import exponential, power
 from karamelo_py.compiler.powers import logarithm_near_one as logarithm
 from karamelo_py.language.arguments import Argument
+from karamelo_py.language.kinds import WithNumbers
 from karamelo_py.language.scene import Scene
 from karamelo_py.script import evaluation, syntax, terms
 from karamelo_py.script.derivatives import OF_ONE, is_number, times
@@ -34,7 +35,7 @@ KNOWN = {*OF_ONE, *OF_TWO, *COMPARED, "number", "name", "if"}
 Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
 
 
-class FormulaOf:
+class FormulaOf(WithNumbers):
     """Script argument: a formula of `names` for a `quantity`."""
 
     names: ClassVar[tuple[str, ...]]
@@ -45,9 +46,8 @@ class FormulaOf:
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         value = argument.value_with(cls.names)
         if isinstance(value, str):
-            raise ScriptError(
-                f"'{value}' is text", mark=argument.mark, expected="the formula without quotes"
-            )
+            message = f"{argument.text} is text"
+            raise ScriptError(message, mark=argument.mark, expected=cls.expected)
         formula = Expression(value)
         if others := formula.names.difference(cls.names):
             raise ScriptError(

@@ -58,8 +58,9 @@ class HyperelasticFormula(OfInvariants, Fields):
     energy
         Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, I3 =
         det C, J = det F, with C = F^T F, and of I4 and I6, the squared stretches of two families of
-        fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Script
-        variables are numbers. At rest I1 = I2 = 3; all other variables are 1.
+        fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Numbers
+        are variables of the script, or named in the same line (mu=4e5). At rest I1 = I2 = 3; all
+        other variables are 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6: numbers, or formulas of x0, y0, z0.
     cp, kappa, alpha
@@ -71,6 +72,7 @@ class HyperelasticFormula(OfInvariants, Fields):
     Example
     -------
     material(rubber, hyperelastic, 1000, 2e5*(I1*J^(-2/3) - 3) + 1e7*(J - 1)^2)
+    material(seal, hyperelastic, 1000, energy="mu/2*(I1 - 3) - mu*log(J)", mu=4e5)
     material(strip, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 5e5*(I4 - 1)^2, fibre=(1, 1, 0))
     material(ring, hyperelastic, 1000, 2e5*(I1 - 3 - 2*log(J)) + 5e5*(I4 - 1)^2, fibre=(-y0, x0, 0))
     material(sheet, hyperelastic, 1000, 2e5*(l1^2 + l2^2 + l3^2 - 3 - 2*log(J)) + 1e7*log(J)^2)
@@ -90,7 +92,10 @@ class HyperelasticFormula(OfInvariants, Fields):
     """
 
     __slots__ = ()
-    syntax = "rho, energy[, fibre=(x, y, z)][, fibre2=(x, y, z)][, cp=, kappa=][, alpha=][, T=293]"
+    syntax = (
+        "rho, energy[, number=...][, fibre=(x, y, z)][, fibre2=(x, y, z)]"
+        "[, cp=, kappa=][, alpha=][, T=293]"
+    )
 
     @classmethod
     def given(

@@ -209,7 +209,7 @@ class DamageFormula(ByRate, DamageFields):
     """
 
     __slots__ = ()
-    syntax = "rate[, brittleness=][, T=293]"
+    syntax = "rate[, number=...][, brittleness=][, T=293]"
 
     @classmethod
     def given(

@@ -184,7 +184,7 @@ class FlowStress(ByFlow, FlowFields):
     """
 
     __slots__ = ()
-    syntax = "G, Y[, T=293]"
+    syntax = "G, Y[, number=...][, T=293]"
 
     @classmethod
     def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0) -> Any:
