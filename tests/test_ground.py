@@ -48,6 +48,26 @@ def test_earth_pressure(run_script, way, n, changes, K, within):
     assert log["up"][-1] == pytest.approx(1 / 3, abs=0.015)
 
 
+@pytest.mark.full
+@pytest.mark.parametrize(("way", "K", "within"), [(-1, 0.294, 0.08), (1, 4.29, 0.03)])
+def test_a_rough_wall_on_a_rough_base_rubs(run_script, way, K, within):
+    """Lancellotta 2002 (exact for sand without weight under a load on its surface)."""
+    page = (HOWTO / "retaining-wall.md").read_text("utf-8")
+    ((travel, T, *lines),) = map(
+        str.splitlines, re.findall(r"^```text\n(travel.*?)^```", page, re.S | re.M)
+    )
+    script = re.sub(r"^(scheme|set_dt).*\n", "", scene("retaining-wall.md"), flags=re.M)
+    script = re.sub(r"^travel.*", f"{travel}\n{T}", script, flags=re.M)
+    for line in lines:  # in place of the line of this command, and of this fix
+        start = re.escape(re.match(r"fix\(\w+|[a-z_]+", line)[0])
+        script = re.sub(rf"^{start}\b.*", line, script, flags=re.M)
+    script = re.sub(r"^run\(.*", lines[-1], script, flags=re.M)
+    log = run_script(script, "-var", "way", str(way)).log
+    half = log["Time"] > log["Time"].max() / 2
+    assert log["K"][half].mean() == pytest.approx(K, rel=within)
+    assert 0.87 < -way * log["wall_y"][half].mean() / log["wall_x"][half].mean() / 0.268 < 1
+
+
 def test_an_excavation_loads_its_strut(run_script):
     """Force of the strut E A/L times its shortening, the motion of the wall (Hooke)."""
     text = (run_script(scene("excavation.md")).folder / "log.mpm").read_text("utf-8")
