@@ -96,7 +96,9 @@ SCENES = {
     .replace(
         "-4*y)",
         "-4*y, x*sin(9*y))\ngroup(some, nodes, region, bar, all)\n"
-        "fix(turn, angular_velocity_nodes, some, time*y0)",
+        "fix(turn, angular_velocity_nodes, some, time*y0)\n"
+        "fix(push, body_force, all, 0, 0, 10*x0)\n"
+        "fix(share, force_nodes, some, 0, 0, time)",
     ),
     "friction around an axis": pair(
         CONTACTS,

@@ -296,6 +296,9 @@ def test_large_vibrations_conserve_energy(run_script):
 TWISTED = bar("x*(1 + cos(PI*y))", n=2, method="ulmpm, AFLIP, quadratic-spline, 0.99", more="""
     anti_volumetric_locking(true)
     fix(turn, angular_velocity_nodes, low, 0.5*time)
+    fix(push, body_force, all, 0, 0, x0)
+    fix(share, force_nodes, high, 0, 0, time)
+    fix(edge, edge_traction, bar, all, xhi, 0, 0, 0.1)
     run(5)""").replace("2, 0, 1, 0, 1,", "2, 0, 2, 0, 2,")  # fmt: skip
 
 
@@ -387,3 +390,65 @@ def test_copies_around_no_axis_are_refused(run_interpreted):
     dump = "dump(d, all, particle, 100, d.*.LAMMPS, x, revolve=8)"
     err = run_interpreted(f"{script[:begin]}{dump}", status=1).err
     assert "only bodies of revolution in 2D have copies around an axis" in err
+
+
+# --- torques ----------------------------------------------------------------------------------------
+
+# Torques of a total force of 0.02 at the mean radius 2/3 of mass, and at 9 of 15 nodes; of an
+# acceleration of 0.01, of a shear stress of 0.01 on the surface of the bar.
+TORQUES = {
+    "force_particles, bar, 0, 0, 0.02": 0.02 * 2 / 3,
+    "force_nodes, nodes, 0, 0, 0.02": 0.01,
+    "body_force, all, 0, 0, 0.01": 0.01 / 3,
+    "edge_traction, bar, all, xhi, 0, 0, 0.01": 0.01,
+}
+
+
+@pytest.mark.parametrize(("load", "torque"), TORQUES.items())
+def test_torque_times_time_is_angular_momentum(state_interpreted, run_interpreted, load, torque):
+    """And the work of the torque is the energy of a free bar."""
+    script = bar("0", law=LINEAR, n=2, more=f"""
+    fix(load, {load})
+    set_dt(0.02)
+    log_modify(custom, Ek, Es, L_y, load_z)
+    log(1)
+    run(8)""")  # fmt: skip
+    log = run_interpreted(script).log
+    assert log["load_z"][1:] == pytest.approx(torque, rel=0.02)
+    assert -log["L_y"][-1] == pytest.approx(0.02 * log["load_z"].sum(), rel=1e-8)
+    work = state_interpreted(script, "work")["work"]
+    assert log["Ek"][-1] + log["Es"][-1] == pytest.approx(work, rel=1e-3)
+
+
+BY_TORQUE = """
+    method(tlmpm, FLIP, linear, 1)
+    scheme(quasi-static)
+    dimension(2, 0, 1, 0, 2, 0.5)
+    axisymmetric(true, twist=true)
+    material(m, linear, 1, 260, 0.3)
+    region(all, block, 0, 1, 0, 2)
+    solid(bar, region, all, 2, m, 0.5, 0)
+    region(low, block, -INF, INF, 0, 0)
+    region(high, block, -INF, INF, 2, 2)
+    group(low, nodes, region, low, all)
+    group(high, nodes, region, high, all)
+    fix(low, velocity_nodes, low, NULL, 0)
+    fix(hold, angular_velocity_nodes, low, 0)
+    fix(load, {})
+    set_dt(1)
+    run(1)
+"""
+
+
+@pytest.mark.parametrize(
+    ("load", "angle"),
+    [
+        ("edge_traction, all, all, yhi, 0, 0, 0.1*x", lambda y: 1e-3 * y),
+        ("force_nodes, high, 0, 0, 0.05", lambda y: 1e-3 * y),
+    ],
+)
+def test_torques_twist_a_bar_in_load_steps(state_interpreted, load, angle):
+    """T/(G J) per length, with R^4/4 for a radian; coarse faces lose 3 % of the traction's torque."""
+    state = state_interpreted(BY_TORQUE.format(load), "x", "y", "twist")
+    low = state["y"] < 1  # far from the end, where loads are not distributed as in torsion
+    assert state["twist"][low] == pytest.approx(angle(state["y"][low]), rel=0.035)

@@ -31,7 +31,9 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
 
     With twist, z is the direction around the axis: components 13 and 23 are the shears r-theta and
     z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
-    and fix angular_velocity_nodes holds and rotates nodes. Columns of points: ``vtheta``, this
+    and fix angular_velocity_nodes holds and rotates nodes. The third component of force_nodes,
+    force_particles, body_force and edge_traction acts around the axis; they publish its torque per
+    radian as ID_z. Columns of points: ``vtheta``, this
     velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the
     angular momentum about the axis as ID_y; steps conserve it to round-off.
 

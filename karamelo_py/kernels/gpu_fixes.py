@@ -19,7 +19,8 @@ from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
-from karamelo_py.kernels.equations.pore_water import RelativeVelocity, WaterWork
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes
+from karamelo_py.kernels.equations.pore_water import RelativeVelocity
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
@@ -113,7 +114,7 @@ def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = k
 def clear_force(i, fate, s, block):
     force = field(block.points.fields, Force)
     if force is not None:
-        for c in range(s.kin.dimension):
+        for c in range(force.shape[0]):
             force[c, i] = 0
 
 
@@ -260,7 +261,7 @@ ADDED = WorkOfForces, VelocityAround
 
 
 def add_work_at_node(i, fate, s, copies):
-    work = field(s.nodes.fields, WaterWork)
+    work = field(s.nodes.fields, WorkAtNodes)
     totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[i, 0]))
     work[i, 0] = 0
 

@@ -528,6 +528,8 @@ def _act_on_whole_nodes(members, task, call, count):
         values = tuple([hooks.scratch[rows[c], q] for c in range(len(tag.values))])
         force = tuple([nodes.sums[n, first + c] for c in range(kin.dimension)])
         star = tuple([nodes.update[n, c] for c in range(kin.dimension)])
+        if tag.shares:
+            values = (*values, call.share)
         results = kinds.results(tag, members, kinds.Member(n, kin, kin, values, dt))
         numbers = kinds.written(tag, members, n, results)
         counted = totals.counts(control.ranks, n)
@@ -828,7 +830,7 @@ def moving_points(s, block, then):
 
 def clear_forces(kin, force, count):
     if force is not None:
-        for c in range(kin.dimension):
+        for c in range(force.shape[0]):
             for p in range(count):
                 force[c, p] = 0
 

@@ -281,11 +281,18 @@ def _writer(item: Any) -> Callable:
 
 
 def vector_hook(
-    function: Callable, *, reads: tuple, writes: tuple, publishes: bool = False, nodes: bool = False
+    function: Callable,
+    *,
+    reads: tuple,
+    writes: tuple,
+    publishes: bool = False,
+    nodes: bool = False,
+    shares: bool = False,
 ) -> CompiledHook:
     """Make a compiled hook that sees vectors, declared fields and the law's state of points.
 
-    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes.
+    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes; with `shares`, too,
+    1 / number of members with mass follows the values.
 
     Parameters
     ----------
@@ -302,7 +309,7 @@ def vector_hook(
     """
     where = WHOLE_NODES if nodes else WHOLE_POINTS
     if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
-        return CompiledHook(function, where, publishes, False, False, False, None, reads, writes)
+        return CompiledHook(function, where, publishes, False, shares, False, None, reads, writes)
     # In the function's module, so that cached kernels can import it.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
@@ -312,7 +319,7 @@ def vector_hook(
     setattr(module, name, made)
     reader, writer = (_node_reader, _node_writer) if nodes else (_reader, _writer)
     readers, writers = tuple(map(reader, reads)), tuple(map(writer, writes))
-    made.of_nodes, made.of_time = nodes, False  # type: ignore[attr-defined]
+    made.of_nodes, made.of_time, made.shares = nodes, False, shares  # type: ignore[attr-defined]
     alone = len(writes) + publishes == 1
 
     def results_of(tag, members, one):
@@ -327,4 +334,4 @@ def vector_hook(
 
     results.on(made)(results_of)
     written.on(made)(written_of)
-    return CompiledHook(function, where, publishes, False, False, False, made, reads, writes)
+    return CompiledHook(function, where, publishes, False, shares, False, made, reads, writes)

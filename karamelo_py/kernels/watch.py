@@ -16,7 +16,8 @@ from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws, matter_of
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
-from karamelo_py.kernels.equations.pore_water import RelativeVelocity, WaterWork
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes
+from karamelo_py.kernels.equations.pore_water import RelativeVelocity
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.records import put_at
@@ -167,9 +168,9 @@ def sum_energies(s, mode):
         if isinstance(block.laws, Saturated):
             relative = field(block.points.fields, RelativeVelocity)
             _add_water(matter_of(s.kin, block), relative, s.control)
-    of_water = field(s.nodes.fields, WaterWork)
-    if of_water is not None:
-        _take_work_at_nodes(s.spans, of_water, s.control)
+    at_nodes = field(s.nodes.fields, WorkAtNodes)
+    if at_nodes is not None:
+        _take_work_at_nodes(s.spans, at_nodes, s.control)
     take_energies(s)
 
 

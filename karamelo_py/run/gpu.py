@@ -16,7 +16,7 @@ from karamelo_py.compiler.programs import EVALUATE
 from karamelo_py.kernels import arrays, gpu, heat, pore_water, table, twist
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
-from karamelo_py.kernels.equations.pore_water import WaterWork
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes
 from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_points
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
@@ -337,7 +337,7 @@ class StepsOnCard:
                 found.append(self.launch(fixes.add_energies, threads, s, block, copies))
             if any(field(block.points.fields, kind) is not None for kind in fixes.ADDED):
                 found.append(self.of_points(fixes.add_work, block, copies))
-        if field(s.nodes.fields, WaterWork) is not None:
+        if field(s.nodes.fields, WorkAtNodes) is not None:
             found.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
         found += [*self.collect(0, WORK + 1), *self.collect(*solids)]
         before, behind = (

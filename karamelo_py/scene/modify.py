@@ -23,6 +23,7 @@ from karamelo_py.language.faults import as_script_error
 from karamelo_py.language.rules import Restrictions
 from karamelo_py.language.scene import Scene
 from karamelo_py.output.units import NUMBER
+from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.views import NodesView, PointsView
 from karamelo_py.script.errors import Mark, ScriptError, plural
@@ -211,12 +212,29 @@ class Fix(Publisher):
         return call
 
 
-def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False) -> tuple:
+AROUND = (
+    "twist=true: force_nodes, force_particles, body_force, edge_traction and "
+    "initial_velocity_particles have a component around the axis; fix angular_velocity_nodes holds "
+    "and rotates nodes"
+)
+
+
+def _is_nothing(formula: Expression | None) -> bool:
+    return formula is None or (formula.is_constant and formula.constant == 0)
+
+
+def per_direction(
+    hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False, around: bool = False
+) -> tuple:
     """Require one formula (or NULL, unless `all_given`) per direction of the domain.
 
-    Further components may be NULL or zero, as in published inputs.
+    Further components may be NULL or zero, as in published inputs. With `around`, a third component
+    acts around the axis of bodies that twist.
     """
-    d = hub.require_domain().dimension
+    domain = hub.require_domain()
+    d, twists = domain.dimension, isinstance(domain.kin, Twisted)
+    if around and twists and len(formulas) == 3 and not _is_nothing(formulas[2]):
+        d = 3
     axes = "xyz"[:d]
     wanted = ", ".join(name + axis for axis in axes)
     if len(formulas) < d:
@@ -229,11 +247,13 @@ def per_direction(hub: Scene, name: str, formulas: Sequence, *, all_given: bool 
         message = f"{len(formulas)} components, but there are at most 3 directions"
         raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
     for k, extra in enumerate(formulas[d:], d - len(formulas)):
-        if extra is not None and not (extra.is_constant and extra.constant == 0):
+        if not _is_nothing(extra):
             last = ": gravity is a component of it" * (name == "b")
             hint = f"the last direction here is {axes[-1]}{last}"
             if len(formulas) == d + 1 and extra.text.isdigit() and formulas[d - 1] is not None:
                 hint = f"with a decimal point: {formulas[d - 1].text}.{extra.text}; else {hint}"
+            if twists:
+                hint = AROUND
             raise ScriptError(
                 f"more components than the {plural(d, 'dimension')} of the domain",
                 argument=k,

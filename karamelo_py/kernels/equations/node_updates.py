@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function, real
-from karamelo_py.compiler.fields import SummedField, field
+from karamelo_py.compiler.fields import Field, SummedField, field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
 
@@ -34,6 +34,10 @@ def unlimited(seen, n, mass, light):
     square = mass * mass
     least = light * seen[n, 0]
     return square / least if square < least else real(1, mass)
+
+
+class WorkAtNodes(Field):
+    """Work at a node since the last check of the energy: on pore water, and of torques."""
 
 
 class SquaredMass(SummedField):

@@ -37,7 +37,7 @@ from karamelo_py.compiler.fields import (
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
-from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
 from karamelo_py.kernels.equations.strain import increment
 from karamelo_py.kernels.records import put_at, row
 from karamelo_py.points import laws
@@ -136,13 +136,9 @@ class GivenFlux(StepField):
     shape = numbers(2, 2)
 
 
-class WaterWork(Field):
-    """Work on the water at a node since the last look at the energy, less the work of drag."""
-
-
 POINT_FIELDS = RelativeVelocity, UnseenPressure, WorkOfForces
 NODE_FIELDS = (
-    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure, WaterWork,
+    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
 )  # fmt: skip
 
 
@@ -469,7 +465,7 @@ class MakeFlux(NamedTuple):
             w = 0.5 * ((water[n, of_momentum] + again[n, k]) / m - before - v)
             dv += out[n, d + k]
             work += w * (m * dv - dt * pushed[k])
-        field(nodes.fields, WaterWork)[n, 0] += work
+        field(nodes.fields, WorkAtNodes)[n, 0] += work
 
 
 # --- nodes to points ------------------------------------------------------------------------------

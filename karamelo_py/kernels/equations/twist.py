@@ -15,6 +15,7 @@ from karamelo_py.compiler.fields import (
     StepField,
     SummedField,
     field,
+    increase,
     pair,
     store,
     triple,
@@ -22,10 +23,15 @@ from karamelo_py.compiler.fields import (
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
-from karamelo_py.kernels.equations.internal_force import force_around, minus_V_stress
+from karamelo_py.kernels.equations.internal_force import (
+    Force,
+    WorkOfForces,
+    force_around,
+    minus_V_stress,
+)
 from karamelo_py.kernels.equations.loss import OnePoint
 from karamelo_py.kernels.equations.mass_momentum import mapped_moment
-from karamelo_py.kernels.equations.node_updates import node_task
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
 from karamelo_py.kernels.equations.strain import increment, increment_at, velocity_gradient
 from karamelo_py.kernels.records import row
 from karamelo_py.points import transfers
@@ -75,6 +81,14 @@ class AngularVelocity(SummedField):
     """Angular velocity of a node that strains the points."""
 
 
+class MassTimesRadius(SummedField):
+    """Sum of N m r at a node: the torque of a unit acceleration around the axis."""
+
+
+class TorqueOfLoads(StepField):
+    """Torque of fixes on a node."""
+
+
 LINE = Line()
 INERTIA = eq.MASS._replace(array=SumsAround)
 MOMENT = eq.NodeColumns(SumsAround, lambda kin: 1, lambda kin: 1, lambda kin: 2)
@@ -120,6 +134,10 @@ def momentum_around(pt, node):
     return (node.N * (mass / pt.radius * omega[0]),)
 
 
+def mass_times_radius(pt, node):
+    return (node.N * (pt.around.mass / pt.radius),)
+
+
 class RotationToNodes(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "angular momentum to grid"
@@ -128,6 +146,7 @@ class RotationToNodes(eq.NodalQuantity):
         eq.Sum(INERTIA, lambda pt, node: (node.N * pt.around.mass,)),
         eq.Sum(MOMENT, angular_momentum),
         eq.Sum(eq.whole(MomentumAround), momentum_around),
+        eq.Sum(eq.whole(MassTimesRadius), mass_times_radius),
     )
 
 
@@ -145,16 +164,23 @@ def torque(pt):
     return r * stress.at()[2, 0], r * stress.at()[2, 1]
 
 
+@eq.reads("force", "radius after move")
+def torque_of_force(pt):
+    """Return r times the force of fixes around the axis, or ()."""
+    force = pt.of(Force)
+    return () if force is None else (pt.of(RadiusAfterMove)[0, pt.p] * force[2, pt.p],)
+
+
+def torque_at(pt, node):
+    at_node = pt.torque[0] * node.strain_N[0] + pt.torque[1] * node.strain_N[1]
+    return (at_node + node.N * pt.push[0] if len(pt.push) else at_node,)
+
+
 class Torque(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "torque"
-    takes = eq.of_point(torque=torque)
-    gives = (
-        eq.Sum(
-            TORQUE,
-            lambda pt, node: (pt.torque[0] * node.strain_N[0] + pt.torque[1] * node.strain_N[1],),
-        ),
-    )
+    takes = eq.of_point(torque=torque, push=torque_of_force)
+    gives = (eq.Sum(TORQUE, torque_at),)
 
 
 @force_around.on(Twisted)
@@ -166,15 +192,22 @@ def _force_around_twisted(kin, pt):
 
 @node_task
 class PushOutwards(NamedTuple):
-    """Adds the change of the centrifugal force by the new w*, so that it does not lag a step."""
+    """Adds the change of the centrifugal force by the new w*, so that it does not lag a step.
+
+    Also sums the work of torques.
+    """
 
     says = "centrifugal force"
     goes_through = ("sums", "sums", "momentum around", "update around")
 
     def at_node(task, kin, nodes, n, dt):
         momentum = field(nodes.fields, MomentumAround)[n, 0]
-        change = field(nodes.fields, UpdateAround)[n, 1]
+        omega, change = (field(nodes.fields, UpdateAround)[n, k] for k in range(2))
         nodes.sums[n, arrays.of_force(kin)] += momentum * (change + change)
+        load = field(nodes.fields, TorqueOfLoads)
+        if load is not None:
+            field(nodes.fields, WorkAtNodes)[n, 0] += dt * load[n, 0] * (omega - 0.5 * change)
+            load[n, 0] = 0
 
 
 @velocity_gradient.on(Twisted)
@@ -217,4 +250,7 @@ class Rotate(eq.Task):
         store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
         if len(moment):
             store(pt.of(MomentAround), pt.p, moment[:2])
+        for push in torque_of_force(pt):
+            work = pt.w.kick * push * (at_nodes - 0.5 * change)
+            increase(pt.of(WorkOfForces), pt.p, (work,))
         return eq.Report(real(0, pt.dt), fastest)

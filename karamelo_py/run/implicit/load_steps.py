@@ -9,7 +9,12 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import DT, TIME, TIMESTEP, Hooks, Tag, of_change, of_force
 from karamelo_py.kernels.clock import finish
 from karamelo_py.kernels.contact import SeparateFields
-from karamelo_py.kernels.equations.twist import AngularVelocity, SumsAround, UpdateAround
+from karamelo_py.kernels.equations.twist import (
+    AngularVelocity,
+    SumsAround,
+    TorqueOfLoads,
+    UpdateAround,
+)
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
@@ -228,6 +233,9 @@ class LoadSteps:
         simulation = self.simulation
         s = simulation.setup
         simulation.clear_forces()
+        torque = field(s.nodes.fields, TorqueOfLoads)
+        if torque is not None:
+            torque[:] = 0
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
         # Prescribed velocities otherwise start from the last step.
@@ -347,6 +355,9 @@ class LoadSteps:
                 take_rows((HELD,), s, simulation.mode, hooks)
         s.control.totals[WORK] = work
         add_to(s.control.totals, WORK, result.inertia.work(result.u, result.reaction))
+        torque = field(s.nodes.fields, TorqueOfLoads)
+        if torque is not None:
+            add_to(s.control.totals, WORK, float(torque[nodes, 0] @ result.u[:, d]))
         carry(s.control.totals[WORK])
         update[nodes, :d] = s.nodes.velocity[nodes, :d] = v[:, :d]
         if around is not None:

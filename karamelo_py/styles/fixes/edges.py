@@ -283,8 +283,9 @@ class EdgeFix(OnEdge, PointForces):
 
     def forces(self, points: PointsView) -> np.ndarray:
         faces = self.faces_at(points.ids - 1)
-        force = np.zeros(points.position.shape)
-        np.add.at(force, faces.point, self.loads(faces))
+        loads = self.loads(faces)
+        force = np.zeros((len(points.ids), loads.shape[1]))
+        np.add.at(force, faces.point, loads)
         return force
 
 
@@ -302,7 +303,8 @@ class EdgeTraction(EdgeFix):
         ``all`` faces of a set in a mesh file.
     traction
         tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z (initial
-        position of the edge), time and published values. NULL leaves a component unchanged.
+        position of the edge), time and published values. NULL leaves a component unchanged. With
+        axisymmetric(true, twist=true), tz acts around the axis.
 
     Example
     -------
@@ -310,7 +312,7 @@ class EdgeTraction(EdgeFix):
 
     Notes
     -----
-    Publishes the sum as ID_x, ID_y, ID_z.
+    Publishes the sum as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
 
     Points are boxes that fill the region; those with an outer face in the direction of `side` take
     the traction on its initial area. It is a dead load (constant magnitude and direction), acts
@@ -346,11 +348,21 @@ class EdgeTraction(EdgeFix):
                 expected=", ".join(SIDES) if side == "all" else "all",
             )
         self.side = None if side == "all" else SIDES.index(side)
-        self.components = per_direction(hub, "t", traction)
+        self.components = per_direction(hub, "t", traction, around=True)
 
     def loads(self, faces: Faces) -> np.ndarray:
         x = faces.middle
         return faces.area[:, None] * vector(self.components, self.hub, x, lambda: x)
+
+    def forces(self, points: PointsView) -> np.ndarray:
+        force = super().forces(points)
+        if force.shape[1] > points.position.shape[1]:
+            # The torque is the one at the faces, half a box outside of the points.
+            faces = self.faces_at(points.ids - 1)
+            torque = np.zeros(len(force))
+            np.add.at(torque, faces.point, faces.middle[:, 0] * self.loads(faces)[:, 2])
+            force[:, 2] = torque / points.reference_position[:, 0]
+        return force
 
 
 class EdgePressure(EdgeFix):

@@ -6,6 +6,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
+from karamelo_py.kernels.equations.node_updates import WorkAtNodes
+from karamelo_py.kernels.equations.twist import MassTimesRadius, SumsAround, TorqueOfLoads
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.signature import In
@@ -23,9 +25,9 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import ignited
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook, per_direction
+from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook, per_direction, vector_hook
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.expressions import Expression
+from karamelo_py.script.expressions import Expression, applied
 from karamelo_py.styles.fixes.formulas import vector
 
 ACCELERATION = Powers(1, 0, -2)
@@ -36,6 +38,24 @@ def accelerate(node):
     return node.v, node.v_star, node.force + node.mass * node.value, node.mass * node.value
 
 
+def accelerate_whole(mass, force, arm, sums, load, values, dt):
+    return pushed(force, sums, load, (mass * values[0], mass * values[1], arm * values[2]))
+
+
+def share_out_whole(force, sums, load, values, dt):
+    return pushed(force, sums, load, tuple([values[3] * value for value in values[:3]]))
+
+
+def pushed(force, sums, load, push):
+    """Add a force in the plane of radius and axis, and a torque; return what a hook returns."""
+    inertia, momentum, torque = sums
+    force = force._make([old + new for old, new in zip(force, push[:2], strict=True)])
+    return force, (inertia, momentum, torque + push[2]), load + push[2], push
+
+
+WRITES = "force", SumsAround, TorqueOfLoads
+
+
 class BodyForce(Fix):
     """Accelerate nodes: gravity, centrifugal force, manufactured sources.
 
@@ -43,7 +63,8 @@ class BodyForce(Fix):
     ----------
     acceleration
         bx, by, bz, one per dimension of the domain: force per mass, numbers or formulas of x0, y0,
-        z0, time and published values. NULL leaves a component unchanged.
+        z0, time and published values. NULL leaves a component unchanged. With axisymmetric(true,
+        twist=true), bz acts around the axis.
 
     Example
     -------
@@ -52,7 +73,7 @@ class BodyForce(Fix):
 
     Notes
     -----
-    Publishes the total force as ID_x, ID_y, ID_z.
+    Publishes the total force as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
 
     See Also
     --------
@@ -65,10 +86,20 @@ class BodyForce(Fix):
     accelerates = exerts = True
 
     post_particles_to_grid = node_hook(accelerate)
+    of_twist = vector_hook(
+        accelerate_whole,
+        reads=("mass", "force", MassTimesRadius, SumsAround, TorqueOfLoads),
+        writes=WRITES,
+        publishes=True,
+        nodes=True,
+    )
 
     def __init__(self, hub: Hub, group: NodeGroup, *acceleration: Expression | None):
         super().__init__(hub, group)
-        self.formulas = per_direction(hub, "b", acceleration)
+        self.formulas = per_direction(hub, "b", acceleration, around=True)
+        if len(self.formulas) > hub.domain.dimension:
+            self.post_particles_to_grid = self.of_twist
+            self.node_fields = (MassTimesRadius, TorqueOfLoads, WorkAtNodes)
 
 
 def _is_gravity(formula: Expression) -> bool:
@@ -111,7 +142,8 @@ class ForceNodes(Fix):
     ----------
     force
         fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
-        unchanged; in 1D and 2D, omit the last ones or set them to NULL or 0.
+        unchanged; in 1D and 2D, omit the last ones or set them to NULL or 0. With
+        axisymmetric(true, twist=true), fz acts around the axis, on each node at its radius.
 
     Example
     -------
@@ -119,7 +151,7 @@ class ForceNodes(Fix):
 
     Notes
     -----
-    Publishes the applied force as ID_x, ID_y, ID_z.
+    Publishes the applied force as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
 
     See Also
     --------
@@ -132,10 +164,23 @@ class ForceNodes(Fix):
     exerts = True
 
     post_particles_to_grid = node_hook(share_out, shares=True)
+    of_twist = vector_hook(
+        share_out_whole,
+        reads=("force", SumsAround, TorqueOfLoads),
+        writes=WRITES,
+        publishes=True,
+        nodes=True,
+        shares=True,
+    )
 
     def __init__(self, hub: Hub, group: NodeGroup, *force: Expression | None):
         super().__init__(hub, group)
-        self.formulas = per_direction(hub, "f", force)
+        self.formulas = per_direction(hub, "f", force, around=True)
+        if len(self.formulas) > hub.domain.dimension:
+            *rest, around = self.formulas
+            self.formulas = (*rest, applied("*", Expression.seed("x0"), around))
+            self.post_particles_to_grid = self.of_twist
+            self.node_fields = (TorqueOfLoads, WorkAtNodes)
 
 
 def torques(x: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -163,15 +208,20 @@ class PointForces(Fix):
         raise NotImplementedError
 
     def publish_load(self, points: PointsView, force: np.ndarray) -> None:
-        """Publish the sum of forces (n, d) on points, and their torque if requested."""
-        self.publish_components(points.total(force))
-        torque = self.hub.values.torque_of(self.id)
+        """Publish the sum of forces (n, d) on points, and their torque if requested.
+
+        With twist, forces (n, 3) have the torque about the axis as their third sum.
+        """
+        x, torque = points.position, self.hub.values.torque_of(self.id)
+        d = x.shape[1]
+        self.publish_components(points.total(np.hstack([force[:, :d], x[:, :1] * force[:, d:]])))
         if len(torque):
-            torque[:3] = points.total(torques(points.position, force))
+            torque[:3] = points.total(torques(x, force))
 
     def initial_integrate(self, points: PointsView) -> None:
-        force = self.forces(points)
-        points.force = points.force + force
+        force, total = self.forces(points), points.force
+        total[:, : force.shape[1]] += force
+        points.force = total
         self.publish_load(points, force)
 
 
@@ -192,7 +242,7 @@ class ForceParticles(PointForces):
     -----
     A point of mass m gets m/M of the force at its position, M the mass of the group. Unlike with
     force_nodes, the load moves with the points. In axisymmetry, forces are per radian. Publishes
-    the sum as ID_x, ID_y, ID_z.
+    the sum as ID_x, ID_y, ID_z; with twist, fz acts around the axis, and ID_z is its torque.
 
     See Also
     --------
@@ -208,7 +258,7 @@ class ForceParticles(PointForces):
                 f"solid '{self.rigid[0].id}' is rigid: its part of the force has no effect",
                 hint="a group without its points",
             )
-        self.force = per_direction(hub, "f", force)
+        self.force = per_direction(hub, "f", force, around=True)
 
     def forces(self, points: PointsView) -> np.ndarray:
         mass, x = points.mass.astype(float), points.position

@@ -13,11 +13,11 @@ USUAL_FRICTION = 2.0  # 1 for rubber on dry concrete, 1.5 for clean metals that 
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Evaluate a formula per direction, (n, d), 0 if missing; `first()` gives reference
+    """Evaluate a formula per direction, (n, d or 3), 0 if missing; `first()` gives reference
     positions."""
     asked = any(formula is not None and formula.names & FIRST for formula in formulas)
     x0 = first() if asked else x
-    values = np.zeros(x.shape)
+    values = np.zeros((len(x), max(x.shape[1], len(formulas))))
     for k, formula in enumerate(formulas):
         if formula is not None:
             values[:, k] = formula.evaluate_points(hub.values, x, x0)
