@@ -392,7 +392,7 @@ def test_copies_around_no_axis_are_refused(run_interpreted):
     assert "only bodies of revolution in 2D have copies around an axis" in err
 
 
-# --- torques ----------------------------------------------------------------------------------------
+# --- torques --------------------------------------------------------------------------------------
 
 # Torques of a total force of 0.02 at the mean radius 2/3 of mass, and at 9 of 15 nodes; of an
 # acceleration of 0.01, of a shear stress of 0.01 on the surface of the bar.
@@ -448,7 +448,7 @@ BY_TORQUE = """
     ],
 )
 def test_torques_twist_a_bar_in_load_steps(state_interpreted, load, angle):
-    """T/(G J) per length, with R^4/4 for a radian; coarse faces lose 3 % of the traction's torque."""
+    """T/(G J) per length, with R^4/4 for a radian; traction at coarse faces lacks 3 %."""
     state = state_interpreted(BY_TORQUE.format(load), "x", "y", "twist")
     low = state["y"] < 1  # far from the end, where loads are not distributed as in torsion
     assert state["twist"][low] == pytest.approx(angle(state["y"][low]), rel=0.035)
