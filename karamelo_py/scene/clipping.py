@@ -1,7 +1,7 @@
 """Volumes and centroids of point boxes clipped at the edge of a region.
 
-The surface in a box is a plane, fitted to `Region.depth` at corners and centre; other boxes are
-halved, up to `HALVED` times.
+The surface in a box is a plane fitted to `Region.depth`; boxes that do not fit are halved, up to
+`HALVED` times.
 """
 
 import itertools
@@ -13,13 +13,13 @@ import numpy as np
 from karamelo_py.scene.region import Region
 
 HALVED = 5  # per direction
-PLANE = 0.01  # distance from a plane, relative to the box
+PLANE = 0.01  # distance from a plane over box size
 EDGE = 0.05  # for a sub-box, whose edge would otherwise be sharp
 SHEET = 0.01  # for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
-NOTHING = 1e-9  # round-off, relative to the box
+NOTHING = 1e-9  # round-off over box size
 # Fraction of a box in the smallest sub-boxes that are not plane: 1/3 of it at a corner in 2D or an
-# edge in 3D. A sheet thinner than these has more, or they are most of its body.
+# edge in 3D. Thinner sheets have more, or are mostly such sub-boxes.
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # pieces of a face per direction
@@ -29,7 +29,7 @@ SLOPE = 1e-3  # relative to the largest; smaller slopes are zero, as sums would 
 class Pieces(NamedTuple):
     number: np.ndarray  # (n,) of the box, ascending
     middle: np.ndarray  # (n, d) centroids
-    fraction: np.ndarray  # (n,) volume fractions of the box
+    fraction: np.ndarray  # (n,) of the box volume
     # (m,) fraction of each box in the smallest sub-boxes that are not plane
     rough: np.ndarray
 
@@ -42,7 +42,8 @@ class Pieces(NamedTuple):
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
     """Clip boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
 
-    Boxes end at the domain and at the region's bounding box: faces along the axes are exact.
+    Boxes end at the domain and at the region's bounding box, so that faces along the axes are
+    exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -158,7 +159,7 @@ def _measure(
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
     """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
-    From the covered areas of opposite faces: the sum over boxes is exact.
+    Computed from the covered areas of opposite faces, so that the sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -181,8 +182,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction (n,) and centroid (d, n) of the part of a unit cube with mean + slopes (x - 1/2) >
-    0."""
+    """Fraction (n,) and centroid (d, n) of a unit cube where mean + slopes (x - 1/2) > 0."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
@@ -196,8 +196,9 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve `_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, minus (plus, minus
-    ...) those at the other corners, outside the cube."""
+    """`_plane` for slopes -`m` < 0 (d, n): a simplex at the lowest corner, minus (plus, minus ...)
+    those at the other corners, outside the cube.
+    """
     d = len(m)
     top = mean + m.sum(axis=0) / 2
     fraction, moment = np.zeros(len(mean)), np.zeros(m.shape)

@@ -23,7 +23,7 @@ class AnyGroup(Named):
     """A group of points or nodes; `all` includes later ones.
 
     Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, members other than
-    `all`; ``add(region, solids)``, which returns the number added (0: region not known yet).
+    `all`; and ``add(region, solids)``, which returns the number added (0: region not known yet).
     """
 
     kind = ""

@@ -27,7 +27,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts in creation order, with ``id`` and ``mark``."""
+    """Named parts in creation order."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -150,7 +150,7 @@ class Update:
 
     @property
     def words_of_state(self) -> str:
-        """Exclude the scheme: any scheme can continue such a state."""
+        """State in words, without the scheme, as any scheme can continue it."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
@@ -185,13 +185,13 @@ class Hub:
         self.settings = Settings()
         self.folder = Path.cwd()
         self.mark: Mark | None = None
-        # Nothing runs and nothing is written in a rehearsal.
+        # Nothing runs or is written in a rehearsal.
         self.rehearsing = False
         self.rehearsed = False
         self.scouting = False  # the first run ends the rehearsal
         self.begun = 0  # including the rehearsal
         self.answered = False  # the script printed, wrote or ended something
-        self.checking = False  # ``karamelo-py check``: the first run only reports
+        self.checking = False  # the first run only reports
         self.pausing = False  # stops before runs, which a program controls
         self.open_ended = False  # a program may continue after the script
         self.in_runs: list[Any] = []
@@ -206,17 +206,17 @@ class Hub:
         self.elements = Catalogue("element", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
-        # Ids of points that are absent at the start, and of those that a script has deactivated.
+        # Ids of points absent at the start, and of points deactivated by the script.
         self.waiting, self.inactive = np.empty((2, 0), np.int64)
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()  # values of fixes and computes; time, timestep, dt
+        self.values = Values()  # of fixes and computes; time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
         self.asked: set[str] = set()  # values and columns that statements read, later ones too
-        self.functions: dict[str, Any] = {}  # Python functions passed by a program
+        self.functions: dict[str, Any] = {}  # passed by a program
         self.in_run = 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
         self._fits_run = 0  # last run whose arrays fit the scene

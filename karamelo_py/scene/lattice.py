@@ -21,9 +21,9 @@ class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
     It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
-    cell centres; nodes added for `least_nodes` per direction have no mass. Numbers of nodes begin
-    at `first`, of cells at `first_cell`; `shape` and `cells` (3,) count them, 1 in unused
-    directions. ScriptError for more than `MAX_NODES` nodes.
+    cell centres; nodes added for `least_nodes` per direction have no mass. Nodes and cells,
+    numbered from `first` and `first_cell`, have `shape` and `cells` (3,), 1 in unused directions.
+    Raises ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Lattice:
         self.lo[:dimension], self.hi[:dimension] = lo[:dimension], hi[:dimension]
         self.h = float(h)
         self.nodes_per_cell = nodes_per_cell
-        self.first = self.first_cell = 0  # see `numbered`
+        self.first = self.first_cell = 0
         lengths = (self.hi - self.lo)[:dimension]
         cells = [max(1, math.ceil(length / h - RELATIVE_TOLERANCE)) for length in lengths]
         nodes = [max(n * nodes_per_cell + 1, least_nodes) for n in cells]
@@ -149,6 +149,5 @@ def chunks(first: Sequence[int], last: Sequence[int], weight: int) -> list[tuple
 
 
 def positions(first: Sequence[int], last: Sequence[int], start: int, end: int) -> np.ndarray:
-    """Indices of the numbers from `start` to before `end`."""
     counts = [b - a + 1 for a, b in zip(first, last, strict=True)]
     return np.stack(np.unravel_index(np.arange(start, end), counts), axis=1) + first

@@ -38,7 +38,7 @@ class MachineMemory(NamedTuple):
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
     """Return the memory with caches and swap; None if the system does not report it.
 
-    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) all count.
+    Limits of the machine, containers and jobs (cgroups) and processes (ulimit -v) count.
     """
     import psutil
 
@@ -109,7 +109,7 @@ def in_words(count: float) -> str:
 
 
 class Room(NamedTuple):
-    whole: float  # bytes, for all points
+    whole: float  # bytes
     of_one: int  # bytes, at least
     already: int
     single: bool  # precision
@@ -138,8 +138,8 @@ class Room(NamedTuple):
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
     """Return the room for points whose law has `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers; the stored last
-    good state of a run has a position, a velocity and the state again.
+    A point has two positions, a velocity, a mass, the state and three integers, and in the last
+    good state a position, a velocity and the state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

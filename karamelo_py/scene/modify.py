@@ -1,8 +1,8 @@
 """Base classes of fixes and computes (Modify in LAMMPS and Karamelo).
 
-A fix overrides hooks, named as in Karamelo and listed in docs/plugins.md. A hook is a method,
-called with a view of the group at that stage of each step, or a compiled hook made by
-:func:`node_hook`, :func:`point_hook` or :func:`vector_hook`.
+A fix overrides hooks, named as in Karamelo (docs/plugins.md): methods, called with a view of the
+group at that stage of each step, or compiled hooks of :func:`node_hook`, :func:`point_hook` or
+:func:`vector_hook`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 
-FIRST, USUAL, LAST = range(3)  # order at a stage; USUAL: as in the script
+FIRST, USUAL, LAST = range(3)  # at a stage; USUAL: as in the script
 FROM_PYTHON = 3e-4  # seconds per call of a Python hook
 
 
@@ -58,7 +58,7 @@ class Publisher:
     # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
-    unit = NUMBER  # units of its values
+    unit = NUMBER  # of its values
     restrictions: Restrictions | None = None  # what it does not support
 
     def publish(self, name: str, value: float) -> None:
@@ -100,8 +100,8 @@ class Fix(Publisher):
     formulas: tuple = ()  # of compiled hooks: one or None per component
     components: tuple = ()  # of a force in Python: a formula or None per direction
     first_step_only = False  # acts only in the first step after its definition
-    # Python hooks treat each point or node separately and move none. They get the local points, in
-    # any order, before the first step in several calls. Sums need ``total``.
+    # Python hooks treat points or nodes separately and move none. They get local points in any
+    # order, before the first step in several calls. Sums need ``total``.
     point_by_point = False
     for_method = False  # read by the method; no hooks
     # Prescribes nodal velocities in ``post_update_grid_state`` where there is a formula; contact
@@ -109,7 +109,7 @@ class Fix(Publisher):
     prescribes_velocity = False
     prescribes_rotation = False  # the angular velocity of its nodes, published as ID_s
     # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
-    # are all held, as at the ends of the grid.
+    # are all held.
     held_directions: tuple[int, ...] = ()
     # Friction coefficient (formula) of this wall in directions without a formula; None:
     # frictionless.
@@ -118,12 +118,12 @@ class Fix(Publisher):
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    by_sizes = False  # sizes of points follow from their volumes, without a thickness
+    by_sizes = False  # point sizes follow from volumes, without a thickness
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes the motion of points
     reads_itself = False  # its formulas may contain its own values
     moves: Any = None  # rigid solid, by the forces on it
-    touches: Any = None  # rigid solid that its points push, and that pushes them
+    touches: Any = None  # rigid solid in contact with its points
     links = False  # contact or joint between rigid bodies
     ignites = False
     follows_points = False  # force depends on positions of points (tools)
@@ -135,8 +135,7 @@ class Fix(Publisher):
     brakes = False
     water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, wherever it is defined
-    # Python hooks store, transfer or dissipate energy, but add none; else the energy balance is not
-    # monitored.
+    # Python hooks add no energy; else the balance is not monitored.
     conserves = False
     # Calls ``between_steps()`` after multiples of this step number (0: never); True if points were
     # deleted.
@@ -170,7 +169,7 @@ class Fix(Publisher):
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mask (m, k) of prescribed components of `nodes` at `x` (m, d), and values.
 
-        For implicit schemes, which do not call hooks for it. Default: `formulas`.
+        Implicit schemes call this instead of hooks. Default: `formulas`.
         """
         acts = np.isin(nodes, self.nodes)
         mask = np.outer(acts, [formula is not None for formula in self.formulas])

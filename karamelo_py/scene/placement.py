@@ -28,17 +28,17 @@ class Placement(NamedTuple):
 
     x0: Any  # (n, d) positions: array or Filled
     volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D); without the radius
-    half_size: np.ndarray  # (n, d) half edges of initial domains
+    half_size: np.ndarray  # (n, d) of initial domains
     lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray
     outside: float = 0
     shape: str = "box"  # or a meshio cell type
     corners: np.ndarray | None = None  # (n, c, d) of domains other than boxes
-    missed: float = 0  # see `Pieces.missed`
+    missed: float = 0
 
 
 class Filled:
-    """Selected positions (n, d) in a box of cells, computed on request; stores bits."""
+    """Selected positions (n, d) in a box of cells, computed on request from bits."""
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip
@@ -64,7 +64,7 @@ class Filled:
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of the positions `step` (n, d) away in the equidistant pattern, or -1."""
+        """Numbers (n,) of the positions `step` (n, d) away in the regular pattern, or -1."""
         cell, index_in_cell = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
@@ -124,8 +124,8 @@ def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Latt
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Positions of `ppc` points along a unit cell, from its centre, and lengths: (ppc,).
 
-    ``gauss``: Gauss-Legendre. Default as in Karamelo: equally spaced, but for 3 its rounded Gauss
-    points with equal lengths.
+    ``gauss``: Gauss-Legendre. The default is Karamelo's: equally spaced, but for 3 its rounded
+    Gauss points with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)

@@ -44,7 +44,7 @@ SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "trait
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
 COLUMNS: dict[str, Any] = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
-ALIKE = 0.85  # similarity of a method to a hook that is reported as a misspelling
+ALIKE = 0.85  # similarity at which a method is reported as a misspelt hook
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:

@@ -115,7 +115,7 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
-        """Mask (n,) of positions where the surface of `other` is this one, if that is known."""
+        """Mask (n,) of positions where the surface of `other` is this one, if known."""
         return None
 
     def shape(self) -> Any:
@@ -139,7 +139,6 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end (argument number `argument`) above the upper end."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

@@ -39,9 +39,9 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # argument that gives the points, for messages
-    # Volumes of points and of the shape from a file that they fill; per radian if axisymmetric.
+    # Volumes of points and of the shape from a file; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
-    elements = ""  # counts of the elements of a mesh
+    elements = ""
     region: Region | None = None
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
     warm = False  # points have individual temperatures

@@ -1,4 +1,4 @@
-"""Rasters of heights: ESRI ASCII grids and GeoTIFF, profiles, and their skins."""
+"""Rasters of heights (ESRI ASCII grids and GeoTIFF), profiles, and their skins."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -107,8 +107,7 @@ def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.n
 
 
 def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.ndarray:
-    """Return triangles (m, 3, 3) around the ground below heights (ny, nx), seen from outside
-    counter-clockwise."""
+    """Return outward triangles (m, 3, 3) around the ground below heights (ny, nx)."""
     ny, nx = z.shape
     top = np.stack([*np.meshgrid(x, y), z], axis=2)
     low = top.copy()

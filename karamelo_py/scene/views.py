@@ -1,7 +1,6 @@
-"""Views of nodes and points for Python hooks: arrays with a row per node or point of the group.
+"""Views of nodes and points for Python hooks, with a row per node or point of the group.
 
-Changes, by assignment or in place, are written back when the hook returns; other fields are
-read-only.
+Changes are written back when the hook returns; other fields are read-only.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -119,7 +118,7 @@ class View:
         raise self._unknown(name)
 
     def __getitem__(self, kind: type) -> np.ndarray:
-        """Declared field, (n, components)."""
+        """Return a declared field, (n, components)."""
         if not isinstance(kind, type):
             raise self._no_column(kind)
         return self._handed(kind, lambda: self._get(kind))
@@ -273,9 +272,8 @@ class NodesView(View):
 class PointsView(View):
     """Points of a group at one stage of a step, ordered by id.
 
-    Or local ones, if hooks treat each point separately (`Fix.point_by_point`): `pieces` of blocks,
-    with rows, in storage order and with read-only positions; before the first step (`in_steps`
-    False) only some of them.
+    With `Fix.point_by_point`, these are local points in storage order, with read-only positions,
+    and before the first step (`in_steps` False) only some at a time.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -399,9 +397,8 @@ class PointsView(View):
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
-        ``gradient(moves, step)``, called if there are any, returns derivatives (n, d) of a velocity
-        `component` in coordinates of the grid (reference positions if not `moves`); `step` is much
-        smaller than a cell.
+        ``gradient(moves, step)`` returns derivatives (n, d) of a velocity `component` in grid
+        coordinates (reference positions if not `moves`); `step` is much smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -444,8 +441,7 @@ class PointsView(View):
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` with a number (n,) of each point whose law is a
-        `law`."""
+        """Call ``kernel(matter, rows, numbers)`` with numbers (n,) of points with this `law`."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -506,9 +502,9 @@ def set_columns(
     ids: np.ndarray | None = None,
     mark: Mark | None = None,
 ) -> None:
-    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
+    """Set columns of points (ids from 0, by default all) between steps, to numbers or (n,).
 
-    ScriptError for derived columns, wrong shapes and values that are not finite.
+    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

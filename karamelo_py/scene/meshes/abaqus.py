@@ -1,6 +1,6 @@
 """Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
-Keywords that move or copy nodes otherwise are refused (Abaqus Keywords Reference; CalculiX CrunchiX
+Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX CrunchiX
 manual).
 """
 
@@ -77,9 +77,9 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 
 
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
-    """Elements (n, count); lines continue until they have `count` numbers.
+    """Elements (n, count) over continued lines.
 
-    Extra numbers on the last line, such as inner nodes of C3D8I, are ignored, as in CalculiX.
+    Extra numbers at the end, such as inner nodes of C3D8I, are ignored, as in CalculiX.
     """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
@@ -103,7 +103,7 @@ def _spherical(x: np.ndarray) -> np.ndarray:
 
 
 def _system(keyword: DeckKeyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Map from local coordinates: origin, a point on the x axis, one in the x-y plane."""
+    """Map from local coordinates by origin, a point on the x axis, and one in the x-y plane."""
     if not keyword.lines:
         return lambda x: x
     points = table_of(keyword, 3, 6)

@@ -46,8 +46,7 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Initialize Gmsh without its reset of SIGPIPE: a closed pipe or live page would end the
-    program."""
+    """Initialize Gmsh without its reset of SIGPIPE, which would end programs at a closed pipe."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
@@ -57,7 +56,7 @@ def begin(gmsh: ModuleType) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path, ending: str = "") -> Iterator[Path]:
-    """Link (or copy) in an empty folder: Gmsh also reads FILE.opt, which may act."""
+    """Link (or copy) in an empty folder, as Gmsh also reads FILE.opt, which may run commands."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / (path.name + ending)
         try:
@@ -129,7 +128,7 @@ class _Header:
         names = re.search(rb"\$PhysicalNames(.*?)\$EndPhysicalNames", head, re.S)
         groups = re.findall(r'(\d) +(\d+) +"([^"]*)"', names[1].decode("latin-1")) if names else []
         self.names = {(int(dim), int(number)): name for dim, number, name in groups}
-        self.groups: dict[int, int] | None = None  # groups by element number
+        self.groups: dict[int, int] | None = None
         version = re.match(rb"\$MeshFormat\s+([12])\S* +0", head)
         if not version and b"$NOD" not in head:
             return

@@ -14,12 +14,12 @@ DIMENSIONS = {
 }  # fmt: skip
 
 
-_MANY = 100  # names; where a mesh has more, a message lists only a few
+_MANY = 100  # names; messages list only a few of more
 
 
 class CellBlock(NamedTuple):
     type: str  # meshio's, such as tetra10
-    nodes: np.ndarray  # (n, c) numbers from 0, corners first
+    nodes: np.ndarray  # (n, c) from 0, corners first
     # (c, d) natural coordinates of the nodes; None: VTK's order
     reference: np.ndarray | None = None
     label: str = ""  # name in the file, if different
@@ -37,8 +37,6 @@ Of = TypeVar("Of")
 
 
 class OnDemand(Mapping[str, Of]):
-    """Values by name, computed on access."""
-
     def __init__(self, names: Collection[str], of: Callable[[str], Of]):
         self.names, self.of = names, of
 
@@ -62,8 +60,7 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # number of other elements by type, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of an element set, outer faces of a node set, or all; ScriptError if unknown or
-        empty."""
+        """Cells of an element set, outer faces of a node set, or all; ScriptError without any."""
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:

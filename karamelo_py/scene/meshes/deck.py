@@ -1,4 +1,4 @@
-"""Parts of decks: numbered nodes and elements, sets of them, merged to one mesh."""
+"""Parts of decks: numbered nodes and elements, and their sets, merged to one mesh."""
 
 import itertools
 from collections import Counter, defaultdict
@@ -12,8 +12,8 @@ from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh, OnDemand
 from karamelo_py.script.errors import ScriptError
 
 _MOST = 2**31  # bytes of an included file
-# Corners, from 0, of faces S1, S2, ... of Abaqus (Abaqus Analysis User's Guide, "Two- and
-# three-dimensional solid element library").
+# Corners, from 0, of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional
+# solid element library").
 _FACES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -52,10 +52,7 @@ def included(keyword: DeckKeyword, name: str, above: tuple[Path, ...]) -> Path:
 
 
 def table_of(keyword: DeckKeyword, least: int, most: int, widths: Sequence[int] = ()) -> np.ndarray:
-    """Numbers (n, most) of the data lines, by commas, or else in columns of `widths`.
-
-    Omitted ones are 0.
-    """
+    """Numbers (n, most) of the data lines, by commas, or else in columns of `widths`; default 0."""
     ends = list(itertools.accumulate(widths))
     starts = [0, *ends[:-1]]
     rows = []
@@ -102,7 +99,7 @@ class DeckPart:
         self.groups: SetItems = {}
         self.sides: dict[str, list[tuple[str, str]]] = {}  # elements or their set; S1, S2, ...
         self.faces: dict[str, list[np.ndarray]] = {}  # node numbers of the deck (n, c)
-        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # system of later nodes
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # of later nodes
 
     def add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
         self.numbers.append(numbers)
@@ -175,7 +172,7 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, as functions that list numbers of the mesh: a deck may have many sets."""
+    """Sets by name, as functions that list numbers of the mesh."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)

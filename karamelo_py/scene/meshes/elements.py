@@ -10,13 +10,13 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# relative to size^dimension; less is round-off
+# relative to size^dimension
 _FLAT = 1e-12
-# Distance from the plane of a 2D mesh, relative to its size; nearer nodes lie in it.
+# Distance from the plane of a 2D mesh, relative to its size.
 _PLANE = 1e-9
 _CHUNK = 4096
-# Below this fraction of curved elements, folds at an edge come from the mesher, not from nodes in
-# another order. The signed sums are right with them.
+# Below this fraction of curved elements, folds at an edge come from the mesher, and signed sums are
+# right. Otherwise nodes have another order.
 _FOLDED = 0.01
 
 
@@ -74,7 +74,7 @@ class MeshElements(NamedTuple):
     corners: np.ndarray
     nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
-    bulge: float = 0.0  # distance of `nodes` from the straight shape, relative to the size
+    bulge: float = 0.0  # distance of `nodes` from the straight shape over size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
         """Reverse the elements `which` (n,); corners only."""
@@ -89,8 +89,8 @@ def elements_of(
 ) -> list[MeshElements]:
     """Elements of `dimension` in a mesh or its `group`, one item per type.
 
-    `lower` accepts groups of lower dimension, such as a boundary. ScriptError if there are none,
-    for unsupported types, and off z = 0 in 2D or the x axis in 1D.
+    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError without
+    elements, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -144,7 +144,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates; of the corners only if those for other nodes are unknown."""
+    """Natural coordinates; of the corners only if those of other nodes are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -196,7 +196,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements: older formats repeat elements of two physical groups."""
+    """Drop repeated elements, as older formats have for elements of two groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -217,10 +217,10 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Elements with positive orientation, volumes (n,) and centroids (n, d).
+    """Orient elements; return them with volumes (n,) and centroids (n, d).
 
-    Exact integrals of det J and x det J, with curved edges and warped faces. ScriptError for a flat
-    or twisted element; few curved ones may be twisted near an edge.
+    Integrals of det J and x det J are exact, also with curved edges and warped faces. Raises
+    ScriptError for flat or twisted elements; a few curved ones may be twisted near an edge.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -230,7 +230,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     twisted = np.zeros(len(nodes), bool)
     for first in range(0, len(nodes), _CHUNK):
         batch = slice(first, first + _CHUNK)
-        # Relative to the first node: no digits are lost far from the origin.
+        # Relative to the first node, to save digits far from the origin.
         local = nodes[batch] - nodes[batch, :1]
         weights, x = _integrated(shape, reference, local)
         volume[batch] = weights.sum(axis=1)

@@ -1,4 +1,4 @@
-"""Read Exodus II files of Cubit, MOOSE and Sierra (Schoof and Yarberry 1994)."""
+"""Read Exodus II files of Cubit, MOOSE and Sierra (Schoof & Yarberry 1994)."""
 
 import re
 from importlib.util import find_spec
@@ -16,9 +16,7 @@ FAMILIES = {
     "WED": "wedge", "PYR": "pyramid", "BAR": "line", "BEA": "line", "TRU": "line", "EDG": "line",
     "SPH": "vertex", "CIR": "vertex",
 }  # fmt: skip
-MESH = re.compile(
-    "coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns"
-)  # variables of the mesh, without results
+MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # without results
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "SHELL": ((0, 1, 2, 3), (0, 3, 2, 1), (0, 1), (1, 2), (2, 3), (3, 0)),
@@ -40,7 +38,7 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
-    """Arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+    """Arrays and element types by name, of netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:

@@ -10,7 +10,7 @@ from karamelo_py.script.errors import ScriptError
 # Largest distance between equal vertices, relative to the size, because files have few digits.
 _WELD = 1e-6
 _SAMPLES = 4000  # positions on a shell that are tested to be in another
-_SETS = 8  # maximum number of sets of shells that do not overlap
+_SETS = 8  # sets of shells that do not overlap
 
 
 class Skin:
@@ -49,9 +49,9 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Faces (m, d, d) of one element only, oriented outwards; in 1D in pairs, the lower one first.
+    """Outer faces (m, d, d), oriented outwards; in 1D in pairs, the lower one first.
 
-    Quadrilaterals are split along the diagonal from the lowest node number, as in their neighbours.
+    Quadrilaterals are split along the diagonal from the lowest node number.
     """
     triangles: list[np.ndarray] = []
     for elements in parts:
@@ -72,7 +72,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Make simplices (m, d, d): a line or node in 3D is a triangle with equal corners."""
+    """Make simplices (m, d, d); in 3D, lines and nodes are triangles with equal corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -114,7 +114,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     """Closed shells of `points` (n, 3), `triangles` (m, 3).
 
     Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
-    ScriptError for an edge with an odd number of triangles.
+    Raises ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
     for sided in (True, False):  # oriented as in the file; else reoriented
@@ -212,8 +212,8 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
     one, other = order[pairs], order[pairs + 1]
     flipped = m * (way[one] == way[other])
-    # Node k is triangle k as in the file, node m + k its reverse: linked nodes fit together. In
-    # each component the triangle of the lowest number stays as it is.
+    # Node k is triangle k as in the file, node m + k its reverse; linked nodes fit together. The
+    # triangle of the lowest number in each component stays as it is.
     one, other = one % m, other % m
     label = _components(np.r_[one, one + m], np.r_[other + flipped, other + m - flipped], 2 * m)
     return np.where((label[:m] > label[m:])[:, None], triangles[:, ::-1], triangles)

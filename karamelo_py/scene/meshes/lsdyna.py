@@ -26,7 +26,7 @@ from karamelo_py.scene.meshes.deck import (
 
 ENDINGS = (".k", ".key", ".dyn", ".kwd")
 _SET = re.compile(r"SET_(NODE|SOLID|SHELL|PART|SEGMENT)(_LIST)?(_GENERATE)?(_TITLE)?")
-# Equal nodes of an element with eight, and the nodes of the type that it then is.
+# Equal nodes of a collapsed hexahedron, and the nodes of its actual type.
 _COLLAPSED = (
     ("tetra", ((3, 4), (4, 5), (5, 6), (6, 7)), [0, 1, 2, 3]),
     ("pyramid", ((4, 5), (5, 6), (6, 7)), [0, 1, 2, 3, 4]),
@@ -113,7 +113,7 @@ def _elements(part: DeckPart, keyword: DeckKeyword) -> None:
 
 
 def _part(part: DeckPart, keyword: DeckKeyword, names: dict[str, str]) -> None:
-    """Titles of parts; those with more cards than a title and numbers have one part each."""
+    """Store titles of parts; parts with more cards have a keyword each."""
     step = 2 if keyword.name == "PART" else len(keyword.lines)
     for title, line in zip(keyword.lines[::step], keyword.lines[1::step], strict=False):
         number = line.split(",")[0] if "," in line else line[:10]

@@ -12,7 +12,7 @@ _TYPES = (
     *(("vertex", 1), ("line", 2), ("triangle", 3), ("quad", 4)),
     *(("tetra", 4), ("hexahedron", 8), ("wedge", 6), ("pyramid", 5)),
 )
-# Corners of edges, in the order in which edges get their numbers (mfem/fem/geom.cpp).
+# Corners of edges, in the order of edge numbers (mfem/fem/geom.cpp).
 _EDGES = {
     "triangle": ((0, 1), (1, 2), (2, 0)),
     "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -34,9 +34,9 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Numbers of second-order nodes, from `first` on, by the corners between which they lie.
+    """Numbers of second-order nodes, from `first` on, by their corners.
 
-    Edges, quadrilateral faces and elements follow each other, each in the order of appearance.
+    Edges come before quadrilateral faces and elements, each in the order of appearance.
     """
     numbers: dict[frozenset[int], int] = {}
     faces = {**FACES, "triangle": (), "quad": (), "line": ()}

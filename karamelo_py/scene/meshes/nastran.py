@@ -25,7 +25,7 @@ from karamelo_py.scene.meshes.deck import (
 )
 
 ENDINGS = (".bdf", ".nas")
-# Nodes: corners, and all. A second-order element may omit nodes in the middle of edges.
+# Nodes: corners, and all. A second-order element may omit mid-edge nodes.
 _TYPES = {
     "CTETRA": ("tetra", 4, 10), "CPENTA": ("wedge", 6, 15), "CHEXA": ("hexahedron", 8, 20),
     "CPYRAM": ("pyramid", 5, 13),
@@ -126,8 +126,6 @@ def _spherical(x: np.ndarray) -> np.ndarray:
 
 
 class _Systems:
-    """Coordinate systems by number, and nodes in them."""
-
     def __init__(self) -> None:
         self.by_number: dict[int, tuple[_Entry, int]] = {}  # entry, and its first field
         self.nodes: dict[int, tuple[_Entry, int, list[float]]] = {}  # system -1: the default

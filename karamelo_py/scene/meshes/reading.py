@@ -1,7 +1,7 @@
 """Entry point for mesh files: chooses the reader.
 
-Decks of Abaqus, LS-DYNA and Nastran, Exodus, MFEM and OBJ have readers here. Gmsh reads its own
-formats, MED, UNV and CGNS, and meshes geometries; meshio reads the rest.
+Gmsh reads its own formats, MED, UNV and CGNS, and meshes geometries; meshio reads formats without a
+reader here.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 # Gmsh takes other text for its geometry language.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
-_BY_ENDING = (".unv", ".cgns")  # recognised by ending
+_BY_ENDING = (".unv", ".cgns")
 _HDF5 = b"\x89HDF"
 # Files of other programs with endings of meshes: first bytes, and advice.
 _FOREIGN = (
@@ -192,7 +192,7 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _skip_close(file: Any, depth: int) -> None:
-    """Skip to the closing bracket; meshio's function never ends in a file without it."""
+    """Skip to the closing bracket; meshio's function never ends without one."""
     while depth > 0:
         letter = file.read(1)
         if not letter:
@@ -233,7 +233,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
-    """Sets of SU2's markers by name: meshio counts those whose names are words."""
+    """Sets of SU2's markers by name; meshio counts those whose names are words."""
     number, named = 0, {}
     for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
         number = int(name) if name.isdigit() else number + 1
