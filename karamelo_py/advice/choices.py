@@ -1,7 +1,7 @@
-"""The rules of ``method(auto)``: what a scene is, and the lines that suit it. The first row counts.
+"""The rules of ``method(auto)``: the first row whose `when` is true gives the lines.
 
-`when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`). Braces in `lines`
-take attributes of the facts. `evidence` names the scenes that the row follows from.
+`when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`), whose attributes
+fill braces in `lines`. `evidence` names the scenes that the row follows from.
 """
 
 from collections.abc import Callable

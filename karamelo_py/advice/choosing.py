@@ -1,7 +1,7 @@
-"""``method(auto)``: the rest of the script is executed once on a copy, up to the first run.
+"""``method(auto)``: facts of the scene, from a rehearsal up to the first run, choose the method.
 
-The facts of that scene choose a row of :data:`karamelo_py.advice.choices.CHOICES`; a row that the
-program refuses for this scene is skipped.
+The first row of :data:`karamelo_py.advice.choices.CHOICES` counts that fits and that the program
+supports.
 """
 
 import copy
@@ -196,7 +196,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
 def choose(hub: Hub) -> Chosen:
     """Choose a row, and write its lines for this scene.
 
-    ScriptError, as the script would raise it, for a mistake further on.
+    Raises ScriptError for a mistake further on in the script.
     """
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
         return Chosen(RESUMED, lines)  # a longer run may suit another row

@@ -1,6 +1,6 @@
 """Stress that a linear basis loses when stressed material moves through the grid.
 
-Points that cross cell faces change strain rates, and their volumes drift: in the updated frame
+Strain rates change at points that cross cell faces, and volumes drift: in the updated frame
 pressure falls by 10 to 35 % per cell, at any speed and strain. GIMP and splines lose 0 to 0.3 %.
 """
 

@@ -23,8 +23,7 @@ APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain a failed step; `smaller` is the step to suggest if it was too large from the
-    start."""
+    """Explain a failed step; `smaller` is the step to suggest if it was too large."""
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
     if status == SHRUNK:
@@ -125,8 +124,7 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """Return id, old and new position, velocity and grid of the failed point with the smallest
-    id."""
+    """Return id, old and new position, velocity and grid of the first failed point."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling

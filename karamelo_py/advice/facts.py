@@ -171,8 +171,9 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Distance that points pass each other at present velocities, over twice the longest
-        side."""
+        """Distance that points pass each other at present velocities over twice the longest
+        side.
+        """
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

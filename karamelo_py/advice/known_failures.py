@@ -1,7 +1,6 @@
 """Warnings before a run: combinations that are known to fail, with reason and fix.
 
-These rules involve several parts (see `karamelo_py.language.rules`). Each is reported once, by
-`check` or before the first step.
+Rules here involve several parts (see `karamelo_py.language.rules`). Each is reported once.
 """
 
 from collections.abc import Iterable, Iterator
@@ -55,7 +54,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return True if nothing can move. Plug-ins count as motion."""
+    """Return True if nothing can move; plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -333,9 +332,8 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 def _warn_about_precision(s: SceneFacts) -> None:
     """Warn if single precision cannot resolve the motion in a step.
 
-    The cell size matters too: a block that falls at 50 000 cells from the origin has an error of
-    3.5 % of its path, and at 200 000 cells it does not move. ScriptError if positions have a
-    spacing of 1/500 cell or more.
+    At 50 000 cells from the origin a falling block errs by 3.5 % of its path, at 200 000 it does
+    not move. Raises ScriptError if positions have a spacing of 1/500 cell or more.
     """
     if s.hub.settings.precision != "single":
         return

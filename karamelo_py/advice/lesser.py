@@ -1,4 +1,4 @@
-"""Suggestions of `check`: scenes for which fewer dimensions, or half of the body, suffice."""
+"""Suggestions of `check`: fewer dimensions, or half of the body, suffice."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -305,7 +305,7 @@ def _mirrored(hub: Hub) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Yield True for each fix that neither acts along k nor depends on it, else False."""
+    """Yield whether each fix neither acts along k nor depends on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]

@@ -22,7 +22,7 @@ STEPS = 500  # the first failed after 800
 class Uneven(NamedTuple):
     heavy: str = ""
     light: str = ""
-    ratio: float = 1.0  # ratio of densities
+    ratio: float = 1.0  # of densities
     courant: float = 0.0  # at the light nodes
 
     @property
@@ -53,8 +53,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe bodies on one grid that start within a cell of each other and separate; else
-    None."""
+    """Describe bodies within a cell of each other on one grid that separate; or None."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None

@@ -1,9 +1,9 @@
 """Displacement of soft elastic bodies by a weight that acts from the first step.
 
-Points of a body that vibrates under a sudden load cross cells repeatedly. With a linear basis the
-body loses stress and sinks further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26,
-0.32, 0.64 and 1.24 cells (FLIP 0.9). With a load that grows over 7 periods it is 1 and 3 % at 0.26
-and 0.32 cells, with cpgimp and splines at most 7 %. Reactions are correct.
+Points of a vibrating body cross cells repeatedly. With a linear basis it loses stress and sinks
+further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells (FLIP
+0.9). With a load that grows over 7 periods it is 1 and 3 % at 0.26 and 0.32 cells, with cpgimp and
+splines at most 7 %. Reactions are correct.
 """
 
 from typing import NamedTuple

@@ -18,8 +18,8 @@ class Forms:
     """The forms of an argument list, by dimension.
 
     `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are listed by
-    supported dimension. Some arguments take one of a few `words`; INF and EDGE mean the `open_ends`
-    (-inf, inf).
+    dimension. Some arguments take one of a few `words`; INF and EDGE mean the `open_ends` (-inf,
+    inf).
     """
 
     def __init__(

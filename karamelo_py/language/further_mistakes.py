@@ -1,7 +1,6 @@
 """Find further, independent mistakes of a script after the first.
 
-Statements that depend on a wrong or skipped one are skipped; command and
-style names are still checked.
+Statements that depend on a wrong or skipped one are skipped, but for command and style names.
 """
 
 import re
@@ -26,7 +25,7 @@ _SCENE = frozenset(
 # These add columns to points.
 _COLUMNS = _SCENE | {"plane_strain", "plane_stress", "uniaxial_stress", "scheme", "fix"}
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
-_PLAIN = {"group", "plot", "load_path", "element"}  # without a style
+_PLAIN = {"group", "plot", "load_path", "element"}
 # Index of the style among the arguments.
 _STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - _PLAIN}
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
@@ -78,8 +77,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Return True if a statement uses a missing name: F, F_x of a fix, ContactForce_S_x of a
-        solid."""
+        """Return True if a statement uses a missing name: F, F_x, ContactForce_F_x."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -90,7 +88,7 @@ class Dependents:
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
     """Return the mistakes after the statement that failed with the error `first`, in order.
 
-    The interpreter's hub is used for trials; do not use it afterwards.
+    Uses up the interpreter's hub.
     """
     errors = first.others
     seen = {error.message: error for error in (first, *errors)}

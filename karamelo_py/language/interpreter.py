@@ -45,13 +45,13 @@ class Interpreter:
         self.hub = hub
         self.variables: dict[str, Value] = {}
         hub.interpreter = self
-        self.files: list[Path] = []  # files read
+        self.files: list[Path] = []
         self.frames: list[_Frame] = []
         self.by_statement = False  # `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None
         self.record = Record()  # executed statements, for restart files
         self.replay: Replay | None = None
-        # Command-line variables override assignments.
+        # They override assignments.
         self.presets = Presets(self, presets or {})
 
     def run_file(self, path: str | Path) -> None:
@@ -106,8 +106,9 @@ class Interpreter:
             self._call(statement)
 
     def rehearse(self, hub: Any, first: Sequence[str] = ()) -> None:
-        """Execute `first` and the rest on another hub, with copied variables, to find mistakes
-        before a long run."""
+        """Execute `first` and the rest of the script on another hub, to find mistakes before a
+        run.
+        """
         other = self._copy(hub)
         try:
             other.perform(first)
@@ -338,7 +339,7 @@ class Interpreter:
         if not registry.knows("command", name) or self.hides(name):
             raise unknown.unknown_call(self, name, mark, statement=False)
         target = registry.find("command", name)
-        # A command without a value must not run here, least of all a run.
+        # A command without a value must not run here.
         if inspect.get_annotations(target).get("return", "") in (None, "None"):
             raise unknown.no_value(name, mark)
         arguments = [

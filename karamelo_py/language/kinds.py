@@ -29,10 +29,7 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Keyword:
-    """Annotation of a field that a script gives as ``name=value``, by default under its own name.
-
-    ``initial_temperature: Annotated[float, Keyword("T")] = 293.0``
-    """
+    """Annotation of a field given as ``name=value``, by default under its field name."""
 
     name: str = ""
 
@@ -234,7 +231,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Script argument: the name of a style, which takes precedence over a variable of that name."""
+    """Script argument: the name of a style, which hides a variable of that name."""
 
     family: str
     script_kind = "a word"
@@ -347,7 +344,7 @@ def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
 def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
-    # Words first: they take precedence over variables of that name.
+    # Words first: they hide variables.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Scene, argument: Argument) -> Any:
@@ -373,7 +370,7 @@ class Parameter:
     optional: bool = False
     default: Any = None
     description: str = ""
-    field: str = ""  # of a record, under another name
+    field: str = ""
 
     @property
     def shown(self) -> str:

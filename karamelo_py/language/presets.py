@@ -17,7 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Command-line variables: texts by name. Assignments of these names are skipped."""
+    """Command-line variables, texts by name, whose assignments are skipped."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)

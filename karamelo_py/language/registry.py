@@ -1,11 +1,11 @@
 """Families of commands and styles: built-in ones in styles.toml, others from packages.
 
-A package offers a style with two lines in its pyproject.toml, for example::
+A package offers a style in its pyproject.toml::
 
     [project.entry-points."karamelo_py.fix"]
     gravity = "my_package:Gravity"
 
-A script names a class of a module, next to it or installed, as ``module.Class``. Nothing is
+Scripts name a class of a module, next to them or installed, as ``module.Class``. Nothing is
 imported before use.
 """
 
@@ -94,8 +94,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget a module imported by a script in another folder; return True if such a module
-    exists."""
+    """Forget a module imported by a script in another folder; return True if one exists."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -119,7 +118,7 @@ def origin(family: str, name: str) -> str:
 def find(family: str, name: str) -> Any:
     """Return the class or function of a style, imported on first use.
 
-    ScriptError if there is no such style, it cannot be imported, or two packages offer it.
+    Raises ScriptError without such a style, if it cannot be imported, or if two packages offer it.
     """
     key = family, name
     of_module = _of_module(family, name)

@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """Statements executed so far, except by :func:`registry.may_differ` (output, step).
+    """Statements executed so far, except by :func:`registry.may_differ`.
 
     `values` has the results of value(...) by statement number.
     """
@@ -37,7 +37,7 @@ class Replay:
         self.record = record
         self.within = within
         self.file = file
-        self.number = -1  # number of the present statement
+        self.number = -1  # of the present statement
         self._values: list[float] = []
 
     @property

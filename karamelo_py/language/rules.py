@@ -1,7 +1,7 @@
 """Declarations of parts: restrictions, known failures, needless costs, causes of energy gain.
 
-A fix, a scheme (in its traits) or a fluid has `Restrictions`, which list unsupported features.
-Rules are declared next to a basis, transfer, scheme, method, field, law or part of a law, or fix::
+A fix, a scheme (in its traits) or a fluid has `Restrictions`. Rules are declared next to the type
+of a part, field or law::
 
     known_failure(
         PIC,
@@ -12,11 +12,10 @@ Rules are declared next to a basis, transfer, scheme, method, field, law or part
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
-returns whether the rule applies, or the numbers in its text by name, or a list of these, one per
-message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (of
-a law or its parts, the material), such as ``{scene.turn:.2g}``. Two names are special: ``mark``,
-the location in the script (default: of the fix, material or method), and ``share``, the size of
-noise over the tolerable amount.
+returns whether the rule applies, or numbers by name for its text, or a list of these, one per
+message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (the
+material of a law), such as ``{scene.turn:.2g}``. Two names are special: ``mark``, the location in
+the script, and ``share``, noise over the tolerable amount.
 """
 
 import re

@@ -52,4 +52,4 @@ class Scene(Protocol):
         """Warn the user."""
 
     def rehearse(self) -> None:
-        """Try the rest of the script once, before the first expensive work."""
+        """Try the rest of the script once."""

@@ -1,16 +1,16 @@
-"""Signatures define syntax: they convert script arguments to a Python call, and give help.
+"""Convert script arguments to a Python call by its signature, and give help.
 
-Commands are functions and styles are classes. The first parameter is the hub; annotations of the
-remaining ones define the arguments::
+The first parameter of a command (function) or style (class) is the hub; annotations of the others
+define the arguments::
 
     class Gravity(Fix):
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
 
-Supported annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile,
-OutputFile, Argument (left to the callee), classes with a classmethod ``from_script(cls, hub,
-argument)``, and unions of these, with None for the word NULL. Annotated adds constraints. ``*args``
-take any number, ``**numbers`` are names for formulas; all others may be written ``name=value``,
-keyword-only parameters must be.
+Annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile, OutputFile,
+Argument (left to the callee), classes with a classmethod ``from_script(cls, hub, argument)``, and
+unions of these, with None for the word NULL. Annotated adds constraints. ``*args`` take any number,
+``**numbers`` are names for formulas; others may be written ``name=value``, keyword-only parameters
+must be.
 """
 
 import inspect
@@ -78,8 +78,8 @@ def parameters(target: Any) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """Return True for a NamedTuple, a tag that needs no hub.
 
-    Its arguments are its fields, or the parameters of its classmethod ``given``. Fields annotated
-    with `Keyword` are written ``name=value``. A method ``checked`` returns a replacement.
+    Its arguments are its fields, or the parameters of its classmethod ``given``. A method
+    ``checked`` returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
@@ -108,8 +108,7 @@ def call(
 ) -> Any:
     """Call a command or make a style from script arguments; store their values in `converted`.
 
-    `name` is ``run``, or ``fix body_force``. ScriptError, with a mark, for anything wrong in the
-    arguments or the target.
+    `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a mark.
     """
     if arguments and target in FORMS:
         target = FORMS[target].get(arguments[0].word(), target)

@@ -1,4 +1,4 @@
-"""Unknown or unusable names: errors with suggestions."""
+"""Errors with suggestions for unknown or unusable names."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -147,7 +147,7 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield later statements: definitions ("" for a variable), ID and line.
+    """Yield later statements: definition ("" for a variable), ID and line.
 
     The innermost script comes first, from `back` statements before its next one.
     """

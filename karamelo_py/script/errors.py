@@ -79,7 +79,7 @@ class ScriptError(Exception):
     # Likely cause and the command that resumes, for failed runs.
     cause: str = ""
     resume: str = ""
-    # True once the statement is known: callers further out add nothing.
+    # callers add nothing further
     complete: bool = False
 
     def __str__(self) -> str:
@@ -216,9 +216,6 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))
-
-
-# Words of other programs, mainly LAMMPS
 
 
 @cache

@@ -152,7 +152,6 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
             return evaluate(node.operands[1 if condition != 0 else 2], raw, scope)
     values = tuple(_numeric(operand, raw, scope, node.name) for operand in node.operands)
     if node.name in ("min", "max"):
-        # Pairwise: the evaluator takes two operands.
         return reduce(lambda a, b: _apply(node.name, node, (a, b), raw), values)
     return _apply(node.name, node, values, raw)
 

@@ -1,4 +1,4 @@
-"""Values of expressions: numbers, texts, and formulas that are evaluated repeatedly.
+"""Values of expressions: numbers, texts, and formulas.
 
 An operation with a variable operand (position, time, published value) gives a formula, with
 constants folded.
@@ -22,7 +22,7 @@ GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
 _MAX_SIZE = 20000
-CHUNK = 1 << 18  # points per evaluation of a formula
+CHUNK = 1 << 18  # points per evaluation
 
 
 class Expression:
@@ -44,7 +44,7 @@ class Expression:
         self.value: Any = float(value) if operation == "number" else value
         own = {value} if operation == "name" else ()
         self.names: frozenset[str] = frozenset(own).union(*(one.names for one in operands))
-        # Counts common operations repeatedly; exact only where needed.
+        # Counts common operations repeatedly.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:
             self.size = len(terms.in_order(self))

@@ -1,8 +1,8 @@
 """Formulas as stack programs, evaluated over blocks of points.
 
-No formula is compiled: for each operation the evaluator loops over a block. Values common to all
-points are computed once per block, by instructions with the flag `UNIFORM`; `SPREAD` expands the
-result to a row. Common subexpressions are stored in rows after the stack.
+The evaluator loops over a block for each operation; no formula is compiled. Instructions with the
+flag `UNIFORM` compute a value common to the block, which `SPREAD` expands to a row. Common
+subexpressions are stored in rows after the stack.
 """
 
 from typing import NamedTuple
@@ -76,8 +76,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise the first `n` numbers of `a`, branch-free if all exponents agree; each equals
-    `_power`."""
+    """Raise the first `n` numbers of `a`, as `_power` does, branch-free if all exponents agree."""
     power = b[0]
     same = True
     for i in range(n):
@@ -97,8 +96,8 @@ def _powers(n, a, b):
 def evaluate(program, globals_, points, count, out, stack):
     """Evaluate a program at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
-    `globals_` are published values (:class:`karamelo_py.script.values.Values`), `out` (BLOCK,) gets
-    the results, `stack` (ROWS, BLOCK) is scratch.
+    `globals_` are published values, `out` (BLOCK,) gets the results, `stack` (ROWS, BLOCK) is
+    scratch.
     """
     code, constants = program
     top = -1
@@ -143,7 +142,7 @@ def evaluate(program, globals_, points, count, out, stack):
 
 
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
-    """Call `evaluate` for the program code[begin:end] with constants[first:last].
+    """Evaluate the program code[begin:end] with constants[first:last].
 
     The first rows of `scratch` are the points, the last the stack; results go to row `result`.
     """
@@ -153,7 +152,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate at any number of present and initial positions (n, 3).
+    """Evaluate at present and initial positions (n, 3).
 
     `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """

@@ -1,6 +1,4 @@
-"""Functions of the script language, for numbers; for many points see
-`karamelo_py.script.formula`.
-"""
+"""Functions of the script language, for numbers."""
 
 import math
 import operator

@@ -1,4 +1,4 @@
-"""Syntax errors in the user's terms: characters, quotes and parentheses, then expressions.
+"""Explain syntax errors: characters, quotes and parentheses, then expressions.
 
 Lark's parser, fed token by token, shows where it stopped and with which stack.
 """
@@ -96,7 +96,7 @@ def _type(symbol: Any) -> str:
 
 
 class _Stop(NamedTuple):
-    """Position at which the parser stopped: tokens before and at it, and the parser's stack.
+    """Tokens before and at the parser's stop, and its stack.
 
     `here` is a character that starts no token, a token, or None at the end.
     """

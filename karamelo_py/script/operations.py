@@ -10,7 +10,7 @@ from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 @noinline
 def _whole(a, down, up):
-    """Round to an integer by sums: every processor has them."""
+    """Round to an integer by sums, which every processor has."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -51,7 +51,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Raise by products for small integer exponents: pow costs ten multiplications."""
+    """Use products for small integer exponents: pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)

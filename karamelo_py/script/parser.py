@@ -69,7 +69,7 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 def _tree(code: str) -> syntax.Node:
     """Parse an expression; offsets count from the start of `code`."""
     word = code.strip()
-    # Fast path: most arguments and right-hand sides are one name or number.
+    # Fast path: most arguments are one name or number.
     start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in SPELLINGS:
         return syntax.Name(start, start + len(word), 1, word)
@@ -147,7 +147,7 @@ def parser_of(start: str) -> Any:
     from lark.lexer import TerminalDef
 
     text = Path(__file__).with_name(f"{start}.lark").read_text(encoding="utf-8")
-    # Tables contain only numbers and strings: their bytes create no other objects.
+    # Tables contain only numbers and strings, so loading them runs no code.
     stamp = hashlib.sha256(f"{lark.__version__} {sys.version} {text}".encode()).hexdigest()[:24]
     path = files.folder().with_name("parsers") / f"{start}-{stamp}.tables"
     with suppress(OSError, ValueError, EOFError, TypeError):
@@ -198,10 +198,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 
 
 class _TreeBuilder:
-    """Builds statement spans and expression trees while Lark parses.
-
-    Each method is named after the grammar rule whose matches it receives.
-    """
+    """Builds statement spans and expression trees while Lark parses, by grammar rule."""
 
     def script(self, parts: list) -> list:
         return [item for item in parts if isinstance(item, tuple)]

@@ -23,10 +23,7 @@ _WRITTEN = (
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
-    """Read at most `largest` bytes (None: any size).
-
-    OSError if the file is not regular or cannot be read.
-    """
+    """Read at most `largest` bytes; OSError if the file is not regular or cannot be read."""
     piped = _PIPED.fullmatch(str(path)) is not None
     # Opening a pipe without a writer would block; Windows has no such flag.
     more = 0 if piped else vars(os).get("O_NONBLOCK", 0)

@@ -34,8 +34,7 @@ class Source:
         return Mark(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Return the characters from `start` to before `end`, with comments and line ends
-        blanked."""
+        """Return characters from `start` to before `end`, comments and line ends blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(

@@ -130,18 +130,14 @@ def _bracketed(term: Term, level: int) -> str:
     return text_of(term) if precedence >= level else f"({text_of(term)})"
 
 
-# Terms that are used several times are computed once, each into a row, and so are operands that
-# would not fit on the stack.
+# Common terms, and operands that would not fit on the stack, are computed once, into rows.
 
 # Stack depth without rows; limits Python's recursion, too.
 _MOST_LEVELS = 60
 
 
 def program(root: Term, push: Callable[[str], tuple[int, int]]) -> formula.Program:
-    """Compile a term to a stack program.
-
-    `push` gives the instruction that pushes a name: GLOBAL or POINT, and its index.
-    """
+    """Compile a term to a stack program; `push` returns the instruction and index of a name."""
     return _Writer(root, push).program()
 
 
@@ -154,8 +150,8 @@ class _Writer:
         self.uses: list[int] = []
         self.uniform: list[bool] = []
         self.code: list[tuple[int, int]] = []
-        self.constants: dict[str, int] = {}  # by hexadecimal text: 0.0 and -0.0 differ
-        self.rows: dict[int, int] = {}  # rows of stored terms
+        self.constants: dict[str, int] = {}  # by hexadecimal text, as 0.0 and -0.0 differ
+        self.rows: dict[int, int] = {}
         self.free = list(range(programs.MAX_KEPT))[::-1]
         self.root = self._number(root)
         self.kept = self._chosen()

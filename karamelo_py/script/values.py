@@ -20,8 +20,7 @@ def in_a_row(suffixes: Sequence[str]) -> bool:
 class Values:
     """Named numbers in one array that kernels read and write.
 
-    It is never reallocated, so references stay valid. Slots 0, 1 and 2 are time, timestep (the
-    number of the step) and dt.
+    It is never reallocated. Slots 0, 1 and 2 are time, timestep (the number of the step) and dt.
     """
 
     def __init__(self) -> None:
@@ -30,7 +29,7 @@ class Values:
         self._of: dict[str, dict[str, int]] = {}  # slots of names, by ID
         self._first: dict[str, int] = {}  # slot of ID_x, named or not
         self._used = 0
-        # Slot of the torque that goes with the force in slots x, y, z from this one on; or 0.
+        # Slot of the torque of the force in slots x, y, z from this one on; or 0.
         self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
