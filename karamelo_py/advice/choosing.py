@@ -55,7 +55,6 @@ class Chosen(NamedTuple):
 
     @property
     def words(self) -> dict[str, str]:
-        """Describe the choice for the banner."""
         reason = ": ".join(filter(None, (self.choice.scene, self.choice.why)))
         return {"chosen for": reason, "which writes": "; ".join(self.lines)}
 
@@ -94,7 +93,7 @@ class Scouted(SceneFacts):
 
     @property
     def dilates(self) -> bool:
-        """Return True if the soil has no friction, or dilates when it flows."""
+        """True for soil without friction or with dilation."""
         return all(
             parameter(part, "dilation", 0.0) > 0 or not parameter(part, "friction", 0.0) > 0
             for part in self.strengths
@@ -102,7 +101,6 @@ class Scouted(SceneFacts):
 
     @property
     def pressed(self) -> bool:
-        """Return True if fixes drive a boundary that touches a body from the start."""
         return any(
             len(x) and not all(map(is_zero, fix.formulas))
             for body in self.bodies
@@ -111,19 +109,18 @@ class Scouted(SceneFacts):
 
     @property
     def shocked(self) -> bool:
-        """Return True if bodies collide fast enough for a linear basis to lose their pressure."""
         return self.crossing.cells > CROSSED and self.impact > FAST
 
     @property
     def wall_ahead(self) -> bool:
-        """Return True if fixes hold nodes where no body is yet."""
+        """True if fixes hold nodes that no body touches yet."""
         near = {fix for body in self.bodies for fix, x in fixes_at(self, body) if len(x)}
         fixes = self.hub.fixes.values()
         return any(f.prescribes_velocity and len(f.nodes) and f not in near for f in fixes)
 
     @cached_property
     def apart(self) -> bool:
-        """Return True if a body begins apart from another that it will meet."""
+        """True if a body starts apart from one that it will meet."""
         boxes = boxes_of([body.motion for body in self.bodies])
         soft = [body for body in self.bodies if not body.solid.rigid]
         times = (meetings(body.motion, boxes, body.solid.h) for body in soft)
@@ -136,18 +133,15 @@ class Scouted(SceneFacts):
 
     @property
     def rolls(self) -> bool:
-        """Return True if a body that rubs is a disk or a ball."""
         return self.rubs and self.d > 1 and any(map(is_round, self.soft))
 
     @property
     def grid(self) -> str:
-        """The method of bodies that slide on each other, or that stick where they meet."""
         contacts = self.method.fields_per_solid or self.apart or self.rubs
         return "ulmpm/contacts" if contacts else "ulmpm"
 
     @cached_property
     def alone(self) -> bool:
-        """Return True if no body meets another, or a wall, but by fixes of points."""
         touching = {solid.id for fix in self.hub.fixes.values() for solid in fix.solids}
         touching |= {
             solid.id
@@ -160,7 +154,7 @@ class Scouted(SceneFacts):
 
 
 def is_round(solid: Solid) -> bool:
-    """Return True if no point is further out than 1.1 radii of a ball of the same volume."""
+    """True if no point is further out than 1.1 radii of a ball of equal volume."""
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)

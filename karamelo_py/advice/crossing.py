@@ -120,7 +120,6 @@ def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
 
 
 def measured(facts: BasicFacts) -> Crossing:
-    """Measure the mean path of stressed material; 0 if loads maintain the stress."""
     energy = facts.simulation.control.energy[0]
     matters = energy.watch_energy and energy.lost > OF_ENERGY and loses(facts)
     loaded = energy.supplied > LOADED * energy.largest_energy
@@ -128,7 +127,6 @@ def measured(facts: BasicFacts) -> Crossing:
 
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
-    """Describe the loss for the summary, with a single warning."""
     crossing, hub = measured(facts), facts.hub
     if crossing.lost <= TOLD:
         return {}

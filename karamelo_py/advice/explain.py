@@ -124,7 +124,6 @@ def _shrunk(hub: Hub, simulation: Simulation) -> Trouble:
 
 
 def _first_wrong(simulation: Simulation) -> tuple | None:
-    """Return id, old and new position, velocity and grid of the first failed point."""
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
@@ -225,7 +224,6 @@ def _is_tangled(simulation: Simulation, x: np.ndarray, grid: int) -> bool:
 
 
 def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
-    """Suggest a smaller step (`instead`, if given), after a check of doubtful units."""
     if doubted := [name for name in hub.update.warned_of if code_of(name) in DOUBTED_UNITS]:
         units = f"check the {doubted[0]} (see the warning)"
         return f"{units}, then {instead}" if instead else units

@@ -85,13 +85,13 @@ class SceneFacts(BasicFacts):
 
     @property
     def locks(self) -> bool:
-        """Return True if linear cells contain several points, so isochoric flow locks."""
+        """True if isochoric flow locks linear cells that contain several points."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
     @property
     def grid_viscosity(self) -> float:
-        """Kinematic numerical viscosity of the PIC part, `PIC` (1 - alpha) h^2/dt."""
+        """Kinematic numerical viscosity, `PIC` (1 - alpha) h^2/dt."""
         series = transfers.terms.defined(type(self.transfer))
         if not self.moves or self.moments or series or self.simulation.implicit:
             return 0.0
@@ -171,15 +171,12 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Distance that points pass each other at present velocities over twice the longest
-        side.
-        """
+        """Distance that points pass each other, over twice the longest side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 
     @cached_property
     def pressure_ratio(self) -> float:
-        """Largest over smallest pressure; 1 with tension."""
         points = self.simulation.points
         low = -points.largest(lambda some: some.particle("s11"))[0]
         high = points.largest(lambda some: -some.particle("s11"))[0]

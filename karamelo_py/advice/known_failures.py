@@ -54,7 +54,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return True if nothing can move; plug-ins count as motion."""
+    """Plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -74,13 +74,12 @@ def _rests(hub: Hub, simulation: Simulation) -> bool:
 
 
 def _is_zero(fix: Fix) -> bool:
-    """Return True for walls and zero loads."""
     holds_at_zero = fix.formulas and all(map(is_zero, fix.formulas))
     return not (fix.for_method or (fix.hooks() and not holds_at_zero))
 
 
 def warn_about_weightless_water(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of pore water that nothing drives, except pressures that vary with the place."""
+    """Warn once of pore water that nothing drives."""
     wet = [solid.material for solid in hub.solids.values() if solid.material.fluid]
     still = all(map(_is_water_at_rest, hub.fixes.values())) and simulation.fastest() == 0
     if wet and still and hub.update.first_time(REST):
@@ -95,7 +94,6 @@ def warn_about_weightless_water(hub: Hub, simulation: Simulation) -> None:
 
 
 def _is_water_at_rest(fix: Fix) -> bool:
-    """Return True if a fix is zero, or only gives water a pressure such as a hydrostatic one."""
     if fix.water_only:
         return all(is_zero(f) or not f.names.isdisjoint(POINT_SEEDS) for f in fix.formulas)
     return _is_zero(fix)
@@ -217,7 +215,6 @@ def _other_units(s: SceneFacts) -> Iterator[Advice]:
 
 
 def _odd_in(units: Units | None, law: NamedTuple, speed: float) -> tuple[str, str] | None:
-    """Return an implausible property of a material, and the fix."""
     density = 1 / float(specific_volume(law))
     modulus = density * speed**2
     if units is None:
@@ -275,7 +272,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Warn once if constant loads act in the first of several load steps only."""
+    """Warn once if constant loads act in the first load step only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(

@@ -118,7 +118,6 @@ def _thin(hub: Hub) -> Words:
 
 
 def _is_led(hub: Hub, k: int) -> bool:
-    """Return True if a fix prescribes velocities along k."""
     led = (fix.formulas for fix in hub.fixes.values() if fix.prescribes_velocity)
     return any(len(formulas) <= k or formulas[k] is not None for formulas in led)
 
@@ -161,7 +160,6 @@ def _layers(hub: Hub, k: int, rest: list[int]) -> tuple[int, tuple[float, float]
 
 
 def _faces_held(hub: Hub, k: int, low: float, high: float) -> bool:
-    """Return True if nodes of the planes `low` and `high` (in cells) are fixed along k."""
     lattice = hub.lattices[0]
     fixed = np.zeros(lattice.shape, np.bool_)
     for fix in hub.fixes.values():
@@ -305,7 +303,6 @@ def _mirrored(hub: Hub) -> Words:
 
 
 def _given_alike(hub: Hub, k: int, rest: list[int]) -> Iterator[bool]:
-    """Yield whether each fix neither acts along k nor depends on it."""
     for fix in _acting(hub):
         formulas = _given(fix)
         rest_formulas = [formulas[j] for j in rest if j < len(formulas)]

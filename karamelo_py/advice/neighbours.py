@@ -37,7 +37,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe a slender elastic body, one row of points, that bends by its weight; or None."""
+    """Describe a slender elastic row of points that bends by its weight; or None."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
@@ -53,7 +53,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe bodies within a cell of each other on one grid that separate; or None."""
+    """Describe bodies that start within a cell of each other and separate; or None."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None

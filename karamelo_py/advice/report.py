@@ -150,10 +150,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print the unknowns of an implicit step, and the memory of its matrix.
-
-    Nodes couple if they are in the stencil of one point.
-    """
+    """Nodes couple if they are in the stencil of one point."""
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
     size = nodes * (2 * reach + 1) ** d * d * d * 8

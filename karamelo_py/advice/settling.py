@@ -27,7 +27,7 @@ class Settling(NamedTuple):
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Predict the displacement of bodies that settle by their weight.
+    """Predict how far bodies settle by their weight.
 
     The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
     + m_1/m), with the speed c of longitudinal waves.
@@ -54,7 +54,6 @@ def expected(facts: BasicFacts) -> Settling:
 
 
 def _rests(other: BodyMotion, motion: BodyMotion, k: int, h: float, *, down: bool) -> bool:
-    """Return True if `other` lies within a cell of a body along k, on its pressed side."""
     gap = other.low - motion.high if down else motion.low - other.high
     apart = np.maximum(other.low - motion.high, motion.low - other.high)
     return -h < gap[k] < h and bool((np.delete(apart, k) < 0).all())

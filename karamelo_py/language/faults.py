@@ -69,7 +69,7 @@ def _others() -> tuple[str, ...]:
 
 
 def steps_to(error: BaseException) -> list[str]:
-    """List the user's lines in a traceback: ``ropes.py:12 in pull: inner(points)``."""
+    """Lines such as ``ropes.py:12 in pull: inner(points)``."""
     others = _others()
     return [
         f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")

@@ -64,7 +64,6 @@ class Dependents:
         return True
 
     def _meant(self, name: str, statement: CommandCall) -> str:
-        """Return the likely command; else record what the line may have defined."""
         other = instead("command", name)
         if other is None and (close := nearest(name, registry.names("command"))):
             return close
@@ -77,7 +76,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Return True if a statement uses a missing name: F, F_x, ContactForce_F_x."""
+        """True if a statement uses a missing name: F, F_x, ContactForce_F_x."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -153,7 +152,7 @@ def misnamed(
     """Return errors about wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
-    are valid even if the definition of a `wanting` name failed.
+    are valid even if a `wanting` name has no definition.
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}

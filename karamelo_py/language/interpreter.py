@@ -71,7 +71,6 @@ class Interpreter:
         return any(frame.next < len(frame.statements) for frame in self.frames)
 
     def include(self, name: str) -> None:
-        """Execute the script `name`, relative to the present one."""
         path = self.included(name, self.folder)
         exists = path.exists()
         if any(exists and frame.path and frame.path.samefile(path) for frame in self.frames):
@@ -100,15 +99,12 @@ class Interpreter:
         return elsewhere if elsewhere.is_file() and not path.is_file() else path
 
     def perform(self, lines: Sequence[str]) -> None:
-        """Execute commands instead of the present line."""
         for statement in parse("\n".join(lines)):
             assert isinstance(statement, syntax.CommandCall)
             self._call(statement)
 
     def rehearse(self, hub: Any, first: Sequence[str] = ()) -> None:
-        """Execute `first` and the rest of the script on another hub, to find mistakes before a
-        run.
-        """
+        """Execute `first` and the rest of the script on another hub, to find mistakes."""
         other = self._copy(hub)
         try:
             other.perform(first)
@@ -187,7 +183,7 @@ class Interpreter:
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """Return the next statement, from any file; it counts as executed."""
+        """Return the next statement, from any file."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):

@@ -53,7 +53,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Constrain a number to `lo` to `hi`, without the ends named by `open` (True: both)."""
+    """Constrain a number; `open` names the excluded ends (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 

@@ -56,7 +56,6 @@ class Presets(dict[str, str]):
                 variables[name] = present
 
     def stand_for(self, statement: Assignment) -> None:
-        """Replace an assignment of the script; a text does not replace a number."""
         name, variables = statement.name, self._script.variables
         # A word may now be an expression of variables.
         if isinstance(variables.get(name), str):
@@ -108,7 +107,6 @@ class Presets(dict[str, str]):
     def _scripts(
         self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()
     ) -> Iterator[list[Statement] | None]:
-        """Yield the statements of a script and its includes; None for an unknown include."""
         yield statements
         for statement in statements:
             if not (isinstance(statement, CommandCall) and statement.name == "include"):

@@ -34,7 +34,7 @@ _differences: dict[Any, bool | tuple[str, ...]] = {}
 
 @cache
 def _families() -> dict[str, dict[str, list[EntryPoint]]]:
-    """Map family and name to entry points (several if packages clash)."""
+    """Entry points by family and name, several if packages clash."""
     table = {
         family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
         for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()
@@ -103,7 +103,6 @@ def forget_other(module: str) -> bool:
 
 
 def name_of(family: str, style: type) -> str:
-    """Return the style name of a class (attribute ``style`` if it has several)."""
     target = f"{style.__module__}:{style.__qualname__}"
     for name, entries in _families().get(family, {}).items():
         if any(entry.value == target for entry in entries):
@@ -118,7 +117,7 @@ def origin(family: str, name: str) -> str:
 def find(family: str, name: str) -> Any:
     """Return the class or function of a style, imported on first use.
 
-    Raises ScriptError without such a style, if it cannot be imported, or if two packages offer it.
+    Raises ScriptError for unknown styles, import errors and clashes of packages.
     """
     key = family, name
     of_module = _of_module(family, name)

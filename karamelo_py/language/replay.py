@@ -45,7 +45,7 @@ class Replay:
         return self.number == len(self.record.statements) - 1
 
     def next(self, text: str, mark: Mark | None) -> None:
-        """Take the next statement; refuse it if it differs from the record."""
+        """Compare the next statement with the record."""
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]

@@ -81,7 +81,6 @@ class Restrictions(NamedTuple):
 
 
 def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:
-    """Refuse excluded combinations, each pair once, in one message."""
     errors: dict[frozenset[str], ScriptError] = {}
     features = [*features, *declared]
     for subject, restrictions in declared.items():
@@ -138,12 +137,10 @@ def suggestion(part: type, *, when: When, cost: str, instead: str) -> None:
 
 
 def gain(part: type, *, when: When, cause: str, cure: str) -> None:
-    """Declare a likely cause of a spurious energy gain, with its fix."""
     _rules.setdefault(("gain", part), []).append((when, "", cause, cure))
 
 
 def advice(kind: str, part: Any, owner: Any, scene: Any) -> Iterator[Advice]:
-    """Yield the advice about a part (or a field, which is a class)."""
     for one in (part if isinstance(part, type) else type(part)).__mro__:
         for when, *words in _rules.get((kind, one), ()):
             result = when(part, scene)

@@ -206,7 +206,6 @@ def remade(
 
 @contextmanager
 def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]) -> Iterator[None]:
-    """Add the current form to errors about lines of an older Karamelo."""
     try:
         yield
     except ScriptError as error:
@@ -291,7 +290,6 @@ def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | 
 
 
 def _joined(expected: list[Parameter]) -> str:
-    """Write the syntax ``a, b[, c[, d]][, e=...]``."""
     text, open_brackets = "", 0
     for parameter in expected:
         comma = ", " if text else ""

@@ -216,7 +216,6 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names for `particle`, then groups and solids."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -224,7 +223,6 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """True if an output uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 

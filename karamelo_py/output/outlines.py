@@ -126,7 +126,6 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Depths on a lattice tightly around the surface; None without one."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -160,7 +159,6 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Lines (m, 3) on the surface, except on planes that cut it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(ends[0], ends[1], BETWEEN + 2)

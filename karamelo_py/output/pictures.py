@@ -498,7 +498,6 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Mask points that are not hidden completely."""
         # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5

@@ -71,7 +71,6 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Return the number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()

@@ -37,7 +37,6 @@ class Rhythmic:
         raise NotImplementedError
 
     def take_part(self) -> None:
-        """Write on a rank other than 0."""
         self.write()
 
     def finish(self) -> None:

@@ -117,7 +117,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Complete plots, dumps and log of an aborted run; errors become warnings."""
+        """Complete the outputs of an aborted run; errors become warnings."""
         if self.hub.rehearsing:
             return
         try:

@@ -87,7 +87,7 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
 
 
 def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
-    """Add id, type and x, y, z from LAMMPS's unwrapped (xu) or scaled (xs) columns."""
+    """Add id, type and x, y, z from LAMMPS's columns."""
     count = len(next(iter(columns.values()), ()))
     columns.setdefault("id", np.arange(1.0, count + 1))
     columns.setdefault("type", np.ones(count))

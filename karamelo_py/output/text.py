@@ -152,10 +152,7 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Nine digits of x > 0 as an integer (0 if undecided), and its power of ten.
-
-    `binary`: the power of two.
-    """
+    """Nine digits of x > 0 as an integer (0 if undecided), and its power of ten."""
     exponent = binary * 315653 >> 20  # log10(2) * 2^20
     exponent += x >= POWERS[index(exponent + 1 - FIRST), 0]
     k = DIGITS - 1 - exponent
@@ -172,7 +169,6 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """The eight digits of n < 10^8, by halves, quarters and eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

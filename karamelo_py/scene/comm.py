@@ -98,7 +98,6 @@ class SerialComm:
         return self.scatter(None if gathered is None else make(gathered))
 
     def gather_rows(self, rows: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
-        """Concatenate into `out` of rank 0."""
         assert out is not None
         out[:] = rows
 

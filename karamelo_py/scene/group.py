@@ -181,7 +181,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """Refuse a group that looks like a wall at an upper edge but lies past it."""
+        """Refuse a group that looks like a wall past an upper edge."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return

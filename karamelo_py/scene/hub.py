@@ -150,7 +150,6 @@ class Update:
 
     @property
     def words_of_state(self) -> str:
-        """State in words, without the scheme, as any scheme can continue it."""
         method = registry.name_of("method", type(self.method))
         transfer = _with_numbers(registry.name_of("transfer", type(self.transfer)), self.transfer)
         return f"{method} {transfer} {_with_numbers(self.method.basis_name, self.method.basis)}"
@@ -314,7 +313,6 @@ class Hub:
             self.console.warn(text)
 
     def rehearse(self) -> None:
-        """Try the rest of the script once, before the first expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
             other = self.rehearsal() if self.interpreter.has_more else self

@@ -89,7 +89,6 @@ def _formulas_in(value: Any) -> Iterator[Expression]:
 
 
 def moved(hub: Scene) -> dict[Any, "Fix"]:
-    """Return the fix of each rigid solid that moves by the forces on it."""
     return {fix.moves: fix for fix in hub.fixes.values() if fix.moves is not None}
 
 
@@ -159,7 +158,6 @@ class Fix(Publisher):
 
     @property
     def of_bodies(self) -> bool:
-        """True if it moves, touches or links rigid bodies."""
         return self.moves is not None or self.touches is not None or self.links
 
     @property
@@ -187,7 +185,7 @@ class Fix(Publisher):
         """Called when the fix has its ID."""
 
     def deleted(self) -> None:
-        """Called before the fix is deleted; raises if other fixes need it."""
+        """Raises ScriptError if other fixes need it."""
 
     def seconds(self) -> float:
         """Estimated core seconds per step, for ``check``."""

@@ -244,7 +244,7 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Lower bound of the number of points, by a sample that grows until it decides on `most`."""
+    """Lower bound of the number of points, by a growing sample."""
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
     places, inside, whole = 0, 0, math.prod((size / spacing).tolist())

@@ -50,7 +50,6 @@ class Region(Named):
 
     @property
     def tolerance(self) -> float:
-        """Round-off allowed outside a face."""
         return self.domain.tolerance
 
     @property
@@ -63,7 +62,6 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
-        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
@@ -73,7 +71,6 @@ class Region(Named):
 
     @property
     def flat(self) -> bool:
-        """True if some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property

@@ -35,7 +35,7 @@ class Raster(NamedTuple):
 
 
 def read_raster(path: Path) -> Raster:
-    """Read a raster; ScriptError for a wrong header, size or number."""
+    """Raises ScriptError for a wrong header, size or number."""
     if path.suffix.lower() in GEOTIFF:
         return _of_geotiff(path)
     words, head = read_text(path).split(), {}
@@ -87,7 +87,7 @@ def _of_geotiff(path: Path) -> Raster:
 
 
 def read_profile(path: Path) -> np.ndarray:
-    """Read positions and heights (n, 2), along increasing positions."""
+    """Return positions, ascending, and heights (n, 2)."""
     profile = np.column_stack([*read_table(path).values()][:2])
     if profile.shape[1] < 2 or len(profile) < 2 or (np.diff(profile[:, 0]) <= 0).any():
         raise ScriptError(
@@ -124,6 +124,5 @@ def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.n
 
 
 def _halves(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
-    """Divide quadrilaterals (..., 3) along a-c."""
     flat = [corner.reshape(-1, 3) for corner in (a, b, c, d)]
     return [np.stack([flat[k] for k in of], axis=1) for of in ((0, 1, 2), (0, 2, 3))]

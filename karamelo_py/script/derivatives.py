@@ -17,14 +17,12 @@ def plus(a: Expression, b: Expression) -> Expression:
 
 
 def times(a: Expression, b: Expression) -> Expression:
-    """Multiply; 0 and 1 are omitted."""
     if is_number(a, 0) or is_number(b, 0):
         return ZERO
     return b if is_number(a, 1) else a if is_number(b, 1) else applied("*", a, b)
 
 
 def to_power(base: Expression, exponent: float) -> Expression:
-    """Raise to a power; 0 and 1 are omitted."""
     if exponent in (0, 1):
         return base if exponent else ONE
     return applied("^", base, Expression(exponent))

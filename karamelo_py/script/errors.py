@@ -110,10 +110,6 @@ def render_message(
     cause: str = "",
     resume: str = "",
 ) -> str:
-    """Format an error or a warning for the user.
-
-    With the `code` of a run: likely cause, fix, and the command that resumes.
-    """
     physics = bool(code) and not codes().get(code, {}).get("script")
     lines = [f"{kind}: {message}"]
     if mark is not None:
@@ -192,7 +188,6 @@ def unknown(
 
 
 def nearest_few(name: str, names: Iterable[str]) -> list[str]:
-    """Return up to three names, most similar first."""
     names = list(names)
     first = nearest(name, names)
     begin = [n for n in names if len(name) > 1 and n.lower().startswith(name.lower())]
@@ -231,7 +226,6 @@ def codes() -> dict[str, dict[str, Any]]:
 
 
 def of_karamelo(name: str) -> bool:
-    """Return True for a Karamelo command, whose name no variable can have."""
     return name in table()["karamelo"].split()
 
 

@@ -36,7 +36,6 @@ class Expression:
     def __init__(
         self, value: Any, operation: str = "number", operands: tuple[Expression, ...] = ()
     ):
-        """`value` is a number, a formula, or the name of a seed."""
         if isinstance(value, Expression):
             operation, operands, value = value.operation, value.operands, value.value
         self.operation: str = operation
@@ -79,7 +78,6 @@ class Expression:
 
     @property
     def text(self) -> str:
-        """Write the formula in script syntax down to its seeds, unless too long."""
         if not terms.is_short(self):
             return f"a long formula of {', '.join(sorted(self.names)) or 'numbers'}"
         return terms.text_of(self)

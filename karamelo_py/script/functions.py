@@ -65,7 +65,6 @@ def compute(name: str, *numbers: float) -> float:
 
 
 def compute_quietly(name: str, *numbers: float) -> float:
-    """Compute as floating-point hardware does: inf or NaN for invalid operands."""
     if name == "if":
         return numbers[1] if numbers[0] != 0 else numbers[2]
     return math.nan if any(map(math.isnan, numbers)) else quietly(name, *numbers)

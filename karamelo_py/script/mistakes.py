@@ -151,7 +151,6 @@ def _stop(parser: Any, code: str) -> _Stop:
 
 
 def in_expression(parser: Any, code: str) -> Mistake:
-    """Explain the mistake in `code`, which Lark's `parser` refuses."""
     at = _stop(parser, code)
     if at.here is None:
         return _at_end(at)

@@ -153,7 +153,6 @@ def of_one(op, a):
 @implements(of_one)
 @noinline
 def _function_of(op, a):
-    """Apply a function by one chain of branches, to save code."""
     for number, do in _NUMBERED_UNARY:
         if op == number:
             return do(a)

@@ -67,7 +67,6 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 
 @lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
-    """Parse an expression; offsets count from the start of `code`."""
     word = code.strip()
     # Fast path: most arguments are one name or number.
     start = code.index(word)

@@ -44,7 +44,7 @@ Tree = TypeVar("Tree", bound=Term)
 
 
 def in_order(root: Tree) -> list[Tree]:
-    """List `root` and the terms below it once each, operands first."""
+    """List terms once each, operands first."""
     ordered: dict[int, Tree] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -179,7 +179,6 @@ class _Writer:
         return all(self.uniform[operand] for operand in operands)
 
     def _chosen(self) -> set[int]:
-        """Choose terms with several users, or too deep for the stack."""
         kept = {k for k, (_, below, _) in enumerate(self.terms) if below and self.uses[k] > 1}
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):

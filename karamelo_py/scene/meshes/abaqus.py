@@ -103,7 +103,6 @@ def _spherical(x: np.ndarray) -> np.ndarray:
 
 
 def _system(keyword: DeckKeyword) -> Callable[[np.ndarray], np.ndarray]:
-    """Map from local coordinates by origin, a point on the x axis, and one in the x-y plane."""
     if not keyword.lines:
         return lambda x: x
     points = table_of(keyword, 3, 6)
@@ -327,5 +326,5 @@ _READ: dict[str, Callable[[_Deck, DeckKeyword], None]] = {
 
 
 def read_deck(path: Path) -> Mesh:
-    """Read a deck; ScriptError names the line that cannot be read."""
+    """Raises ScriptError with the line that cannot be read."""
     return _Deck(path).mesh()

@@ -26,7 +26,6 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
-    """Open a model; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -105,7 +104,6 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """Read a mesh; Gmsh's errors become ValueError."""
     with alone(path, "" if path.suffix.lower() in READS else ".msh") as link:
         try:
             with _model(link) as gmsh:

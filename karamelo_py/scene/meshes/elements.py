@@ -144,7 +144,6 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates; of the corners only if those of other nodes are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -266,7 +265,6 @@ def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.n
 
 @lru_cache
 def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (q,), shape functions (q, c) and slopes (q, c, d) at Gauss points."""
     shape = SHAPES[name]
     exponents = _exponents(name, len(reference))
     order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with merged corners
@@ -291,7 +289,6 @@ def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (q, c) of nodes at `reference`, and slopes (q, c, d), at `points`."""
     if name == "pyramid":
         return _of_pyramids(points)
     exponents, inverse = _coefficients(name, reference)

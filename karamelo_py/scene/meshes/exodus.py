@@ -38,7 +38,6 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
-    """Arrays and element types by name, of netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:
@@ -63,7 +62,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Read blocks, side sets and node sets; KeyError or OSError for other files."""
+    """Raises KeyError or OSError for other files."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

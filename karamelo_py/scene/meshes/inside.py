@@ -153,7 +153,6 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Merge equal vertices; ScriptError if the surface is open."""
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -191,7 +190,6 @@ def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Drop repeated triangles, and all of them where two shells touch."""
     same = np.sort(triangles, axis=1)
     order = np.lexsort(same.T)
     begin = np.flatnonzero(np.r_[True, (np.diff(same[order], axis=0) != 0).any(axis=1)])
@@ -231,7 +229,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number shells by common edges (3 m,); if not `sided`, by edges of two triangles."""
+    """Number shells by edges of two triangles, if `sided` of any."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

@@ -113,7 +113,6 @@ def _elements(part: DeckPart, keyword: DeckKeyword) -> None:
 
 
 def _part(part: DeckPart, keyword: DeckKeyword, names: dict[str, str]) -> None:
-    """Store titles of parts; parts with more cards have a keyword each."""
     step = 2 if keyword.name == "PART" else len(keyword.lines)
     for title, line in zip(keyword.lines[::step], keyword.lines[1::step], strict=False):
         number = line.split(",")[0] if "," in line else line[:10]
@@ -149,7 +148,7 @@ def _set(part: DeckPart, keyword: DeckKeyword, match: re.Match) -> None:
 
 
 def read_lsdyna(path: Path) -> Mesh:
-    """Read a deck; ScriptError names the line that cannot be read."""
+    """Raises ScriptError with the line that cannot be read."""
     part, titles = DeckPart(), dict[str, str]()
     for keyword in _keywords(path):
         match = _SET.fullmatch(keyword.name)

@@ -140,7 +140,6 @@ class _Systems:
     def places(
         self, entry: _Entry, number: int, x: np.ndarray, above: tuple[int, ...] = ()
     ) -> np.ndarray:
-        """Positions (n, 3) in the basic system of coordinates `x` in a system."""
         number = self.default if number < 0 else number
         if not number:
             return x
@@ -170,7 +169,7 @@ class _Systems:
 
 
 def read_nastran(path: Path) -> Mesh:
-    """Read bulk data; ScriptError names the line that cannot be read."""
+    """Raises ScriptError with the line that cannot be read."""
     part, systems = DeckPart(), _Systems()
     elements: dict[tuple[str, str], list[list[int]]] = defaultdict(list)
     for entry in _entries(path):

@@ -192,7 +192,7 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _skip_close(file: Any, depth: int) -> None:
-    """Skip to the closing bracket; meshio's function never ends without one."""
+    """meshio's function never ends without a bracket."""
     while depth > 0:
         letter = file.read(1)
         if not letter:
@@ -278,7 +278,6 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
-    """An exception as one line; meshio hides that no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
