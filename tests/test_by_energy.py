@@ -654,8 +654,8 @@ def test_laws_with_fibres_are_not_wrapped(run_interpreted):
     script = (
         "method(tlmpm, FLIP, linear, 1)\ndimension(2, 0, 1, 0, 1, 0.5)\n"
         "material(m, hyperelastic, 1, (I1 - 3 - 2*log(J)) + (J - 1)^2 + (I4 - 1)^2, "
-        "fibre=(1, 1, 0))\nmaterial(w, {}, m, 2, 1)\n"
+        "fibre=(1, 1, 0))\n{}\n"
     )
-    for wrapper in ("mullins", "viscoelastic"):
+    for wrapper in ("material(w, mullins, m, 2, 1)", "viscosity(prony, m, g=0.2, tau=1)"):
         err = run_interpreted(script.format(wrapper), status=1).err
         assert "is no isotropic elastic solid" in err

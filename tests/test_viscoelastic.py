@@ -1,4 +1,4 @@
-"""Material viscoelastic: closed forms of linear viscoelasticity (Christensen 1982; Ferry 1980)."""
+"""Viscosity: closed forms of linear viscoelasticity (Christensen 1982; Ferry 1980)."""
 
 import re
 from math import erf, exp, log, pi, sqrt
@@ -16,6 +16,7 @@ from karamelo_py.points.laws.hencky import HenckyConstants
 from karamelo_py.points.laws.linear import LinearConstants
 from karamelo_py.points.laws.mullins import Mullins, distortional_energy
 from karamelo_py.points.laws.neo_hookean import NeoHookeanConstants
+from karamelo_py.points.laws.newtonian import Newtonian
 from karamelo_py.points.laws.thin import Thin
 from karamelo_py.points.laws.viscoelastic import Viscoelastic, Wlf
 
@@ -23,7 +24,8 @@ SPACE, G = Space(), 1e6 / 2.8
 TERMS = ((0.3, 0.01), (0.2, 1.0))
 RUBBER = """\
 material(rubber, neo-hookean, 1000, 1e6, 0.4)
-material(damper, viscoelastic, rubber, 0.3, 0.01, 0.2, 1)
+material(damper, neo-hookean, 1000, 1e6, 0.4)
+viscosity(prony, damper, g=(0.3, 0.2), tau=(0.01, 1))
 """
 
 
@@ -32,8 +34,13 @@ class Elastic(Named):
         self.whole = law
 
 
+def relaxing(elastic, *terms, wlf=None):
+    g, tau = zip(*terms, strict=True)
+    return Viscoelastic.given(Elastic(elastic), g=g, tau=tau, wlf=wlf)
+
+
 def damper(kind=NeoHookeanConstants):
-    return Viscoelastic.given(Elastic(kind(1000, 1e6, 0.4).checked()), *sum(TERMS, ()))
+    return relaxing(kind(1000, 1e6, 0.4).checked(), *TERMS)
 
 
 def relaxation(t):
@@ -87,11 +94,11 @@ def test_a_cycle_of_stiffening_rubber_dissipates_its_work(run_interpreted):
     """After a stretch to three times the length and full relaxation nothing is stored."""
     script = """
     material(y, yeoh, 1100, 2e7, 5e5, -1e4, 2e3)
-    material(v, viscoelastic, y, 0.3, 0.5)
+    viscosity(prony, y, g=0.3, tau=0.5)
     load_path(pull, 50, exx=1.1, syy=0, szz=0)
     load_path(back, 50, exx=0, syy=0, szz=0)
     load_path(rest, 50, sxx=0, syy=0, szz=0, duration=10)
-    element(e, v, pull, back, rest)"""
+    element(e, y, pull, back, rest)"""
     folder = run_interpreted(script).folder
     d = np.genfromtxt(folder / "element_e.txt", names=True)
     assert d["dissipated"][-1] == pytest.approx(d["work"][-1], rel=0.08)
@@ -103,8 +110,8 @@ def test_a_cycle_of_stiffening_rubber_dissipates_its_work(run_interpreted):
 def test_shear_creeps_under_constant_stress(run_interpreted):
     """gamma = s/G (1/(1-g) - g/(1-g) exp(-(1-g) t/tau))."""
     script = """
-        material(rubber, neo-hookean, 1000, 1e6, 0.4)
-        material(damper, viscoelastic, rubber, 0.4, 2)
+        material(damper, neo-hookean, 1000, 1e6, 0.4)
+        viscosity(prony, damper, g=0.4, tau=2)
         load_path(pull, 1, sxy=1, duration=1e-9)
         load_path(hold, 40, sxy=1, duration=5)
         element(r, damper, pull, hold)
@@ -117,7 +124,7 @@ def test_shear_creeps_under_constant_stress(run_interpreted):
 @pytest.mark.parametrize("x", [1e-6, 0.009, 0.011, 0.5, 1e4])
 def test_the_tangent_of_a_step_is_the_mean_modulus_over_it(x):
     """G (1 - g (1 - (1 - exp(-x))/x)) for a step of x relaxation times."""
-    law = Viscoelastic.given(Elastic(NeoHookeanConstants(1000, 1e6, 0.4).checked()), 0.4, 2.0)
+    law = relaxing(NeoHookeanConstants(1000, 1e6, 0.4).checked(), (0.4, 2.0))
     found = stress(law, sheared(law, laws.initial_state(law, SPACE, 1.0), 1e-6, 2 * x))[3]
     assert found == pytest.approx(1e-6 * G * (1 + 0.4 * (-np.expm1(-x) / x - 1)), rel=1e-9)
 
@@ -221,10 +228,10 @@ WARM = NeoHookeanConstants(1000, 1e6, 0.4, 2000, 0.2).checked()
     "law",
     [
         Mullins(WARM, 2.0, 1e5, 0.1),
-        Viscoelastic.given(Elastic(WARM), 0.3, 0.01),
-        Viscoelastic.given(Elastic(Mullins(WARM, 2.0, 1e5, 0.1)), 0.3, 0.01),
+        relaxing(WARM, (0.3, 0.01)),
+        relaxing(Mullins(WARM, 2.0, 1e5, 0.1), (0.3, 0.01)),
     ],
-    ids=["mullins", "viscoelastic", "both"],
+    ids=["mullins", "prony", "both"],
 )
 @pytest.mark.parametrize("kin", [PlaneStrain(), Line()], ids=["plate", "bar"])
 def test_columns_of_thin_rubber_are_its_energy_and_temperature(law, kin):
@@ -241,7 +248,7 @@ def test_columns_of_thin_rubber_are_its_energy_and_temperature(law, kin):
 
 
 def test_a_bar_counts_what_softening_loses(run_interpreted):
-    script = BAR.replace("viscoelastic, rubber, 0.3, 0.005", "mullins, rubber, 2, 1e-3")
+    script = BAR.replace(PRONY, "material(damper, mullins, rubber, 2, 1e-3)")
     log = run_interpreted(script).log
     total = log["Ek"] + log["Es"] + log["Ed"]
     assert log["Ed"][-1] > 0.1 * total[0] and np.allclose(total, total[0], rtol=0.05)
@@ -270,7 +277,7 @@ def test_the_tangent_of_softened_rubber():
 def test_warm_polymers_relax_sooner():
     """By log10 a = -C1 (T - Tr)/(C2 + T - Tr) (Williams, Landel & Ferry 1955), and warm up."""
     base = NeoHookeanConstants(1000, 1e6, 0.4, 2000, 0.2).checked()
-    law = Viscoelastic.given(Elastic(base), 0.4, 2.0, wlf=Wlf(17.44, 51.6, 373.0))
+    law = relaxing(base, (0.4, 2.0), wlf=Wlf(17.44, 51.6, 373.0))
     state = laws.initial_state(law, SPACE, 1.0)
     state = laws.with_temperature(law, SPACE, state, 383.0)
     state = sheared(law, state, 1e-3, 1e-12)
@@ -282,12 +289,15 @@ def test_warm_polymers_relax_sooner():
     assert laws.temperature(law, SPACE, state) - 383 == pytest.approx(lost / 2e6, rel=1e-3)
 
 
-BAR = """
+PRONY = """material(damper, neo-hookean, 1000, 1e6, 0.4)
+    viscosity(prony, damper, g=0.3, tau=0.005)"""
+VOIGT = "viscosity(newtonian, damper, mu=500)"
+BAR = f"""
     method(tlmpm, FLIP, linear, 1)
     dimension(1, 0, 1, 1/8)
     region(all, block, 0, 1)
     material(rubber, neo-hookean, 1000, 1e6, 0.4)
-    material(damper, viscoelastic, rubber, 0.3, 0.005)
+    {PRONY}
     solid(bar, region, all, 1, damper, 1/8, 0)
     group(bar, particles, region, all, solid, bar)
     fix(v, initial_velocity_particles, bar, 0.01*cos(PI*x))
@@ -316,31 +326,93 @@ def test_a_bar_rings_down(run_interpreted):
     assert abs(drift) < 0.3 and log["Ed"][-1] > 0.2 * total[0]
 
 
+def test_a_viscous_bar_rings_down(run_interpreted):
+    """rho s^2 + pi^2 (K + 4/3 (G + mu s)) = 0 gives frequency and decay (Kelvin and Voigt)."""
+    said = run_interpreted(BAR.replace(PRONY, PRONY.split("viscosity")[0] + VOIGT))
+    log, m = said.log, 1e6 / 0.6 + 4 / 3 * G
+    s = np.roots([1000, pi**2 * 4 / 3 * 500, pi**2 * m])[0]
+    total = log["Ek"] + log["Es"]
+    assert total[-1] / total[0] == pytest.approx(exp(2 * s.real * 0.06), rel=0.06)
+    drift = float(re.search(r"energy +(\S+) %", said.out)[1])
+    assert abs(drift) < 0.5 and log["Ed"][-1] > 0.25 * total[0]
+
+
+@pytest.mark.parametrize("kin", [SPACE, PlaneStrain(), Line()], ids=["3D", "2D", "1D"])
+def test_viscous_stress_is_that_of_newton(kin):
+    """2 mu dev(D) + bulk tr(D) I above the solid's; a rotation has no strain rate; it heats."""
+    law = Newtonian.given(Elastic(WARM), 20.0, 7.0)
+    start = laws.initial_state(law, kin, 1.0)
+    D = np.diag([1.0, -0.3, 0.2][: kin.dimension] + [0.0] * (3 - kin.dimension))
+    state = laws.advance(law, kin, start, flat(kin, 1e-9 * D), 1e-9)
+    exact = 40 * (D - np.trace(D) / 3 * np.eye(3)) + 7 * np.trace(D) * np.eye(3)
+    found = np.array(laws.cauchy_stress(law, kin, state))
+    found -= np.array(laws.cauchy_stress(law.law, kin, state.solid))
+    assert np.allclose(found[:3], np.diag(exact), rtol=1e-6)
+    a, square = (80 / 3 + 7) / 1000 / 0.01, laws.wave_speed_squared(law.law, kin, start.solid)
+    damped = laws.wave_speed_squared(law._replace(cell_size=0.01), kin, start)
+    assert sqrt(damped) == pytest.approx(sqrt(square + a * a) + a, rel=1e-9)
+    lost = laws.dissipated_energy(law, kin, state)
+    assert lost == pytest.approx(1e-9 * np.sum(exact * D), rel=1e-6)
+    assert laws.temperature(law, kin, state) == pytest.approx(lost / 2e6, rel=1e-6)
+    if kin is SPACE:
+        turned = laws.advance(law, kin, state, flat(kin, rotation(np.ones(3)) - np.eye(3)), 1.0)
+        assert np.allclose(turned.viscous, 0, atol=1e-12)
+
+
+def test_metals_and_soils_become_viscous(run_interpreted):
+    """The rate of plastic shear adds 2 mu D to the flow stress; damping is in the balance."""
+    script = """
+        eos(b, linear, 8000, 1e9)
+        strength(s, plastic, 4e8, 1e6)
+        material(m, eos-strength, b, s)
+        viscosity(newtonian, m, 1e4)
+        load_path(shear, 100, exy=0.05, duration=0.01)
+        element(r, m, shear)
+    """
+    t = table(run_interpreted, script)
+    assert t["sxy"][-1] == pytest.approx(1e6 / sqrt(3) + 2e4 * 5, rel=1e-3)
+    assert t["ep"][-1] > 0.05
+    assert t["stored"][-1] + t["dissipated"][-1] == pytest.approx(t["work"][-1], rel=1e-2)
+
+
 def test_relaxation_below_the_step_is_reported(run_interpreted):
-    said = run_interpreted(BAR.replace("0.3, 0.005", "0.3, 1e-7").replace("0.06)", "1e-3)"))
-    assert "relaxation time below the time step" in said.err
+    text = BAR.replace("g=0.3, tau=0.005", "g=(0.3, 0.2), tau=(1, 1e-7)").replace("0.06)", "1e-3)")
+    err = run_interpreted(text).err
+    assert "the relaxation time 1e-07 of material 'damper' is below the time step" in err
+    line = next(line for line in text.splitlines() if "1e-7" in line)
+    assert f":7:{line.strip().index('1e-7') + 1}: warning" in err
 
 
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("rubber", "pairs of g and tau"),
-        ("rubber, 0.3", "pairs of g and tau"),
-        ("rubber, 1.3, 1", "sum to 1.3"),
-        ("rubber, 0.3, 0", "above 0"),
-        ("rubber, 0.6, 1, 0.4, 2", "no stiffness would remain"),
-        ("wood, 0.3, 1", "no isotropic elastic solid"),
-        ("damper, 0.3, 1", "no isotropic elastic solid"),
-        ("nothing, 0.3, 1", "unknown material"),
-        ("rubber, 0.3, 1, wlf=(17, 52, 300)", "no temperature that could shift times"),
-        ("warm, 0.3, 1, wlf=(17, 52)", "'(17, 52)' is no shift"),
-        ("warm, 0.3, 1, wlf=(17, -52, 300)", "above 0"),
+        ("prony, rubber", "g=..., tau=... are missing"),
+        ("prony, rubber, g=0.3", "tau=... is missing"),
+        ("prony, rubber, g=(0.3, 0.1), tau=1", "there are 2 fractions g and 1 times tau"),
+        ("prony, rubber, g=1.3, tau=1", "sum to 1.3"),
+        ("prony, rubber, g=(0.3, 0.2), tau=(1, 0)", "0 is not a number above 0"),
+        ("prony, rubber, g=(0.3, x), tau=(1, 2)", "x is not a number above 0"),
+        ("prony, rubber, g=(0.6, 0.4), tau=(1, 2)", "no stiffness would remain"),
+        ("prony, wood, g=0.3, tau=1", "no isotropic elastic solid"),
+        ("prony, damper, g=0.3, tau=1", "no isotropic elastic solid"),
+        ("prony, nothing, g=0.3, tau=1", "unknown material"),
+        ("prony, rubber, g=0.3, tau=1, wlf=(17, 52, 300)", "no temperature that could shift times"),
+        ("prony, warm, g=0.3, tau=1, wlf=(17, 52)", "'(17, 52)' is no shift"),
+        ("prony, warm, g=0.3, tau=1, wlf=(17, -52, 300)", "above 0"),
+        ("newtonian, rubber", "mu is missing"),
+        ("newtonian, rubber, -1", "of at least 0"),
+        ("newtonian, tool, 1", "is rigid"),
+        ("newtonian, water, 1", "is a fluid"),
+        ("newtonian, thick, 1", "has this viscosity already"),
     ],
 )
 def test_constants_that_no_body_has(run_interpreted, line, says):
     wood = "material(wood, orthotropic, 1, 9, 1, 1, 0.3, 0.3, 0.4, 1, 1, 1)\n"
     wood += "material(warm, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)\n"
-    said = run_interpreted(f"{RUBBER}{wood}material(m, viscoelastic, {line})\n", status=1).err
+    wood += "material(tool, rigid, 1)\neos(w, fluid, 1e3, 1e5, 7)\nstrength(w, fluid, 1e-3)\n"
+    wood += "material(water, eos-strength, w, w)\nmaterial(thick, neo-hookean, 1000, 1e6, 0.4)\n"
+    wood += "viscosity(newtonian, thick, 1)\n"
+    said = run_interpreted(f"{RUBBER}{wood}viscosity({line})\n", status=1).err
     assert says in said and "Traceback" not in said and "^" in said
 
 

@@ -22,6 +22,7 @@ from karamelo_py.points.laws import (
 )
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
+from karamelo_py.points.laws.viscosity import inviscid
 from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.run.body_motion import motions
 from karamelo_py.run.state import SceneState
@@ -84,7 +85,7 @@ def _deforming(hub: Hub) -> list[Tag]:
 
 
 def _flows(law: Tag) -> bool:
-    strength = parameter(law, "strength", None)
+    strength = parameter(inviscid(law), "strength", None)
     return strength is not None and (law_traits(strength).flows or not shear_modulus(strength) > 0)
 
 
@@ -206,11 +207,10 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
     law, kin = law_on(solid.material.whole, solid.h, solid.T0), simulation.kin
     viscous = not isinstance(parameter(law, "viscosity", Absent()), Absent)
     law = law._replace(viscosity=Absent()) if viscous else law
-    whole = float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
-    if not parameter(parameter(law, "strength"), "mu") > 0:
-        return sqrt(whole), viscous
-    law = law._replace(strength=law.strength._replace(mu=0.0))
-    square = float(wave_speed_squared(law, kin, initial_state(law, kin, 1.0)))
+    whole, square = (
+        float(wave_speed_squared(one, kin, initial_state(one, kin, 1.0)))
+        for one in (law, inviscid(law))
+    )
     return sqrt(square), viscous or whole > SLOWED**2 * square
 
 

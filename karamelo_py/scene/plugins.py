@@ -291,7 +291,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
         for item in of.values()
     ]
     parts += [
-        PartInUse(f"{of.kind} {item.style}", type(item.laws[of.kind]), item.mark)
+        PartInUse(f"{item.kind} {item.style}", type(item.laws[item.kind]), item.mark)
         for of in (hub.materials, *hub.parts.values())
         for item in of.values()
     ]

@@ -49,7 +49,8 @@ from karamelo_py.points.laws.temperatures import (
     initial_heat,
     thermal_pressure,
 )
-from karamelo_py.points.laws.viscosity import damped, viscous_pressure, viscous_speed
+from karamelo_py.points.laws.thermoelastic import is_warm
+from karamelo_py.points.laws.viscosity import damped, inviscid, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, unknown
 
 WARMER = 1.0, 100.0, 1000.0  # kelvin above a test point
@@ -536,6 +537,16 @@ def _wave_speed_squared_eos_strength(law, kin, state):
         return squared
     viscous = viscous_speed(law.viscosity, m.viscous[0], 1 / volume, sound(law, J, m))
     return damped(squared, viscous)
+
+
+@inviscid.on(EosStrength)
+def _inviscid_eos_strength(law):
+    return law._replace(viscosity=Absent(), strength=inviscid(law.strength))
+
+
+@is_warm.on(EosStrength)
+def _is_warm_eos_strength(law):
+    return not isinstance(law.temperature, Absent)
 
 
 @laws.shear_part.on(EosStrength)

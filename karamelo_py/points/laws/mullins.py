@@ -57,11 +57,11 @@ class Mullins(NamedTuple):
     of the elastic material, W(F) - W(J^(1/3) I), and the largest W so far, Wm (Ogden & Roxburgh
     1999, Proc. R. Soc. Lond. A 455, 2861-2877; beta: Bose et al. 2003). On loading beyond Wm, eta
     is 1. The work that unloading does not return counts as dissipated, and heats a material with a
-    temperature. Relaxation may be added: ``material(damper, viscoelastic, tyre, 0.2, 1)``.
+    temperature. Relaxation may be added: ``viscosity(prony, tyre, g=0.2, tau=1)``.
 
     See Also
     --------
-    viscoelastic, hyperelastic, yeoh, ogden
+    viscosity prony, hyperelastic, yeoh, ogden
     """
 
     in_lanes = True

@@ -1,4 +1,4 @@
-"""Material viscoelastic."""
+"""Viscosity prony: relaxation of the deviatoric stress of an elastic law."""
 
 from math import log
 from typing import Any, ClassVar, NamedTuple
@@ -25,9 +25,8 @@ from karamelo_py.points.kinematics import (
     tr,
 )  # fmt: skip
 from karamelo_py.points.laws import Absent, law_traits
-from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import Mark, ScriptError
 
 ENOUGH = 1e3  # strain increment over the round-off whose stiffness is known
 LEAST = 0.01  # stiffness over that at rest of a strain that counts
@@ -91,6 +90,25 @@ class Wlf(NamedTuple):
         return cls(*numbers)
 
 
+class Positives(tuple):
+    """Script argument: positive numbers (0.2, 0.1), and where they are in the script."""
+
+    script_kind = "a number above 0, or several such as (0.2, 0.1)"
+    marks: tuple[Mark, ...]
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        listed = argument.listed()
+        for one in listed:
+            number = one.value(hub)
+            if not (isinstance(number, float) and number > 0):
+                message = f"{one.text} is not a number above 0"
+                raise ScriptError(message, mark=one.mark, expected=cls.script_kind)
+        made = cls(one.value(hub) for one in listed)
+        made.marks = tuple(one.mark for one in listed)
+        return made
+
+
 DECADES = 30.0  # largest shift; the formula ends at T = Tr - C2
 
 
@@ -113,15 +131,16 @@ class Branch(NamedTuple):
 
 
 class Viscoelastic(NamedTuple):
-    """Elastic solid whose deviatoric stress relaxes, by a Prony series.
+    """Relaxation of the deviatoric stress of an elastic solid, by a Prony series.
 
     Parameters
     ----------
-    elastic
+    material
         ID of an isotropic elastic material: the instantaneous response.
-    pairs
-        g and tau of each term: relaxing fraction of the instantaneous shear stiffness, relaxation
-        time.
+    g
+        Relaxing fraction of the instantaneous shear stiffness, in each term.
+    tau
+        Relaxation time of each term.
     wlf
         C1, C2, Tr: a material with a temperature T relaxes in tau a, log10 a = -C1 (T - Tr)/(C2 + T
         - Tr) (Williams, Landel & Ferry 1955).
@@ -129,9 +148,9 @@ class Viscoelastic(NamedTuple):
     Example
     -------
     material(rubber, neo-hookean, 1000, 1e6, 0.4)
-    material(damper, viscoelastic, rubber, 0.3, 0.01, 0.2, 1)
-    material(warm, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)
-    material(polymer, viscoelastic, warm, 0.3, 1, wlf=(17.44, 51.6, 373))
+    viscosity(prony, rubber, g=(0.3, 0.2), tau=(0.01, 1))
+    material(polymer, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)
+    viscosity(prony, polymer, g=0.3, tau=1, wlf=(17.44, 51.6, 373))
 
     Notes
     -----
@@ -149,7 +168,7 @@ class Viscoelastic(NamedTuple):
 
     See Also
     --------
-    neo-hookean, ogden, hyperelastic, compute dissipated_energy
+    viscosity newtonian, material ogden, material mullins, compute dissipated_energy
     """
 
     in_lanes = True
@@ -158,30 +177,41 @@ class Viscoelastic(NamedTuple):
     branches: Any
     shift: Any = Absent()
 
-    syntax = "elastic, g1, tau1[, g2, tau2, ...][, wlf=(C1, C2, Tr)]"
+    syntax = "material, g=(g1, ...), tau=(tau1, ...)[, wlf=(C1, C2, Tr)]"
 
     @classmethod
-    def given(cls, elastic: ElasticMaterial, *pairs: AboveZero, wlf: Wlf | None = None):
-        if wlf and not is_warm(elastic.whole):
-            message = f"material '{elastic.id}' has no temperature that could shift times"
+    def given(
+        cls, material: ElasticMaterial, *, g: Positives, tau: Positives, wlf: Wlf | None = None
+    ) -> "Viscoelastic":
+        if wlf and not is_warm(material.whole):
+            message = f"material '{material.id}' has no temperature that could shift times"
             raise ScriptError(message, argument="wlf", expected="an elastic law with cp and kappa")
-        if not pairs or len(pairs) % 2:
-            raise ScriptError("the terms are pairs of g and tau", expected=cls.syntax)
-        if not sum(pairs[::2]) < 1:
-            message = f"the fractions g sum to {sum(pairs[::2]):g}: no stiffness would remain"
-            raise ScriptError(message, argument="pairs", expected="a sum of g below 1")
-        branches, G = Absent(), strained(elastic.whole, 1)[3]
-        for g, tau in zip(pairs[::2], pairs[1::2], strict=True):
-            branches = Branch(g, tau, 0.25 / (g * G), branches)
-        return cls(elastic.whole, branches, wlf or Absent())
+        if len(g) != len(tau):
+            message = f"there are {len(g)} fractions g and {len(tau)} times tau"
+            raise ScriptError(message, argument="tau", expected="a time for each fraction")
+        if not sum(g) < 1:
+            message = f"the fractions g sum to {sum(g):g}: no stiffness would remain"
+            raise ScriptError(message, argument="g", expected="a sum of g below 1")
+        branches, G = Absent(), strained(material.whole, 1)[3]
+        for fraction, time in zip(g, tau, strict=True):
+            branches = Branch(fraction, time, 0.25 / (fraction * G), branches)
+        return cls(material.whole, branches, wlf or Absent())
+
+
+def _too_short(branch, scene):
+    if scene.simulation.implicit or not branch.tau < scene.simulation.dt:
+        return None
+    relaxing = [one.arguments.get("tau", ()) for one in scene.hub.materials.values()]
+    times = next(times for times in relaxing if branch.tau in times)
+    return {"mark": times.marks[times.index(branch.tau)], "dt": scene.simulation.dt}
 
 
 known_failure(
     Branch,
     "short relaxation times",
-    when=lambda branch, scene: branch.tau < scene.simulation.dt and not scene.simulation.implicit,
-    reason="material '{owner.id}' has a relaxation time below the time step: that part of the "
-    "stress never acts",
+    when=_too_short,
+    reason="the relaxation time {part.tau:.4g} of material '{owner.id}' is below the time step, "
+    "{dt:.4g}: that part of the stress never acts",
     cure="leave the term out, with a softer elastic law",
 )
 

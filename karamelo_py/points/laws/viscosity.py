@@ -6,6 +6,8 @@ A part of `eos_strength` added by an equation of state; its memory is (q,), the 
 from math import sqrt
 from typing import NamedTuple
 
+from karamelo_py.compiler import point_function
+
 
 class ArtificialViscosity(NamedTuple):
     """q = rho h (Q1 h d^2 - Q2 c d) for a negative rate of volume change d."""
@@ -15,6 +17,12 @@ class ArtificialViscosity(NamedTuple):
     Q1: float
     Q2: float
     cell_size: float  # h, set when the scene is lowered
+
+
+@point_function(otherwise=True)
+def inviscid(law):
+    """Return the law without viscous terms that shorten the stable step."""
+    return law
 
 
 def artificial_viscosity(Q1: float, Q2: float) -> dict[str, NamedTuple]:

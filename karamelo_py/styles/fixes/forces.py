@@ -371,7 +371,7 @@ def refuse_following(hub: Hub, group: ParticleGroup) -> None:
             raise ScriptError(
                 f"the stress of solid '{solid.id}' follows from its deformation and cannot be set",
                 argument="group",
-                expected="linear, hill, jointed, viscoelastic, cam-clay or eos-strength (not jwl)",
+                expected="linear, hill, jointed, cam-clay or eos-strength (not jwl)",
             )
 
 

@@ -8,7 +8,7 @@ from karamelo_py.points.kinematics import dev, inner, nothing
 from karamelo_py.points.laws import LawTraits, answers, parameter, specific_volume, strengths
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
-from karamelo_py.points.laws.viscosity import damped
+from karamelo_py.points.laws.viscosity import damped, inviscid
 
 
 class Elastic(NamedTuple):
@@ -152,6 +152,11 @@ def _shear_strain_viscous(strength, kin, s):
 def _shear_response_viscous(strength, kin, step, memory, heat):
     new = 2 * strength.mu / step.dt * dev(step.strain)
     return new, memory, inner(new, step.strain)
+
+
+@inviscid.on(Viscous)
+def _inviscid_viscous(strength):
+    return strength._replace(mu=0.0)
 
 
 @strengths.damped_speed_squared.on(Viscous)

@@ -147,7 +147,7 @@ class Norton(NamedTuple):
 
     See Also
     --------
-    perzyna, formula, material viscoelastic
+    perzyna, formula, viscosity prony
     """
 
     in_lanes = True
