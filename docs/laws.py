@@ -96,7 +96,7 @@ def flyer(axes) -> None:
     axes.plot(log["Time"], log["u_x"], color=PALETTE[0])
     axes.axhline(0.4, color="0.5", ls="--", lw=1)
     axes.annotate("speed of the flyer", (0, 0.4), (0.05, 0.36), fontsize=8, color="0.3")
-    axes.set(title="Flyer and spall", xlabel="time (us)", ylabel="free surface (km/s)")
+    axes.set(title="Flyer and spall", xlabel="time (µs)", ylabel="free surface (km/s)")
 
 
 def ceramics(axes) -> None:
@@ -122,7 +122,7 @@ def pores(axes) -> None:
     p = np.linspace(0.05, 1.2, 100)
     axes.plot(p, 1 + 0.25 * ((1.2 - p) / 1.15) ** 2, color="0.5", ls="--", lw=1, label="Herrmann")
     axes.legend(fontsize=8, frameon=False)
-    axes.set(title="P-alpha", xlabel="pressure (GPa)", ylabel="distension (1)")
+    axes.set(title="P-alpha", xlabel="pressure (GPa)", ylabel="distension")
 
 
 def rubber(axes) -> None:
@@ -132,7 +132,7 @@ def rubber(axes) -> None:
         axes.plot(x, d["sxx"] * d["J"] / x, color=PALETTE[k], label=name)
         axes.plot(*np.transpose(points), "o", color=PALETTE[k], ms=4)
     axes.legend(fontsize=8, frameon=False)
-    axes.set(title="Treloar's rubber, Ogden", xlabel="stretch (1)", ylabel="nominal stress (MPa)")
+    axes.set(title="Treloar's rubber, Ogden", xlabel="stretch", ylabel="nominal stress (MPa)")
 
 
 def relaxation(axes) -> None:
@@ -142,7 +142,7 @@ def relaxation(axes) -> None:
     exact = 1 - 0.3 * (1 - np.exp(-t / 0.01)) - 0.2 * (1 - np.exp(-t))
     axes.plot(t, exact, color="0.5", ls="--", lw=1, label="Prony series")
     axes.legend(fontsize=8, frameon=False)
-    axes.set(title="Relaxation", xlabel="time (s)", ylabel="stress / initial (1)", ylim=(0, 1.05))
+    axes.set(title="Relaxation", xlabel="time (s)", ylabel="stress / initial", ylim=(0, 1.05))
 
 
 def moduli(axes) -> None:
@@ -166,7 +166,7 @@ def moduli(axes) -> None:
     axes.plot(w, stored, "o", color=PALETTE[0], ms=4)
     axes.plot(w, lost, "o", color=PALETTE[1], ms=4)
     axes.legend(fontsize=8, frameon=False)
-    axes.set(title="Moduli of the series", xlabel="frequency (rad/s)", ylabel="modulus / G (1)")
+    axes.set(title="Moduli of the series", xlabel="frequency (rad/s)", ylabel="modulus / G")
     axes.set_xscale("log")
 
 
@@ -180,7 +180,7 @@ def strip(axes) -> None:
     exact = 1e3 * d["sxx"] / np.cumprod(np.append(1, 1 + np.diff(d["exx"])))
     axes.plot(np.exp(d["exx"]), exact, color="0.5", ls="--", lw=1, label="one element")
     axes.legend(fontsize=8, frameon=False)
-    axes.set(title="Strip with fibres", xlabel="stretch (1)", ylabel="force (mN)")
+    axes.set(title="Strip with fibres", xlabel="stretch", ylabel="force (mN)")
 
 
 def main() -> None:

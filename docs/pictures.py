@@ -62,10 +62,10 @@ def main() -> None:
         column[name] = tuple(map(list, zip(*found, strict=True)))
     panel(left, square)
     panel(right, column)
-    left.set(title="Pulsating square, G = 0.1", xlabel="cells / side (1)")
-    left.set(ylabel="relative error of the displacement (1)")
-    right.set(title="Column under its own weight", xlabel="cells / height (1)")
-    right.set(ylabel="mean error of the stress / (rho g l0) (1)")
+    left.set(title="Pulsating square, G = 0.1", xlabel="cells / side")
+    left.set(ylabel="relative error of the displacement")
+    right.set(title="Column under its own weight", xlabel="cells / height")
+    right.set(ylabel="mean error of the stress / (rho g l0)")
     savefig(figure, DOCS / "_static" / "convergence.png")
 
 

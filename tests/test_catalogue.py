@@ -4,8 +4,9 @@ import pytest
 
 import karamelo_py
 from karamelo_py.app import catalogue
-from karamelo_py.app.cli import main
+from karamelo_py.app.cli import COMMANDS, main
 from karamelo_py.language import registry
+from karamelo_py.script.errors import table
 
 
 def call(capsys, *arguments):
@@ -129,6 +130,11 @@ def test_help_finds_styles_by_a_word(capsys, word, listed):
         (["strength", "reduction"], "command modify"),
         (["random", "variables"], "karamelo-py sensitivity"),
         (["parameter", "study"], "karamelo-py sweep"),
+        (["prescribed", "displacement"], "fix velocity_nodes"),
+        (["save", "restart"], "command restart"),
+        (["poisson"], "material linear"),
+        (["gravity"], "fix body_force"),
+        (["factor", "of", "safety"], "karamelo-py find"),
     ],
 )
 def test_several_words_need_no_quotes(capsys, words, listed):
@@ -184,11 +190,28 @@ def test_a_broken_plug_in_is_listed_as_such(capsys, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("asked", "said"),
-    [("umat", "class in Python")],
+    [
+        ("umat", "class in Python"),
+        ("mass scaling", "raise the density"),
+        ("hourglass", "two points per cell"),
+        ("loop", "karamelo-py sweep"),
+    ],
 )
 def test_help_says_what_is_missing(capsys, asked, said):
     assert main(["help", asked]) == 0
     assert said in capsys.readouterr().out
+
+
+def test_answers_of_help_name_what_there_is():
+    """A target of the table is a command, a style or a subcommand."""
+    targets = [target.split() for key in table()["first"] for target in key.split(", ")]
+    known = {(family, name) for family in registry.families() for name in registry.names(family)}
+    known |= {("karamelo-py", name) for name in COMMANDS}
+    assert not [target for target in targets if tuple(target) not in known]
+    asked = [
+        word for key in ("first", "answers") for words in table()[key].values() for word in words
+    ]
+    assert len(asked) == len(set(asked))
 
 
 def test_help_takes_commands_of_other_programs(capsys):

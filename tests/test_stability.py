@@ -142,7 +142,7 @@ def test_what_limits_the_step_stands_in_the_map(folder):
     # In the total frame the program takes 0.9 of the stable step of itself, at rest and after.
     assert list(table["own_dt"]) == pytest.approx(list(0.9 * table["stable_dt"]), rel=1e-4)
     said = (folder / "map.svg").read_text(encoding="utf-8")
-    assert "(light_nodes)" in said and "the program's own" in said
+    assert "(light_nodes)" in said and "step of the program" in said
     (folder / "in.bar").write_text(SCRIPT, encoding="utf-8")
     assert main(["stability", "in.bar", *words]) == 0
     assert pandas.read_csv(folder / "map.csv")["limit"].isna().all()

@@ -15,6 +15,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.script.errors import ScriptError, codes, instead, meant, table
 
 COMMAND = "command"
+PROGRAM = "karamelo-py"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
 _WIDEST = 88  # characters per line
@@ -91,30 +92,29 @@ def print_help(
         return print_styles([name])
     if name in codes():
         return _explain_code(name, codes()[name]["title"], codes()[name]["text"])
+    for answer in (text for text, alike in table()["answers"].items() if name.lower() in alike):
+        return _explain_code(name, answer, "")
+    for targets in (text for text, alike in table()["first"].items() if name.lower() in alike):
+        named = [target.split() for target in targets.split(", ")]
+        return _list(f"Commands about {name}", named, manuals())
     fewer = [" ".join(words[:k] + words[k + 1 :]) for k in range(len(words) * (len(words) > 2))]
     said = next(filter(_about, [name, *fewer]), name)
     arguments, related = _arguments(name), _about(said)
     failures = [words for _, *words in rules.known_failures() if rules.code_of(words[0]) == name]
     for about, reason, cure in failures[:1]:
         _explain_code(name, f"known failure: {about}", f"{reason}.\n\nFix: {cure}")
-    programs, page, seeks = _subcommands(said, manuals()), _Page(), _patterns(said)
+    programs, seeks = manuals(), _patterns(said)
     first = [(f, n) for f, n in related if all(s.search(f"{n} {_summary(f, n)[0]}") for s in seeks)]
     if arguments and first:
-        page.say(f"Commands about {said}", "bold")
-        page.rows([(f"{family} {style}", family, style) for family, style in first])
-        page.say()
+        _list(f"Commands about {said}", first, programs)
+        _Page().say()
         related = [one for one in related if one not in first]
     if arguments:
         _explain_argument(name, arguments)
-    if related or programs:
-        page.say("\nSee also" if arguments or failures else f"Commands about {said}", "bold")
-        page.rows([(f"{family} {style}", family, style) for family, style in related])
-        for program, summary in programs.items():
-            page.say(f"  karamelo-py {program}  {summary}")
-    if arguments or related or programs or failures:
-        return 0
-    if absent := next((text for word, text in table()["missing"].items() if word in name), None):
-        _Page().paragraph(f"{name}: {absent}. The page 'What it cannot do' has more.")
+    if related := [*related, *_subcommands(said, programs)]:
+        known = arguments or failures
+        _list("\nSee also" if known else f"Commands about {said}", related, programs)
+    if arguments or related or failures:
         return 0
     if len(words) > 1 and meant(words[0], families()):
         raise _unknown("family", words[0], families())
@@ -122,10 +122,19 @@ def print_help(
     raise _unknown("command or style", name, names.union(commands))
 
 
+def _list(title: str, named: Iterable[Sequence[str]], manuals: Mapping[str, tuple]) -> int:
+    page = _Page()
+    page.say(title, "bold")
+    page.rows([(f"{family} {name}", family, name) for family, name in named if family != PROGRAM])
+    for name in (name for family, name in named if family == PROGRAM):
+        page.say(f"  {PROGRAM} {name}  {manuals[name][0]}")
+    return 0
+
+
 def _explain_code(code: str, title: str, text: str) -> int:
     page = _Page()
     page.say(code, "bold")
-    page.paragraph(f"{title}\n\n{text}")
+    page.paragraph(f"{title}\n\n{text}".strip())
     return 0
 
 
@@ -222,13 +231,11 @@ def _patterns(word: str) -> list[re.Pattern]:
     return [re.compile(rf"(?<![^\W_]){term}", re.IGNORECASE) for term in sought]
 
 
-def _subcommands(word: str, manuals: Mapping[str, tuple[str, str]]) -> dict[str, str]:
+def _subcommands(word: str, manuals: Mapping[str, tuple[str, str]]) -> Iterable[tuple[str, str]]:
     begins = _patterns(word)
-    return {
-        name: summary
-        for name, (summary, text) in manuals.items()
-        if all(each.search(f"{name} {text}") for each in begins)
-    }
+    for name, (_, text) in manuals.items():
+        if all(each.search(f"{name} {text}") for each in begins):
+            yield PROGRAM, name
 
 
 def _arguments(word: str) -> dict[str, Parameter]:

@@ -159,13 +159,13 @@ class Frames:
         from PIL import Image
 
         first, *others = (Image.open(BytesIO(frame)) for frame in self._frames)
+        hundredths = max(2, round(100 / self.fps))  # below 2, viewers slow down
         first.save(
             file,
             format="GIF",
             save_all=True,
             append_images=others,
-            # In 1/100 s; below two of them, viewers slow down.
-            duration=max(20, 10 * round(100 / self.fps)),
+            duration=10 * hundredths,
             loop=0,
         )
 

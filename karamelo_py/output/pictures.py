@@ -351,15 +351,9 @@ def _power(value: float, _: object = None) -> str:
 
 def _arrows(shown: ScalarMappable, of_bar: Transform) -> list[Polygon]:
     looks = {"transform": of_bar, "clip_on": False, "edgecolor": "black", "linewidth": 0.8}
-    return [
-        Polygon(
-            [(0, end), (0.5, end + 0.06 * way), (1, end)],
-            facecolor=shown.get_cmap()(float(end)),
-            visible=False,
-            **looks,
-        )
-        for end, way in ((0, -1), (1, 1))
-    ]
+    ends = [(end, [(0, end), (0.5, end + 0.06 * way), (1, end)]) for end, way in ((0, -1), (1, 1))]
+    colours = shown.get_cmap()
+    return [Polygon(xy, visible=False, fc=colours(float(end)), **looks) for end, xy in ends]
 
 
 class PlanePicture(Picture):
@@ -378,12 +372,10 @@ class PlanePicture(Picture):
         if not self.options.solids:
             shown = ScalarMappable(self.norm, self.options.cmap)
             bar = self.figure.colorbar(
-                shown,
-                ax=self.axes,
-                shrink=0.8,
+                shown, ax=self.axes, shrink=0.8,
                 ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # whole decades
                 format=FuncFormatter(_power if self.options.log else _number),
-            )
+            )  # fmt: skip
             bar.set_label(self.options.label, fontsize=self.options.fontsize)
             bar.ax.tick_params(labelsize=self.small)
             self.scale = bar.ax.yaxis

@@ -75,7 +75,6 @@ def add_options(parser: ArgumentParser) -> None:
     add_axes(parser)
     parser.add_argument("-log", default="log.mpm", metavar="FILE", help="log of -curve (log.mpm)")
     parser.add_argument("-where", action="append", default=[], help="draw only these rows")
-    parser.add_argument("-title", help="title (the first sentence of the script)")
     parser.add_argument("-o", type=Path, help="the picture or page: " + ", ".join(SUFFIXES))
 
 

@@ -305,7 +305,7 @@ def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair]
     for row in rows:
         cases.setdefault(tuple(row[n] for n in others), {})[row[name]] = row
     differing = [n for k, n in enumerate(others) if len({case[k] for case in cases}) > 1]
-    scene = Path(table.made.get("script", table.path)).name
+    scene = Path(table.made.get("script", table.path)).name.removeprefix("in.").replace("_", " ")
     compared = []
     for case, two in cases.items():
         if len(two) < 2:

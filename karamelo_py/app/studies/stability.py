@@ -133,7 +133,9 @@ def run(options: Namespace) -> int:
     finally:
         if chart.results:
             records.write(table, chart.rows())
-            chart.draw(out, variables.title_of(options.script), words)
+            fixed = [f"{name} = {given[0]}" for name, given in values.items() if len(given) == 1]
+            title = options.title or ", ".join([variables.title_of(options.script), *fixed])
+            chart.draw(out, title, words)
     chart.tell()
     searched = [n for n, words in zip(chart.shape, apart, strict=True) if not words]
     width = unseen(searched, options.stride)
@@ -380,8 +382,8 @@ class Map:
             for reason, k in numbers.items()
         ]  # fmt: skip
         names = dict.fromkeys(row["limit"] for row in self.results.values() if row["limit"])
-        limit = "the program's limit" + (f"\n({', '.join(names)})" if names else "")
-        lines = ("stable_dt", limit, "k--"), ("own_dt", "the program's own", "k:")
+        limit = "stability limit" + (f" ({', '.join(names)})" if names else "")
+        lines = ("stable_dt", limit, "k--"), ("own_dt", "step of the program", "k:")
         rows = list(pairwise(edges(y)))
         for step, label, style in lines:
             ends = [
@@ -389,18 +391,15 @@ class Map:
                 for at, row in zip(self.line(step), rows, strict=True) for up in row
             ]  # fmt: skip
             if any(at == at for at, _ in ends):
-                handles += axes.plot(
-                    *zip(*ends, strict=True), style, linewidth=1.4, label=f"first step = {label}"
-                )
-        label = "run; others inferred"
+                handles += axes.plot(*zip(*ends, strict=True), style, linewidth=1.4, label=label)
+        label = "run (cells without a dot or\nnumber are inferred)"
         handles.append(Line2D([], [], color="k", marker=".", linestyle="", label=label))
         axes.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
             fontsize=8, borderaxespad=0,
         )  # fmt: skip
         axes.set(xlabel=words[0], ylabel=words[1])
-        fixed = [f"{n} = {v[0]}" for n, v in self.values.items() if len(v) == 1]
-        axes.set_title(", ".join([title, *fixed]), loc="left", fontsize=10)
+        axes.set_title(title, loc="left", fontsize=10)
         if len(y) <= FEW:
             axes.set_yticks(y if two else [])
         for axis, at, words in zip((axes.xaxis, axes.yaxis), (x, y), self.words, strict=False):

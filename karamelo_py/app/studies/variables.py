@@ -265,6 +265,7 @@ def add_axes(parser: ArgumentParser) -> None:
         help="labels of the axes: 'time (s),F (N)'; an empty label leaves the usual one, a label "
         "with commas needs double quotes",
     )
+    parser.add_argument("-title", help="title (the first sentence of the script)")
 
 
 def along(options: Namespace, x: str, y: str) -> tuple[str, str]:
