@@ -1,4 +1,4 @@
-"""Tracing compiler: Python functions of points, numbers and arrays become kernels on LLVM.
+"""Tracing compiler from Python functions of points, numbers and arrays to kernels on LLVM.
 
 The folders `trace`, `code` and `disk` are private.
 """

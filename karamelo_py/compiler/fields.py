@@ -1,4 +1,4 @@
-"""Declared fields: data of points and nodes, each declared once by the part that owns it.
+"""Declared fields: data of points and nodes, declared by the part that owns it.
 
 A field is a NamedTuple class with one member, its array. Kernels look it up by class; its
 attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check`::
@@ -9,21 +9,21 @@ attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check
         columns = ("dose",)
 
 shape
-    function of the kinematics: the number of components (`scalar` by default, `vector`, `tensor`,
+    number of components, a function of the kinematics (`scalar` by default, `vector`, `tensor`,
     `planar`);
 kept
-    whether its values persist between steps and runs (the default);
+    whether values persist between steps and runs (default `True`);
 start
     initial value: a number (default 0), or a function of the kinematics with one number per
     component;
 summed
-    whether points contribute to this nodal field (default `False`): contributions are summed tile
-    by tile (:mod:`karamelo_py.kernels.sums`);
+    whether points add to this nodal field (default `False`), tile by tile
+    (:mod:`karamelo_py.kernels.sums`);
 columns
-    names of its components in dumps, the log, plots and pictures.
+    names of the components in dumps, the log, plots and pictures.
 
-A part names its fields in ``point_fields`` or ``node_fields``. Arrays of points have the shape
-(components, points), arrays of nodes (nodes, components).
+A part names its fields in ``point_fields`` or ``node_fields``. Point arrays have shape (components,
+points), node arrays (nodes, components).
 """
 
 import ctypes
@@ -61,7 +61,7 @@ def vector(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """Count the components of a tensor, including the hoop component."""
+    """Count the components of a tensor, hoop component included."""
     return kin.tensor_size
 
 
@@ -86,7 +86,7 @@ class Field(NamedTuple):
 
     @staticmethod
     def shown(values: np.ndarray, table: Any) -> np.ndarray:
-        """Return what the columns show (n, components), of the values in a table of points."""
+        """Return what the columns show (n, components), given values in a table of points."""
         return values
 
     @staticmethod
@@ -102,13 +102,13 @@ class StepField(Field):
 
 
 class SummedField(StepField):
-    """A nodal field to which points contribute in a step."""
+    """A nodal field that points add to in a step."""
 
     summed = True
 
 
 def name_of(kind: type) -> str:
-    """Return the class name of a field in lower case words."""
+    """Return a field's class name in lower-case words."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
@@ -147,10 +147,10 @@ def rows_of_points(
 ) -> np.ndarray:
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    No vector load crosses a line, and the dozens of rows that a visit traverses in parallel fall
-    into different cache sets; contiguous rows would collide for n = 512 or 512 000. Rows always
-    have gaps, because an array without is another type and another compilation. `room` (k,) is used
-    if long enough (`length_of_rows`).
+    So no vector load crosses a line, and the dozens of rows that a pass reads in parallel use
+    different cache sets (contiguous rows would collide for n = 512 or 512 000). Rows always have
+    gaps, since an array without them has another type and needs another compilation. `room` (k,) is
+    used if long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -221,7 +221,7 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """Return the array of the field of this class, or of one derived from it, or None."""
+    """Return the array of the field of this class, or of a derived one, or None."""
     for one in fields:
         if kind is not None and isinstance(one, kind):
             return one.array
@@ -229,7 +229,7 @@ def field(fields: tuple, kind: type) -> Any:
 
 
 def load(array, p, template):
-    """Load components 0, 1, ... of point `p`, as many as `template` has; () without an array."""
+    """Load as many components of point `p` as `template` has; () without an array."""
     if array is None:
         return ()
     if type(template) is tuple:
@@ -242,7 +242,7 @@ def store(array, p, values):
 
 
 def store_from(array, p, first, values):
-    """Set components of point `p`, starting at `first`."""
+    """Set components of point `p` from `first` on."""
     if array is not None:
         values = flat(values)
         for k in range(first, len(values)):

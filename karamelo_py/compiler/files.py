@@ -15,7 +15,7 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-# No links, no waiting for a pipe; not all systems have these flags.
+# no links, no waiting for a pipe, where the system has these flags
 _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 

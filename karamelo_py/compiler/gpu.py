@@ -74,7 +74,7 @@ def _largest(array, i, value):
 
 
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
-    """Raise a non-negative double to `value` if that is larger, atomically."""
+    """Raise a non-negative double to `value` if larger, atomically."""
     array[i] = max(array[i], value)
 
 
@@ -139,7 +139,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# functions of the C library that NVIDIA's library has too
+# functions of the C library that NVIDIA's has too
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -215,7 +215,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 class Code(NamedTuple):
     name: str
-    code: bytes  # empty if it is to be read from the disk
+    code: bytes  # empty if to be read from disk
     file: str
     needs: tuple
     modules: frozenset[str]
@@ -263,7 +263,7 @@ class _Coded:
 class Emulator(_Coded):
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
-    copies = 1  # copies of the totals that threads add to
+    copies = 1  # of the totals that threads add to
 
     def __init__(self) -> None:
         super().__init__()
@@ -291,7 +291,7 @@ class Emulator(_Coded):
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
-        """Run `count` threads; interpreted, of a Python function."""
+        """Run `count` threads of an entry, or of a Python function if interpreted."""
         if not INTERPRETED:
             entry(arguments, count)
             return
@@ -340,7 +340,7 @@ class Counted(Emulator):
 
 class Card(_Coded):
     on_card = True
-    copies = 64  # copies of the totals; neighbouring threads use different ones
+    copies = 64  # of the totals; neighbouring threads use different ones
 
     def __init__(self) -> None:
         try:
@@ -479,8 +479,7 @@ def _free_all(card: Any, rooms: dict[int, int]) -> None:
 class Images:
     """Arrays of the program with copies in device memory.
 
-    An image is a NumPy array at a device address: kernels get its description, and the program
-    never accesses its items.
+    An image is a NumPy array at a device address, which only kernels access.
     """
 
     def __init__(self, card: Any):

@@ -3,7 +3,8 @@
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
 components). Functions in ``scalarised`` of a class are called lane by lane. Each lane has the bits
-of the same operations on numbers; sums at nodes differ from sums over single points by round-off.
+of the scalar operation; only sums at nodes differ by round-off.
+
 In a tile's last group, missing lanes load the first point, and contribute nothing.
 """
 
@@ -40,9 +41,9 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM splits wider vectors, for which narrow registers are too few.
+# LLVM splits wider vectors, for which narrow registers do not suffice.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
-AHEAD = 256  # bytes of point arrays prefetched ahead
+AHEAD = 256  # bytes of point arrays to prefetch ahead
 
 
 def _largest(builder: ir.IRBuilder, lanes: Lanes, vector: ir.Value) -> ir.Value:
@@ -84,14 +85,14 @@ def _added(builder: ir.IRBuilder, lanes: Lanes, total: ir.Value, vector: ir.Valu
 
 @in_lanes(scalar_of, _added)
 def added(total: float, value: float) -> float:
-    """Add to `total`, lane after lane, as for numbers."""
+    """Add to `total` lane after lane, as for numbers."""
     return total + value
 
 
 def beside(first: int, steps: int) -> int:
     """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
+    For lanes both parts are stored, to address neighbours relative to the first nodes.
     """
     return first + steps
 
@@ -127,7 +128,7 @@ class LaneGroup(LaneType):
 
 
 class Beside(LaneType):
-    """Type of nodes in lanes, and a distance from them."""
+    """Type of nodes in lanes plus a distance."""
 
     def __init__(self, nodes: Lanes):
         self.nodes, self.width = nodes, nodes.width
@@ -364,7 +365,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # of parameters: a group mostly has one material
+        # parameters: a group mostly has one material
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

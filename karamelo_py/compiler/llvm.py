@@ -117,7 +117,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
     conversion = _conversion(kind, wanted)
     if conversion is not None:
         if conversion == "sitofp" and isinstance(of, Lanes) and kind.bitwidth > 32:
-            value = builder.trunc(value, ir.VectorType(I32, of.width))  # which every processor can
+            value = builder.trunc(value, ir.VectorType(I32, of.width))  # always convertible
         return getattr(builder, conversion)(value, to)
     if register_type(of) != to:
         raise TypeError(f"{of} is no {wanted}")

@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
 They are series after range reduction (Muller 2016, "Elementary Functions", chapter 11) with a
-relative error of about two round-off errors; for powers, times |y ln x| if that is above 1.
-Interpreted, they are Python's.
+relative error of about two round-off errors; powers, times |y ln x| if above 1. Interpreted code
+uses Python's.
 """
 
 import math
@@ -19,7 +19,7 @@ from karamelo_py.compiler.trace.values import OF_REALS, intrinsic
 
 
 def logarithm(x: float) -> float:
-    """Return the natural logarithm of a positive number, NaN for negative ones."""
+    """Return the natural logarithm, NaN for negative numbers."""
     return math.log(x) if x > 0 else (-inf if x == 0 else nan)
 
 
@@ -41,11 +41,11 @@ OF_REALS |= {power}
 
 
 class _Bits(NamedTuple):
-    """Layout of the bits of a number, or of each number in lanes."""
+    """Layout of the bits of a number, or of each lane."""
 
     number: ir.Type
     whole: ir.Type  # the same bits
-    short: ir.Type  # 32-bit integers, which every processor converts to reals
+    short: ir.Type  # 32-bit, which every processor converts to reals
     mantissa: int
     bias: int
 
@@ -91,7 +91,7 @@ def _scaled(x, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
         for exponent in (half, builder.sub(n, half)):
-            # in two steps, because results may be infinite or denormal
+            # in two steps, as results may be infinite or denormal
             e = builder.add(exponent, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
@@ -144,7 +144,7 @@ def _logarithm_near_one(x):
 
 @implements(exponential, by_type=True)
 def _exponential(x):
-    # Adding a number so large that its spacing is 1 rounds; not all targets have rounding.
+    # Adding a number with spacing 1 rounds; not all targets have rounding.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):

@@ -1,6 +1,6 @@
-"""Call of the evaluator of formulas (`karamelo_py.script.formula`) in kernels, by its address.
+"""Call of the formula evaluator (`karamelo_py.script.formula`) by address, outside kernels.
 
-A kernel would otherwise contain it. It gets whole tables: slices are slow to compile.
+It gets whole tables, as slices are slow to compile.
 """
 
 from numba import types

@@ -1,8 +1,8 @@
 """Dual numbers: a value and its derivatives, in forward mode.
 
-A point function evaluated with them returns exact derivatives, for the stress of a law its
-consistent tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the
-same bits as without derivatives. A slope that is the literal 0 writes no code.
+Point functions of dual numbers return exact derivatives; for the stress of a law, its consistent
+tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the same bits as
+without derivatives. A slope that is the literal 0 writes no code.
 """
 
 import math
@@ -18,7 +18,7 @@ from karamelo_py.compiler.trace.values import is_literal, rebuilt
 
 @algebra
 class Dual(namedtuple("Dual", "value slopes")):
-    """A number and its derivatives; slopes may be literal 0s."""
+    """A number and its derivatives, which may be literal 0s."""
 
     __slots__ = ()
     __array_ufunc__ = None  # NumPy leaves operations to these
@@ -141,7 +141,7 @@ def times(factor: Any, slope: Any) -> Any:
 
 
 def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
-    """Return the number with the slopes a x' + b y'."""
+    """Return the number with slopes a x' + b y'."""
     n = len(x.slopes) if isinstance(x, Dual) else len(y.slopes)
     slopes = []
     for s, t in zip(slopes_of(x, n), slopes_of(y, n), strict=True):
@@ -180,7 +180,7 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
 
 
 def _inverse(x):
-    """Return 1/x, or 0 for 0, where slopes are infinite."""
+    """Return 1/x, or 0 for 0."""
     return where(x > 0, 1 / where(x > 0, x, 1), 0)
 
 
@@ -224,7 +224,7 @@ def _atan2(y, x):
 def _hypot(x, y):
     a, b = value_of(x), value_of(y)
     made = math.hypot(a, b)
-    over = where(made > 0, made, 1)  # at 0 the slope is 0, as for norms
+    over = where(made > 0, made, 1)  # 0 at 0, as for norms
     return combined(made, a / over, x, b / over, y)
 
 
@@ -280,7 +280,7 @@ def _raised(x, y, made):
     """Add slopes to the power `made`; for base 0 they are 0, except for exponent 1."""
     base, exponent = value_of(x), value_of(y)
     above = base > 0
-    some = base != 0  # for negative bases the exponent must be an integer
+    some = base != 0  # negative bases need an integer exponent
     over = where(some, base, 1)
     alone = where(exponent == 1, 1, 0) if not is_literal(exponent) else int(exponent == 1)
     return combined(

@@ -1,8 +1,8 @@
-"""Parallel loops, one implementation for all kernels, which calls the loop body by address.
+"""Parallel loops: one implementation for all kernels, which calls the loop body by address.
 
-The body is a function of the address of the loop's arguments, and an index. Waking threads takes as
-long as a small loop, so a kernel with many loops is run by a *team* (`by_team`): its first thread
-executes the kernel, the rest wait for its loops. Each thread has a fixed range of indices, and
+The body is a function of the address of the loop's arguments, and an index. As waking threads takes
+as long as a small loop, a kernel with many loops is run by a *team* (`by_team`): its first thread
+executes the kernel, the others wait for its loops. Each thread has a fixed range of indices, and
 steals work from threads that make no progress.
 """
 
@@ -140,7 +140,7 @@ def _add_among(array, i, j, value):
 
 # --- threads ----------------------------------------------------------------------------------
 
-# address of the arguments, an index, and the address of the `Failure`
+# address of the arguments, index, address of the `Failure`
 _TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
 _PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
 _SHARE_OUT = [ctypes.c_int64] * 6
@@ -153,7 +153,7 @@ class _Pools(threading.local):
 
 _pools = _Pools()
 if hasattr(os, "register_at_fork"):
-    # a forked process has none of the threads
+    # a forked process has no threads
     os.register_at_fork(after_in_child=lambda: _pools.of.cache_clear())
 
 
@@ -251,18 +251,18 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 # --- teams ------------------------------------------------------------------------------------
 
 # Only the leader writes _STATE: it waits, leads, has ended. Every index is processed once: 1. A
-# ticket is the number of the loop and the indices left in a range. An index is taken by a
-# compare-and-swap of the ticket, so by one thread; tickets of other loops are never equal. 2. The
-# leader releases task, arguments and count before the tickets, and every swap continues that
-# release: a thread that takes an index has acquired the words of its loop. 3. _DONE lacks a taken
-# index until it is finished, and the leader stays in the loop until _DONE plus its own indices is
-# the count: the words do not change meanwhile, and by acquiring _DONE it sees all stores of the
-# others. 4. The leader takes the remaining indices itself: it waits for taken indices, never for a
-# thread that was preempted, woke late or left. Words, each in a separate cache line.
+# ticket has the loop's number and the indices left in a range. Indices are taken by
+# compare-and-swap of the ticket, so by one thread; tickets of different loops are never equal. 2.
+# The leader releases task, arguments and count before the tickets, and every swap continues that
+# release, so a thread that takes an index has acquired its loop's words. 3. _DONE counts finished
+# indices, and the leader stays in the loop until these and its own are all: the words do not change
+# meanwhile, and by acquiring _DONE it sees all stores of the others. 4. The leader takes the
+# remaining indices itself: it waits only for taken indices, never for a thread that was preempted,
+# woke late or left. Words, each in a separate cache line:
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses, about 0.3 ms; then sleep, because cores may be needed
+_SHORT = 8000  # pauses, about 0.3 ms; then sleep, as cores may be needed
 _APART, _LOOKS = 10, 64  # pauses between looks at another range; looks, 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
 _LEFT = (1 << 32) - 1  # mask of a ticket for the remaining indices; the upper bits are the loop
@@ -301,7 +301,7 @@ def _take_part(team, k):
             for _ in range(_APART):
                 pause(False)
         elif replaced(team + _TICKETS + 64 * owner, word, word - 1):
-            # While an index is unfinished, the loop stays the present one.
+            # The loop stays the present one while an index is unfinished.
             end = read(team + _COUNT) * (owner + 1) // size
             task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
             _call(task, arguments, end - left)

@@ -1,7 +1,7 @@
-"""The arrays of a run, as NamedTuples for kernels.
+"""Arrays of a run, as NamedTuples for kernels.
 
-n points in a block, d dimensions, N nodes, T tiles. Arrays of points are (components, n), arrays of
-nodes (N, components); optional fields are declared (:mod:`karamelo_py.compiler.fields`).
+n points in a block, d dimensions, N nodes, T tiles. Point arrays are (components, n), node arrays
+(N, components); optional fields are declared (:mod:`karamelo_py.compiler.fields`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,23 +21,23 @@ from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector
 
-# A NamedTuple, often empty, whose class selects implementations.
+# NamedTuple, often empty, whose class selects implementations
 Tag: TypeAlias = Any
-# A double or single, lanes of these, or a number with slopes.
+# double, single, lanes of these, or a number with derivatives
 Number: TypeAlias = Any
-# One index, or several in lanes.
+# one index, or several in lanes
 Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
-    sums: np.ndarray  # mass, momentum, force, scattered by the points
-    update: np.ndarray  # v* after the momentum update, v* - v
-    velocity: np.ndarray  # the velocity whose gradient deforms the points
-    fields: tuple  # declared fields, each (N, components)
+    sums: np.ndarray  # mass, momentum, force
+    update: np.ndarray  # v* after the update, v* - v
+    velocity: np.ndarray  # deforms the points
+    fields: tuple  # (N, components) each
 
 
-# First components in node records; a 3D vector takes four numbers, one register.
-MASS = 0  # in Nodes.sums
+# First components of node records; a 3D vector takes four numbers, one register.
+MASS = 0
 
 
 def of_momentum(kin):
@@ -56,7 +56,7 @@ def vector_at(kin, records, i, first, template):
     return vector(kin, row(records, i, first, (*template,)))
 
 
-# Record widths by dimension.
+# record widths by dimension
 SUMS_WIDTH = {1: 4, 2: 8, 3: 8}
 UPDATE_WIDTH = {1: 2, 2: 4, 3: 8}
 VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
@@ -65,15 +65,15 @@ VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 class Points(NamedTuple):
     """Points of one law, by tile; a location (w numbers) is position and stored domain shape."""
 
-    x: np.ndarray  # (2, w, n) locations now and after the move; `motion.now` is the index
+    x: np.ndarray  # (2, w, n) locations; `motion.now` is the present index
     home: np.ndarray | None  # (w, n) reference locations (total frame)
     v: np.ndarray  # (d, n)
     mass: np.ndarray  # (n,)
-    state: np.ndarray  # (s, n), of the law
-    material: np.ndarray  # (n,) int32, row in the table of laws
+    state: np.ndarray  # (s, n)
+    material: np.ndarray  # (n,) int32 row in the table of laws
     grid: np.ndarray  # (n,) int32
-    id: np.ndarray  # (n,) int64, from 0
-    fields: tuple  # declared fields, each (components, n)
+    id: np.ndarray  # (n,) int64
+    fields: tuple  # (components, n) each
 
 
 def known_to_laws(points):
@@ -85,7 +85,7 @@ def known_to_laws(points):
 
 
 def arrays_of(points: Points) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield (name, array); points are the last axis."""
+    """Yield (name, array), with points along the last axis."""
     for name, array in points._asdict().items():
         if name != "fields" and array is not None:
             yield name, array
@@ -100,46 +100,40 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    count: np.ndarray  # (3,) int64: occupied tiles, parts of the points, parts that other
-    #                    processes wait for
-    share: np.ndarray  # (S + 1,) int64: tiles of part k are order[share[k]:share[k + 1]]
-    order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
+    count: np.ndarray  # (3,) int64: occupied tiles, parts, parts that others await
+    share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
+    order: np.ndarray  # (T + 1,) int64: occupied tiles as visited
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
-    grid: np.ndarray  # (T + 1,) int64: its grid
-    number: np.ndarray  # (T + 1,) int64: its number
-    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes that its points may see
-    rows: np.ndarray  # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i
-    #                   ny + j) from the row's first; last < first if empty; r = 0 if boxes are not
-    #                   refined
-    buffer: np.ndarray  # (T + 1, 5) int64: range of its records in the buffers; Grid.first,
-    #                     step_x and step_y of its nodes there
-    report: np.ndarray  # (T + 1, 14): largest move, largest rate, failed point + 1; at looks also
-    #                     kinetic and stored energy, number of the solid (-1: several), mass,
-    #                     momentum, elastic energy, and this times velocity
+    grid: np.ndarray  # (T + 1,) int64
+    number: np.ndarray  # (T + 1,) int64
+    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes in reach
+    rows: np.ndarray  # (T + 1, r, 2) int16: first, last node in row i ny + j of the box, if refined
+    buffer: np.ndarray  # (T + 1, 5) int64: range in the buffers; Grid.first, step_x, step_y there
+    report: np.ndarray  # (T + 1, 14): largest move, rate, failed point + 1; energies
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """Sums of the tiles of points in dense boxes of nodes, one after another.
+    """Sums of point tiles in dense boxes of nodes, one after another.
 
-    A tile of nodes sums the boxes that reach it in a fixed order and zeros them. Its parts are
-    ranges of nodes that overlap a box, after one that clears what the first box does not cover.
+    A tile of nodes adds the boxes that reach it in a fixed order and zeros them. Its parts are
+    ranges of nodes that overlap a box, after one that clears what the first box leaves uncovered.
     Columns of a part: first node in the grid and in the box; lengths; strides in the grid and in
     the box along the first two directions; the action. With few points, the nodes are the only
     buffer.
     """
 
     nodes: Nodes
-    count: np.ndarray  # (2,) int64: parts; 1 if the nodes are the only buffer
-    first: np.ndarray  # (S + 1,) int64: rows of part k are first[k]:first[k + 1]
+    count: np.ndarray  # (2,) int64: parts; 1 if nodes are the only buffer
+    first: np.ndarray  # (S + 1,) int64: part k has rows first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
-    number: int  # index among the buffers of a scene
+    number: int  # index among the scene's buffers
 
 
 class Locations(NamedTuple):
-    """Locations of points during a sweep, each (w, n)."""
+    """Locations of points in a sweep, each (w, n)."""
 
     where: np.ndarray  # for weights
     x: np.ndarray  # before the move
@@ -148,12 +142,12 @@ class Locations(NamedTuple):
 
 class Block(NamedTuple):
     points: Points
-    laws: NamedTuple  # parameters, an array (m,) over materials each
+    laws: NamedTuple  # (m,) parameters over materials
     tiling: Tiling
 
 
 class OnGrids(NamedTuple):
-    basis: Tag  # () if the result serves all bases
+    basis: Tag  # () if any basis will do
     kin: Tag
     grids: Grid
     of: np.ndarray  # (n,) grid of each point
@@ -171,13 +165,13 @@ def matter_of(kin: Tag, block: Block) -> Matter:
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points `rows` in this order, not yet sorted."""
+    """Return the block with the points `rows` in this order, unsorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
 
 def joined_points(points: Points, parts: Sequence[Sequence[np.ndarray]]) -> Points:
-    """Return points like `points`, from `parts` with all their arrays, one after another."""
+    """Return points like `points` from `parts`, lists of all their arrays."""
     count = sum(arrays[0].shape[-1] for arrays in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype.type) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
@@ -192,23 +186,23 @@ class NoHooks(NamedTuple):
 HOOK = np.dtype([
     ("address", np.int64),
     ("stage", np.int64),
-    ("begin", np.int64),  # range of members; -1: all
+    ("begin", np.int64),  # range of members; begin -1: all
     ("end", np.int64),
     ("slot", np.int64),  # of the published total; -1: none
-    ("uses_before", np.int64),  # of the value one step earlier
-    ("uses_share", np.int64),  # of 1 / number of members with mass
-    ("holds", np.int64),  # whether it sets or bounds the velocity
-    ("uses_place", np.int64),  # whether formulas depend on position
+    ("uses_before", np.int64),  # the formulas one step earlier
+    ("uses_share", np.int64),  # 1 / number of members with mass
+    ("holds", np.int64),  # sets or bounds the velocity
+    ("uses_place", np.int64),  # formulas depend on position
     ("totals", np.int64),  # numbers published by a hook on whole points
 ])  # fmt: skip
 PROGRAM = np.dtype([
-    ("begin", np.int64),  # range of code; -1: NULL
+    ("begin", np.int64),  # range of code; begin -1: NULL
     ("end", np.int64),
     ("first", np.int64),  # range of constants
     ("last", np.int64),
 ])  # fmt: skip
-# The hook that holds a node in one direction.
-HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # slot: 1 + slot of the total; 0: none
+# The hook that holds a node along one axis
+HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # slot: 1 + slot of the total, or 0
 
 
 class Apart(NamedTuple):
@@ -217,36 +211,36 @@ class Apart(NamedTuple):
     chosen: np.ndarray  # (A, BLOCK)
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
     values: np.ndarray  # (A, ...)
-    totals: np.ndarray  # (A, rows, LIMBS), zero between two loops
-    step: np.ndarray  # (A, 1) STEP, only its entries for hooks
-    heat: np.ndarray  # (A, 1) HEAT, likewise
+    totals: np.ndarray  # (A, rows, LIMBS), zero between loops
+    step: np.ndarray  # (A, 1) STEP, entries for hooks
+    heat: np.ndarray  # (A, 1) HEAT, entries for hooks
 
 
 class Hooks(NamedTuple):
     """Compiled hooks of fixes, called by address at their stage (`kernels.hooks`)."""
 
-    evaluate: int  # address of the evaluator of formulas
+    evaluate: int  # address of the formula evaluator
     table: np.ndarray  # (k,) HOOK
     programs: np.ndarray  # (k, 4) PROGRAM: components, friction at a wall
-    members: np.ndarray  # int64: node numbers, or bits that mark points
+    members: np.ndarray  # int64: node numbers, or bits per point
     code: np.ndarray  # (c, 2) int64, of formulas
     constants: np.ndarray  # (m,) float64
-    x0: np.ndarray  # (n, d) reference positions, by id
+    x0: np.ndarray  # (n, d) reference positions by id
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
-    loads: np.ndarray  # (N, d) of this step if hooks apply forces, else (0, d)
-    rigid_fields: np.ndarray  # (F,) bool: fields of rigid solids, N/F nodes each; or (0,)
-    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
-    mode: Tag  # one thread or several
+    loads: np.ndarray  # (N, d) in this step if hooks apply forces, else (0, d)
+    rigid_fields: np.ndarray  # (F,) bool: rigid, with N/F nodes each; or (0,)
+    torques: np.ndarray  # (values,) slot of the torque of a force's slot, or 0
+    mode: Tag  # one or several threads
     apart: Apart
-    whole: tuple  # tags of hooks on whole points (`vector_hook`)
+    whole: tuple  # tags of hooks on whole points
 
 
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
-WHOLE = -1  # instead of an address: one of Hooks.whole
+WHOLE = -1  # marks one of Hooks.whole instead of an address
 
-# stages of fixes, in Karamelo's names
+# stages of fixes, named as in Karamelo
 INITIAL_INTEGRATE = 0
 POST_PARTICLES_TO_GRID = 1
 POST_UPDATE_GRID_STATE = 2
@@ -258,128 +252,127 @@ POST_HEAT_TO_GRID = 7
 SUPPLY_HEAT = 8
 POST_UPDATE_GRID_HEAT = 9
 POST_CONTACT = 10  # damping, also of contact forces
-POST_WATER_TO_GRID = 11  # accelerations of nodes, for the water in their pores
+POST_WATER_TO_GRID = 11  # accelerations of nodes, for pore water
 POST_UPDATE_GRID_ROTATION = 12
 POST_ROTATION_TO_GRID = 13
 
-# node array on which a hook acts
+# node array that a hook changes
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-# Step size (`kernels.clock`, `run.step_size`): times, lengths (`spacing`), fractions.
+# Step size (`kernels.clock`, `run.step_size`)
 STEP = np.dtype([
     ("fixed_dt", np.float64),  # set_dt, or 0
-    ("dt_factor", np.float64),  # fraction of the stable step of waves
-    ("dt_factor_moving", np.float64),  # once points have moved (`kernels.clock`)
-    ("heat_factor", np.float64),  # fraction of the stable step of conduction
+    ("dt_factor", np.float64),  # fraction of the stable step
+    ("dt_factor_moving", np.float64),  # once points have moved
+    ("heat_factor", np.float64),  # fraction of conduction's stable step
     ("end_time", np.float64),
     ("last_dt", np.float64),  # 0 at the start and after load steps
-    ("kick", np.float64),  # time that forces act, between the middles of the two steps
+    ("kick", np.float64),  # time that forces act, between mid-steps
     ("first_kick", np.float64),  # of the first step, in steps
-    ("contact_dt", np.float64),  # step for the contact stiffness (`kernels.clock`)
-    ("contact_kick", np.float64),  # time that forces would act in such steps
+    ("contact_dt", np.float64),  # sets the contact stiffness
+    ("contact_kick", np.float64),  # kick for such steps
     ("last_contact_dt", np.float64),
     ("spacing", np.float64),  # smallest cell size
-    ("courant", np.float64),  # stable step over cell size / rate
+    ("courant", np.float64),  # stable step * rate / cell size
     ("courant_moving", np.float64),  # once points have moved
     ("kept", np.float64),  # FLIP coefficient
-    ("kept_by_time", np.float64),  # per stable step if it depends on time, else 0
-    ("first_limit", np.float64),  # stable step at the start
-    ("limit", np.float64),  # stable step now
-    ("over_limit", np.int64),  # consecutive steps above the stable limit
-    ("watch_limit", np.int64),  # whether these stop the run
+    ("kept_by_time", np.float64),  # per stable step if time-dependent, else 0
+    ("first_limit", np.float64),  # initial stable step
+    ("limit", np.float64),  # stable step
+    ("over_limit", np.int64),  # consecutive steps above the limit
+    ("watch_limit", np.int64),  # 1: these stop the run
 ])  # fmt: skip
-# Motion of points (`kernels.clock`, `run.tiles`): lengths in cells, speeds per time.
+# Motion of points (`kernels.clock`, `run.tiles`): lengths in cells
 MOTION = np.dtype([
     ("rate", np.float64),  # max over points of c + max |v_i - common_i|
-    ("new_rate", np.float64),  # in the last sweep
+    ("new_rate", np.float64),  # of the last sweep
     ("common", np.float64, (1, 3)),  # reference velocity for speeds
     ("weight", np.float64),  # of the common drift; 1: `common` is 0
     ("wave", np.float64),  # wave speed when `common` was measured
-    ("speed", np.float64),  # of the fastest point, in cells per time
-    ("move", np.float64),  # largest in this step, in cells
+    ("speed", np.float64),  # of the fastest point
+    ("move", np.float64),  # largest in this step
     ("new_move", np.float64),
     ("stride", np.float64),
-    ("drift", np.float64),  # since the points were sorted, in cells
+    ("drift", np.float64),  # since points were sorted
     ("drift_limit", np.float64),
-    ("pace", np.float64),  # largest move in a step since then
-    ("path", np.float64),  # largest path of a point, in cells
-    ("now", np.int64),  # index of the present locations
+    ("pace", np.float64),  # largest move per step since then
+    ("path", np.float64),  # longest path of a point
+    ("now", np.int64),  # index of present locations
     ("wrong", np.int64),  # 1 if a point failed
 ])  # fmt: skip
-# Energy monitor (`kernels.watch`, `run.energy`): energies, counts, fractions.
+# Energy monitor (`kernels.watch`, `run.energy`)
 ENERGY = np.dtype([
-    ("watch_energy", np.int64),  # whether the work of all loads is known
-    ("level", np.float64),  # fraction of the present stored energy in the balance
-    ("work", np.float64),  # of fixes so far
-    ("kinetic", np.float64),  # sum over points
-    ("stored", np.float64),  # including dissipated energy
-    ("born_with", np.float64),  # internal energy of gases before any work
+    ("watch_energy", np.int64),  # 1: the work of all loads is known
+    ("level", np.float64),  # weight of the present stored energy in the balance
+    ("work", np.float64),  # of fixes
+    ("kinetic", np.float64),
+    ("stored", np.float64),  # includes dissipated energy
+    ("born_with", np.float64),  # initial internal energy of gases
     ("stored_before", np.float64),  # one step earlier
     ("moving_before", np.float64),  # kinetic minus work, then
-    ("stored_at", np.int64),  # step of these values
-    ("looks", np.int64),  # number of checks of the balance so far
+    ("stored_at", np.int64),  # step of the previous three
+    ("looks", np.int64),  # number of checks
     ("balance", np.float64),  # kinetic + stored + dissipated - work
     ("first_balance", np.float64),
     ("first_work", np.float64),
-    ("sum_of_balance", np.float64),  # over a window of checks
+    ("sum_of_balance", np.float64),  # over a window
     ("last_balance", np.float64),  # at the previous check
     ("last_but_one", np.float64),
     ("first_few", np.float64),  # mean of the first checks
-    ("first_mean", np.float64),  # mean of the first window
+    ("first_mean", np.float64),  # of the first window
     ("largest_mean", np.float64),
     ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
-    ("largest_energy", np.float64),  # of kinetic, stored, work and rigid bodies
-    ("largest_own", np.float64),  # without pure drift
-    ("of_drift", np.float64),  # kinetic energy of the centres of mass
+    ("largest_energy", np.float64),  # of kinetic, stored, work, rigid bodies
+    ("largest_own", np.float64),  # without drift
+    ("of_drift", np.float64),  # kinetic energy of centres of mass
     ("elastic", np.float64),  # at the last check
-    ("carried", np.float64, (1, 3)),  # elastic energy times the cells it has moved through
+    ("carried", np.float64, (1, 3)),  # elastic energy times cells moved through
     ("to_and_fro", np.float64),  # time for waves through all bodies and back
     ("time_of_look", np.float64),
-    ("lost", np.float64),  # largest loss by crossing, as a fraction of the unit
-    ("crossed", np.float64),  # cells that stressed material has moved through
-    ("supplied", np.float64),  # largest work so far, of either sign
-    ("energy_floor", np.float64),  # round-off of energies
-    ("windows", np.int64),  # consecutive windows with a growing balance
-    ("growth", np.float64),  # in the last window, relative to the largest energy
+    ("lost", np.float64),  # largest loss by crossing, relative
+    ("crossed", np.float64),  # cells that stressed material moved through
+    ("supplied", np.float64),  # largest work, of either sign
+    ("energy_floor", np.float64),  # round-off
+    ("windows", np.int64),  # consecutive windows with growth
+    ("growth", np.float64),  # in the last window, relative
     ("grown", np.float64),  # largest since the first checks
 ])  # fmt: skip
-# Conduction (`kernels.heat`, hooks, `kernels.watch`): times, temperatures.
+# Conduction (`kernels.heat`, hooks, `kernels.watch`)
 HEAT = np.dtype([
-    ("heat_limit", np.float64),  # stable step of conduction, infinite without
+    ("heat_limit", np.float64),  # stable step, or infinite
     ("heat_reference", np.float64),  # in undeformed bodies
-    ("watch_heat", np.int64),  # whether all sources of heat are known
-    ("coldest", np.float64),  # lower bound from initial state, fixes and sources
+    ("watch_heat", np.int64),  # 1: all heat sources are known
+    ("coldest", np.float64),  # bounds by initial state, fixes and sources
     ("hottest", np.float64),
-    ("T_low", np.float64),  # extremes of the points at the last check
+    ("T_low", np.float64),  # extremes at the last check
     ("T_high", np.float64),
-    ("own_heat", np.float64),  # largest rise of a point by its dissipation
-    ("set_low", np.float64),  # extremes prescribed by fixes at nodes
+    ("own_heat", np.float64),  # largest rise of a point by dissipation
+    ("set_low", np.float64),  # extremes set by fixes at nodes
     ("set_high", np.float64),
-    ("rise", np.float64),  # largest heating rate of points by fixes
+    ("rise", np.float64),  # largest heating rate by fixes
     ("fall", np.float64),
 ])  # fmt: skip
 CLOCK = np.dtype([("step", STEP), ("motion", MOTION), ("energy", ENERGY), ("heat", HEAT)])
 TIME, TIMESTEP, DT = 0, 1, 2  # first published values
-LAST = 2**62  # above any id of a point
+LAST = 2**62  # above any point id
 
 
 class Control(NamedTuple):
-    values: np.ndarray  # published values, after TIME, TIMESTEP, DT
-    clock: np.ndarray  # (1,) CLOCK, for copies and files; the next four are its parts
+    values: np.ndarray  # published values, from TIME, TIMESTEP, DT on
+    clock: np.ndarray  # (1,) CLOCK; the next four are its parts
     step: np.ndarray
     motion: np.ndarray
     energy: np.ndarray
     heat: np.ndarray
-    totals: np.ndarray  # sums of LIMBS numbers (kernels.totals): of published values; of mass and
-    #                     momentum of each solid (1 + d); of elastic energy and this times velocity
+    totals: np.ndarray  # (rows, LIMBS): published values; mass and momentum per solid
     digits: np.ndarray  # (LIMBS,) scratch
-    answer: np.ndarray  # rounded totals, results agreed between processes
-    firsts: np.ndarray  # (S + 1,) int64: id of the first point of each solid; LAST
-    ranks: Tag  # whether there are other processes
+    answer: np.ndarray  # rounded totals, results agreed among processes
+    firsts: np.ndarray  # (S + 1,) int64: first point id of each solid; LAST
+    ranks: Tag  # other processes, or `Alone`
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control with a zero clock; `firsts` are ids of the first points of solids."""
+    """Make a control with a zero clock; `firsts` are ids of the solids' first points."""
     clock: Any = np.zeros(1, CLOCK).view(np.recarray)
     parts = clock.step, clock.motion, clock.energy, clock.heat
     clock.motion.weight = clock.motion.stride = 1.0
@@ -399,16 +392,15 @@ class Setup(NamedTuple):
     transfer: Tag
     averaging: Tag
     contact: Tag
-    bodies: Tag  # freely moving rigid bodies, or none
+    bodies: Tag  # free rigid bodies, or none
     heat: Tag
-    company: Tag  # of tasks and quantities: water in the pores, rotation around an axis, none
-    grids: Grid  # an array (g,) for each number
+    company: Tag  # adds tasks and quantities: pore water, rotation
+    grids: Grid  # (g,) each
     nodes: Nodes
     buffers: Buffers
-    blocks: tuple[Block, ...]  # one for each constitutive law
-    spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of node numbers in use
-    ranges: np.ndarray  # (S + rows, 2) int64: for each part of the nodes, range of the following
-    #                     rows, then the ranges of node numbers in use, by part
+    blocks: tuple[Block, ...]  # one per law
+    spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of nodes in use
+    ranges: np.ndarray  # (S + rows, 2) int64: range of each part's rows, then ranges of nodes
     control: Control
 
 
@@ -420,7 +412,7 @@ def with_items(of, /, **items):
 
 @noinline
 def first_from(ascending, begin, end, x):
-    """Return the first index with at least `x`; NumPy's search takes 0.4 s to compile."""
+    """Return the first index of a value >= `x`; np.searchsorted takes 0.4 s to compile."""
     while begin < end:
         middle = (begin + end) // 2
         if ascending[middle] < x:

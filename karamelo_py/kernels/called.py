@@ -1,4 +1,4 @@
-"""Python hooks that compiled steps call by address, before points are mapped to nodes."""
+"""Python hooks called by address from compiled steps, before points are mapped to nodes."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ _call = caller_of(CALL)
 
 class CalledHooks(NamedTuple):
     compiled: NamedTuple
-    address: int  # of ``(stage) -> 1``, or 0 if it failed
+    address: int  # of ``(stage) -> 1``, or 0 on failure
 
 
 @kernel

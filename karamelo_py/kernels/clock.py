@@ -14,52 +14,50 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """Return dt, the time that points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step; tiny, not 0, if there is none, because laws divide by it."""
+    """Return the last dt; tiny instead of 0 without one, as laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
-    """Return the time that forces act, between the middles of the last and this step.
+    """Return the time that forces act, between mid-steps.
 
-    In the first step it is the whole step, as if initial velocities were half a step old, or half.
+    In the first step it is dt, or dt / 2 if initial velocities are not half a step old.
     """
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
-    """Return the reference velocity (d,) for speeds, in the type of `template`."""
     return vector(kin, [real(motion.common[0, k], template) for k in range(kin.dimension)])
 
 
 NEXT_TO_NOTHING = 1e-9  # fraction of a step
-ROUNDING = 1e-6  # fraction of a step: round-off of a million additions
+ROUNDING = 1e-6  # fraction of a step, for a million additions
 
-# If dt drops suddenly (set_dt), the dt of the contact stiffness drops by this fraction per step:
+# If dt drops suddenly (set_dt), the contact stiffness's dt drops by this fraction per step, so that
 # loaded springs stiffen over several periods.
 FOLLOWING = 0.01
-STILL = 0.25  # cells a point must move before the smaller stable step for crossing cells applies
+STILL = 0.25  # cells to move before the smaller stable step for crossing cells applies
 # cells that a point may move in a step that ignores a common drift
 STRIDE = 0.65
 
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose dt of the next step from the fastest point, or fixed; shorter at the end.
+    """Choose the next dt from the fastest point, or fixed; shorter at the end.
 
-    The last two steps are shortened equally: prescribed or mapped velocities give impulses that do
-    not vanish with dt, so a very short step would have huge forces. Contact with a stiffness of
-    m/dt^2 takes dt of a whole step, because suddenly stiffer springs would throw bodies back.
+    The last two steps are equal, as prescribed or mapped velocities give impulses that do not
+    vanish with dt: a very short step would have huge forces. Contact with a stiffness of m/dt^2
+    uses an unshortened dt, since suddenly stiffer springs would throw bodies back.
     """
     step, motion, heat = control.step[0], control.motion[0], control.heat[0]
     if motion.weight > 1:
-        # the drift may have rotated since it was measured, so speeds bound it
+        # The drift may have rotated since it was measured; speeds bound it.
         motion.rate = max(motion.rate, motion.wave + motion.speed * step.spacing)
     limit = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
     dt = min(step.dt_factor * limit, step.heat_factor * heat.heat_limit)
@@ -71,7 +69,7 @@ def choose_dt(control: Control) -> None:
     step.limit = limit
     step.over_limit = step.over_limit + 1 if dt > limit else 0
     remaining = step.end_time - control.values[TIME]
-    # Rounding of many additions of dt must not leave a final step of 1e-16.
+    # Round-off must not leave a final step of 1e-16.
     if 0 < remaining <= dt * (1 + ROUNDING):
         dt = remaining
     elif 0 < remaining < 2 * dt * (1 - ROUNDING):
@@ -141,7 +139,6 @@ def take_reports(control: Control) -> None:
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Accept the reports of a sweep; return whether no point failed."""
     read_reports(s)
     take(s.control)
     return s.control.motion[0].wrong == 0
@@ -161,7 +158,7 @@ def move_check(s: Setup) -> MoveCheck:
 
 
 def checked_move(check, points, p):
-    """Return the move of point `p` in cells, and whether it is allowed."""
+    """Return a point's move in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)

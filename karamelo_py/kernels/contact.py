@@ -1,27 +1,21 @@
 """Contact on the grid between solids with separate velocity fields.
 
 Where two fields have mass at a node, an impulse along their common normal removes the approach
-velocity, after Bardenhagen et al. 2001 ("An improved contact algorithm for the material point
-method and application to stress propagation in granular material", CMES 2(4)). Coulomb friction
-adds a tangential impulse, at most mu times as large. Momentum is conserved to round-off.
+velocity (Bardenhagen et al. 2001, CMES 2(4)). Coulomb friction adds a tangential impulse of at most
+mu times the normal one. Momentum is conserved to round-off.
 
-Where more than two fields meet, all pairs compute impulses from the same velocities, so the order
-of the solids does not matter. Each impulse is divided by the number of approaching pairs of one of
-its two bodies, the larger number, so that energy does not grow. Further iterations remove the rest.
+Where more than two fields meet, all pairs start from the same velocities, so the order of solids
+does not matter. Each impulse is divided by the larger of the two bodies' numbers of approaching
+pairs, so that energy does not grow; iterations remove the rest.
 
-Fields meet up to two cells before the bodies do (the reach of the basis functions). So the gap is
-measured from the mean positions of each body's points around a node
-(`karamelo_py.points.basis.surface`), and bodies may approach until it is closed at the end of the
-step. Convex bodies are apart if any direction shows a gap. The grid axes are tried in addition to
-the normal, as normals tilt where faces end.
+Fields overlap up to two cells before the bodies touch. The gap is therefore measured from the mean
+positions of each body's points (`karamelo_py.points.basis.surface`), along the normal and along the
+grid axes, as normals tilt where faces end. Any positive gap means that convex bodies are apart.
 
-A wall is a body of prescribed velocity. In a liquid or granular material some points lie closer to
-the wall than the mean position says, so each apparent gap would let them sink in a little. Points
-of these materials leave the wall for a few steps at a time. Bodies of such shapeless materials may
-therefore leave a wall but not approach it for 100 steps after a contact, also one at nodes that a
-moving wall has left. (With the same rule, an elastic disk takes 4 % less force: Hertz.) A wall may
-be one cell thick: only its faces towards the other body count. No face of a hollow corner may be
-entered.
+In liquids and granular materials some points lie closer to a wall than their mean suggests, so each
+apparent gap would let them sink in. Such bodies may leave a wall, but not approach it for 100 steps
+after a contact. (For elastic bodies the rule would lower the force: by 4 % for a Hertzian disk.) A
+wall may be one cell thick; only its faces towards the other body count.
 """
 
 from math import sqrt
@@ -53,11 +47,11 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 # squared sine of the scatter of a body's outward directions about their mean:
-SCATTER = 0.003  # accuracy for a plane face
-EDGE = 0.03  # above it a face ends or is round
+SCATTER = 0.003  # for a plane face
+EDGE = 0.03  # above this a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 MEMORY = 100  # steps after a contact in which shapeless bodies may not approach a wall
-REPEATS = 16  # iterations where more than two fields meet; each at least halves the rest
+REPEATS = 16  # iterations for more than two fields; each at least halves the rest
 
 
 class SeparateFields(NamedTuple):
@@ -66,28 +60,27 @@ class SeparateFields(NamedTuple):
     node_fields = (Normal, Centre)
     looks_beyond = 1  # cells beyond the points' nodes whose sums are read
 
-    stride: int  # to the same position in the next field
-    beside: np.ndarray  # (d, 2) stride to the next node, and number of nodes, along each axis
-    per_mass: np.ndarray  # (F,) specific volume over h^(d - 1)
+    stride: int  # offset of the same position in the next field
+    beside: np.ndarray  # (d, 2) stride, and number of nodes, along each axis
+    per_mass: np.ndarray  # (F,) specific volume / h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient; infinite: no slip
-    warmth: np.ndarray  # (F, F) fraction of frictional heat to the first of two fields
-    pair: np.ndarray  # (F, F) slot of the force of a pair on its first field, or -1
-    slot: np.ndarray  # (F,) slot of the force on each field
-    copies: np.ndarray  # (k, 2) slot of a field, and of another solid that gets its force
-    touched: np.ndarray  # (N, F) int32: last step (from 1) of contact between a node and a later
-    #                      field's node; negative if they stuck
-    prescribed: np.ndarray  # (N, k) 1 + slot of the reaction if a fix prescribes v, else 0
-    reactions: np.ndarray  # number of such slots, then the slots; negative of a torque
-    forces: np.ndarray  # number of slots of forces and torques, then the slots
-    rigid: np.ndarray  # (F,) bool: contact does not move the field
-    free: np.ndarray  # (F,) bool: a rigid one that fix rigid_body moves
-    torque: np.ndarray  # (F,) slot of the torque on each field
-    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
-    memory: np.ndarray  # (F,) steps that a contact is remembered: MEMORY if shapeless, else 1
-    surface: np.ndarray  # (F, k) distance to the surface by mean position of points, in cells
-    meeting: np.ndarray  # (F,) int64 scratch: fields that meet at a position
-    partners: np.ndarray  # (F,) int64 scratch: contacts of each
-    change: np.ndarray  # (F, k) scratch: velocity change of each
+    warmth: np.ndarray  # (F, F) fraction of frictional heat to the first field
+    pair: np.ndarray  # (F, F) slot of the force on the first field, or -1
+    slot: np.ndarray  # (F,) slot of the force
+    copies: np.ndarray  # (k, 2) slot of a field, slot of another solid that gets its force
+    touched: np.ndarray  # (N, F) int32 last step of contact with a later field, < 0: stuck
+    prescribed: np.ndarray  # (N, k) 1 + slot of the reaction where v is prescribed, else 0
+    reactions: np.ndarray  # number of slots, then the slots; negative for a torque
+    forces: np.ndarray  # number of slots, then the slots
+    rigid: np.ndarray  # (F,) bool: not moved by contact
+    free: np.ndarray  # (F,) bool: moved by fix rigid_body
+    torque: np.ndarray  # (F,) slot of the torque
+    torques: np.ndarray  # (values,) slot of the torque of the force in each slot, or 0
+    memory: np.ndarray  # (F,) steps that a contact is remembered
+    surface: np.ndarray  # (F, k) distance to the surface over mean position, in cells
+    meeting: np.ndarray  # (F,) int64 scratch: fields that meet
+    partners: np.ndarray  # (F,) int64 scratch: contacts of each field
+    change: np.ndarray  # (F, k) scratch: velocity changes
 
 
 class Bodies(NamedTuple):
@@ -103,31 +96,31 @@ class Bodies(NamedTuple):
 def around_of(kin, contact, nodes, pair, again):
     """Return sliding speed around the axis, its change per impulse, and speed before the step.
 
-    Of the angular velocities w*, or `again` of those that deform. () without rotation.
+    Uses the angular velocities w*, or the deforming ones if `again`. Returns () without rotation.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def take_around(kin, bodies, control, sides, impulse):
-    """Change angular velocities by an impulse on the second of two sides, and count the torque."""
+    """Apply the impulse on the second side to the angular velocities, and count the torque."""
 
 
 @point_function(otherwise=True)
 def stay_around(kin, bodies, pair, sides, share):
-    """Change the angular velocities that deform, so that a pair sticks."""
+    """Make a pair stick in the deforming angular velocities."""
 
 
 @point_function(otherwise=True)
 def turn(kin, nodes, n, change, again):
-    """Add a field's change to its angular velocity; `again`: to the one that deforms."""
+    """Add a field's change to its angular velocity, or to the deforming one if `again`."""
 
 
 # --- two bodies at a position -----------------------------------------------------------------
 
 
 class Where(NamedTuple):
-    node: int  # its node in the first field
+    node: int  # in the first field
     x: tuple  # (d,)
     h: float
     dt: float
@@ -135,14 +128,14 @@ class Where(NamedTuple):
 
 
 class Touched(NamedTuple):
-    """Selects pairs that were in contact in a step."""
+    """Selects the pairs that were in contact in a step."""
 
     step: int
 
 
 class Side(NamedTuple):
     field: int
-    i: int  # index among those that meet
+    i: int  # index among the meeting fields
     n: int
     per_mass: float
     x: tuple  # (d,)
@@ -153,12 +146,12 @@ class NodePair(NamedTuple):
     m: int
     per_n: float  # 1 / mass
     per_m: float
-    outward: tuple  # common normal, not normalised, out of the first body
-    scatter: float  # smaller scatter of the two outward directions
-    yielding: tuple  # change of relative velocity per impulse, per axis
-    relative: tuple  # velocity of the first body relative to the second
-    wall: bool  # whether exactly one has a prescribed velocity
-    hollow: bool  # and it has a corner filled by the other
+    outward: tuple  # common normal out of the first body, not normalised
+    scatter: float  # the smaller of the two outward directions' scatters
+    yielding: tuple  # (d,) change of relative velocity per impulse
+    relative: tuple  # velocity of the first relative to the second
+    wall: bool  # exactly one has a prescribed velocity
+    hollow: bool  # and the other fills a corner of it
 
 
 @noinline
@@ -172,7 +165,6 @@ def _yielding(contact, n, k, per_mass):
 
 @noinline
 def _led(contact, kin, n):
-    """Return True if the velocity is prescribed, so that faces retain their directions."""
     led = False
     for k in range(kin.dimension):
         led = led or _immovable(contact, n, k)
@@ -212,16 +204,16 @@ def _cosine_above(a, b, least):
 
 @noinline
 def _normal(bodies, n, other):
-    """Return the outward direction of a body, and the squared sine of its scatter angle.
+    """Return the outward normal of a body, and the squared sine of its scatter.
 
-    It averages the sums of m grad N of the nodes around `n`, with weights 1/4, 1/2, 1/4 along each
-    axis: accurate to two degrees for a plane face. A single sum varies by tens of degrees as rows
-    of points inclined to the grid pass its node. Nodes whose sum points the same way as `other`,
-    the other body's outward direction, are omitted: only one face of a thin wall counts.
+    The sums of m grad N of neighbouring nodes are averaged with weights 1/4, 1/2, 1/4 along each
+    axis. This is accurate to 2 degrees on a plane face; a single node errs by tens of degrees as
+    inclined rows of points pass it. Nodes whose sum points along `other`, the other body's normal,
+    are omitted, so that only one face of a thin wall counts.
 
-    Its length is its weight against the other body's direction: larger with more surface around the
-    nodes, smaller where their directions differ, as at edges. (Lemiale, Nairn & Hurmane 2010 take
-    the larger sum. A block's edge on a base of equal density is then tilted by 15 degrees.)
+    The length weights it against the other body's normal: it grows with surface and falls with
+    scatter. (Taking the larger sum, as in Lemiale, Nairn & Hurmane 2010, tilts a block's edge on a
+    base of equal density by 15 degrees.)
     """
     contact, kin, _ = bodies
     total, lengths = zero_vector(kin, 0.0), 0.0
@@ -245,7 +237,7 @@ def _normal(bodies, n, other):
 
 @noinline
 def _is_hollow(bodies, n, normal, other):
-    """Return True if two faces towards another body, around a node, face each other."""
+    """Return True if two faces towards the other body face each other around a node."""
     contact, kin, _ = bodies
     turn, square = 0.0, dot(normal, normal)
     for which in range(3**kin.dimension):
@@ -259,7 +251,7 @@ def _is_hollow(bodies, n, normal, other):
 
 @noinline
 def _entering(bodies, n, other, velocity, least):
-    """Return the largest component of a velocity, if above `least`, into a face towards `other`."""
+    """Return the largest velocity component, if above `least`, into a face towards `other`."""
     contact, kin, _ = bodies
     most, penetrating = least, zero_vector(kin, 0.0)
     for which in range(3**kin.dimension):
@@ -279,10 +271,10 @@ def _across(direction, other):
 
 @noinline
 def _entering_corner(bodies, n, other, velocity):
-    """Return the part of a velocity to remove so that no face of a hollow corner is entered.
+    """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The rest slides along one face, along the edge of two, or is 0. The removed part is
-    perpendicular to it, so that one impulse removes it.
+    The remainder slides along a face or an edge, or is 0; the two are perpendicular, so one impulse
+    suffices.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -327,7 +319,7 @@ def _pair_of(bodies, records, n, m, may_be_hollow):
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
-    # Normals of opposite faces with a common end tilt to opposite sides; the difference does not.
+    # The difference cancels the opposite tilts of two faces that end together.
     outward = of_n - of_m
     wall, yields = led_n != led_m, vector(kin, yielding)
     return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
@@ -340,7 +332,6 @@ def _left(pair, push):
 
 @noinline
 def _reach(bodies, outward, n, where, side):
-    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
     contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
@@ -360,10 +351,10 @@ def _gap(bodies, outward, pair, where):
 
 
 def _directions(bodies, pair):
-    """Return further directions along which bodies may be apart; zeros for none.
+    """Return further directions that may show a gap; zeros for none.
 
-    Along grid axes gaps do not depend on where faces end. Where both bodies' faces end, the vector
-    between the mean positions leads across the gap; next to a plane face it does not.
+    These are the grid axes and, where the faces of both bodies end, the vector between the mean
+    positions. Next to a plane face that vector does not cross the gap.
     """
     _, kin, nodes = bodies
     centre, zero = field(nodes.fields, Centre), zero_vector(kin, 0.0)
@@ -377,9 +368,9 @@ def _directions(bodies, pair):
 
 @noinline
 def _last_contact(bodies, pair):
-    """Return the last step of contact at the nodes of a pair, 0 for none.
+    """Return the last step of contact at a pair's nodes, 0 if none.
 
-    Contact at the nodes that a moving rigid wall has left counts too.
+    Nodes that a moving rigid wall has just left count too.
     """
     contact, kin, nodes = bodies
     other = pair.m // contact.stride
@@ -396,7 +387,7 @@ def _last_contact(bodies, pair):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity in excess of closing the gap in a step; 0 if apart."""
+    """Return the approach velocity beyond what closes the gap in this step; 0 if apart."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -406,7 +397,7 @@ def _excess_of(bodies, pair, where):
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
     if pair.wall and memory > 1:
         last = _last_contact(bodies, pair)
-        # With three bodies, a pair may already have touched in this step.
+        # With three bodies, a pair may have touched earlier in this step.
         if last > 0 and last >= where.step - memory:
             return approach / size
     for direction in _directions(bodies, pair):
@@ -421,7 +412,7 @@ def _excess_of(bodies, pair, where):
 
 @noinline
 def _friction_of(yielding, friction, push, slide, share):
-    """Return the tangential impulse per sliding speed, and whether it stops all sliding."""
+    """Return the tangential impulse per sliding speed, and whether it stops sliding."""
     compliance = dot(slide, slide, yielding)
     if not compliance > 0:
         return 0.0, False
@@ -457,7 +448,7 @@ def _node(contact, node, i):
 
 @noinline
 def _count_partners(which, bodies, node, count):
-    """Count approaching, or `Touched`, pairs of each field; return whether any."""
+    """Count each field's approaching (or `Touched`) pairs; return whether there are any."""
     contact, some_pair = bodies.contact, False
     contact.partners[:count] = 0
     for i in range(count):
@@ -507,7 +498,6 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _work_on(bodies, n, k, impulse, per_mass):
-    """Work of a rigid body's impulse, with the mean of a node's velocities in the step."""
     _, kin, nodes = bodies
     if _immovable(bodies.contact, n, k):
         return 0.0
@@ -532,7 +522,7 @@ def _touch_pair(bodies, control, i, j, where):
         return  # both prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction does not change the remaining approach, which closes the gap.
+    # Friction leaves the remaining approach, which closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     around = around_of(kin, contact, nodes, pair, False)
@@ -542,17 +532,17 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Dissipation is the impulse times the mean of the sliding speeds at start and end of the
-        # step; within it, internal forces offset the change that the impulse makes.
+        # Heat is the impulse times the mean sliding speed over the step, in which internal forces
+        # offset the impulse's change.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slides, (*before, *around[2:3]), yields, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    # Of a free body the work is what the other one takes: what collisions lose is lost outside.
+    # A free body's work is that on the other body; collisions dissipate outside of it.
     free = contact.free[a] != contact.free[b]
-    work = 0.0 if free else -heat  # remaining work of rigid bodies
+    work = 0.0 if free else -heat  # work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
     if rub > 0:
         for speed in around[:1]:
@@ -661,13 +651,13 @@ SeparateFields.rows = (  # type: ignore[attr-defined]
 
 class ListedPairs(NamedTuple):
     nodes: np.ndarray  # (n, 2)
-    normals: np.ndarray  # (n, d) unit, from the first to the second body
-    gaps: np.ndarray  # (n,) remaining distances
+    normals: np.ndarray  # (n, d) unit, out of the first body
+    gaps: np.ndarray  # (n,)
 
 
 @kernel
 def list_pairs(bodies, grids, spans, pairs):
-    """Fill `pairs` with the pairs of nodes where two fields meet; return their number."""
+    """Fill `pairs` with the node pairs where two fields meet; return their number."""
     contact, kin, nodes = bodies
     count = 0
     for s in range(1, 1 + spans[0, 0]):
@@ -699,7 +689,7 @@ def list_pairs(bodies, grids, spans, pairs):
 
 @noinline
 def _stay_pair(bodies, i, j, pair, sticks):
-    """Remove a pair's normal velocity; if they stick all of it, in a hollow all not along v*."""
+    """Remove a pair's normal velocity: all of it if they stick, all across v* in a hollow."""
     contact, kin, nodes = bodies
     share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:
@@ -754,16 +744,16 @@ def stay_node(bodies, step, n):
 
 
 def _stay(steps):
-    """Prevent the deforming velocity from opening or closing active contacts.
+    """Stop the deforming velocity from opening or closing active contacts.
 
-    Mapped separately from v*, it would move surfaces that are pressed together, and stress would do
-    spurious work: colliding bars would quadruple their energy, or double it if only approach is
-    removed. With `steps` 1, the contacts of this step count (v* is known), with 0 the last step's.
+    Otherwise stress does spurious work on surfaces pressed together: colliding bars quadruple their
+    energy, or double it if only approach is removed. With `steps` 1 this step's contacts count (v*
+    is known), with 0 the last step's.
     """
 
     def stay(s, n):
         step = int(s.control.values[TIMESTEP]) + steps
-        if step > 0:  # no contact before the first step
+        if step > 0:  # none before the first step
             stay_node(_bodies(s), step, n)
 
     return (each_node(stay),)

@@ -13,7 +13,7 @@ from karamelo_py.points.basis import entry, locate, reach, support
 from karamelo_py.points.kinematics import outer, planar, zero
 
 STRAIN, JACOBIAN, ENERGY = 6, 12, 13
-EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy of the point
+EXPORTED = 14  # columns: stress, elastic strain (6 each), det F, stored energy
 
 
 @kernel
@@ -41,9 +41,9 @@ def export(quantity, times_volume, matter, out):
 
 
 def imposing(change: Callable) -> Any:
-    """Make a kernel that sets the state of points to ``change(law, kin, state, value)``.
+    """Make a kernel that sets points' states to ``change(law, kin, state, value)``.
 
-    It takes a `Matter`, the rows of the points, and values by point.
+    It takes a `Matter`, the rows of the points, and a value for each.
     """
 
     @kernel
@@ -63,18 +63,18 @@ def _with_some_stress(law, kin, state, wanted):
     return law_functions.with_stress(law, kin, state, tuple(new))
 
 
-# Values: the components of Cauchy stress, then 1 for each to be set, else 0.
+# values: components of Cauchy stress, then 1 for each to be set, else 0
 impose_stress = imposing(_with_some_stress)
 impose_temperature = imposing(law_functions.with_temperature)
-impose_lighting = imposing(law_functions.lit)  # values: time since the point was lit
+impose_lighting = imposing(law_functions.lit)  # values: time since lighting
 
 
 @kernel
 def export_to_nodes(at, values, unit, out):
-    """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) of at most 2^36 units.
+    """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) have at most 2^36 units.
 
-    The first column takes whole units, the second remainders in units 2^36 times smaller: both are
-    exact for up to 2^17 points at a node, in any order.
+    The first column has whole units, the second remainders in units 2^36 times smaller: both are
+    exact in any order for up to 2^17 points per node.
     """
     basis, kin, grids, grid_of, where = at_hand(at)
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit
@@ -91,7 +91,7 @@ def export_to_nodes(at, values, unit, out):
 
 @kernel
 def export_velocity_moment(at, gradients, out):
-    """Fill ``out`` (d d, n) with moments sum N v (X - x) of velocities with these gradients."""
+    """Fill ``out`` (d d, n) with sum N v (X - x) of velocities with these gradients."""
     basis, kin, grids, grid_of, where = at_hand(at)
     flat = planar(kin)
     for p in range(out.shape[1]):

@@ -1,4 +1,4 @@
-"""Contact of rigid bodies that move by the forces on them, and their rows of a step."""
+"""Contact of freely moving rigid bodies, and their rows of a step."""
 
 from typing import NamedTuple
 
@@ -21,22 +21,22 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
-SOFT = 0.1  # fraction of the penetration removed in a step
-DEEP = 0.125  # cells of penetration, from which on the spring hardens: a heavy body on few points
+SOFT = 0.1  # fraction of penetration removed per step
+DEEP = 0.125  # penetration in cells above which the spring hardens, for a heavy body on few points
 
 _call = caller_of(CALL)
 
 
 class TouchingSurface(NamedTuple):
-    """The surface of a body, and the points that it touches."""
+    """Surface of a body, and the points it touches."""
 
     shape: arrays.Tag
-    members: np.ndarray  # (N,) bool, by id
-    clear: np.ndarray  # (N,) by id: no face is closer to this point
+    members: np.ndarray  # (N,) bool by id
+    clear: np.ndarray  # (N,) by id: no face is closer
     mu: float
-    slot: int  # of the force on the points
-    torque: int  # slot of its torque, or 0
-    lost: int  # address of a function called for a point without a way out
+    slot: int  # of the force on points
+    torque: int  # of its torque, or 0
+    lost: int  # address of a function for points without a way out
 
 
 # --- contact at points ------------------------------------------------------------------------
@@ -50,7 +50,7 @@ def _stencil_of(s, points, p):
 
 @point_function(otherwise=True)
 def free_way(shape, kin, x, reach):
-    """Distance to the surface, at most `reach`, where it saves later searches; else 0."""
+    """Return the distance to the surface, up to `reach`, where it saves later searches; else 0."""
     return 0.0
 
 
@@ -62,7 +62,6 @@ def _free_way_to_faces(shape, kin, x, reach):
 
 @noinline
 def _touched(shape, kin, x, about):
-    """Depth at `x`, and the unit direction out, 0 if there is none or the surface is not close."""
     close, ball, reach, step, _ = about
     within = depth(shape, kin, x, close)
     if within <= -close:
@@ -82,13 +81,13 @@ def _touched_faces(shape, kin, x, about):
     _, _, _, step, away = about
     if not 0.01 * step < away:
         return _touched(shape, kin, x, about)
-    sign = 1.0 if encloses(kin, shape, x) else -1.0  # slopes take six searches
+    sign = 1.0 if encloses(kin, shape, x) else -1.0  # slopes would take six searches
     return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
 
 
 @noinline
 def _list_point(body, surface, s, block, p):
-    """Put a contact of point `p` with a surface into the next record; return whether it touches."""
+    """Record a contact of point `p` with a surface; return whether it touches."""
     kin, points, d = s.kin, block.points, s.kin.dimension
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
@@ -100,7 +99,7 @@ def _list_point(body, surface, s, block, p):
         speed += abs(points.v[c, p])
     if away > (constants.bound + 2 * h) ** 2:
         return False
-    # Surfaces that may meet in this step: most points are far, and a short reach is cheap.
+    # Reject points that cannot meet the surface in this step; a short reach is cheap.
     move, number = 2 * dt * (speed + constants.speed), points.id[p]
     law, material = state_at(kin, points, block.laws, p)
     ball = radius(kin, volume_of(kin, points, law, material, p), x)
@@ -152,7 +151,7 @@ def _list_points(body, surface, s, block, number):
 
 @noinline
 def _hold(s, slot, x, c, force):
-    """Add a component of a force to the reaction of the fix that holds a node at `x`."""
+    """Add a force component to the reaction of the fix that holds a node at `x`."""
     values, turning = s.control.values, s.bodies.torques[slot]
     values[slot + c] += force
     if turning:
@@ -163,7 +162,7 @@ def _hold(s, slot, x, c, force):
 
 @noinline
 def _give_to_points(body, s, block, number, measures):
-    """Add the impulses of contacts to the nodes of a block's points, or sum their work."""
+    """Add impulses of contacts to the nodes of a block's points, or sum their work."""
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
     kick, work = s.control.step[0].kick, 0.0
     for i in range(body.count[0]):
@@ -181,7 +180,7 @@ def _give_to_points(body, s, block, number, measures):
                 elif nodes.sums[n, arrays.MASS] > 0 and not held:
                     change = arrays.of_change(kin) + c
                     if measures:
-                        # The mean of the velocities before and after the step, as for loads.
+                        # mean velocity over the step, as for loads
                         work += impulse * (nodes.update[n, c] - 0.5 * nodes.update[n, change])
                     else:
                         nodes.update[n, c] += impulse / nodes.sums[n, arrays.MASS]
@@ -201,7 +200,6 @@ def _give_to_points(body, s, block, number, measures):
 
 @noinline
 def _lead_nodes(body, s):
-    """Set the velocity of a body at the nodes of its field, for contact at nodes."""
     first = arrays.of_momentum(s.kin)
     for r in range(1, 1 + s.spans[0, 0]):
         for n in range(s.spans[r, 0], s.spans[r, 1]):
@@ -215,7 +213,6 @@ def _lead_nodes(body, s):
 
 @noinline
 def _list_nodes(body, s):
-    """List the nodes where a body meets fields that yield."""
     contact, nodes, d = s.contact, s.nodes, s.kin.dimension
     step = int(s.control.values[arrays.TIMESTEP]) + 1
     count = list_pairs(Bodies(contact, s.kin, nodes), s.grids, s.spans, body.pairs)
@@ -244,7 +241,6 @@ def _list_nodes(body, s):
 
 @noinline
 def _reaction(body, s):
-    """Set the total of the impulses of contact at nodes, about the centre."""
     total, centre, values = body.solution.total, body.state[0].x, s.control.values
     kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
@@ -257,7 +253,6 @@ def _reaction(body, s):
 
 @noinline
 def _add_links(body, s):
-    """Add the forces of other bodies to the forces that the method publishes."""
     given, centre, values = body.solution.given, body.state[0].x, s.control.values
     kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
@@ -269,10 +264,10 @@ def _add_links(body, s):
 
 @noinline
 def _follow(s, n, again):
-    """Let a node of a body follow the surface that it touches, for the velocity that deforms this.
+    """Let a body's node follow the surface it touches, in the deforming velocity.
 
-    A light body may be faster than the surface until the gap is closed: straining it by the body's
-    velocity would add more energy than the body has. `again`: v* of this step is known.
+    A light body may be faster until the gap is closed; straining the surface by its velocity would
+    add more energy than the body has. `again`: v* of this step is known.
     """
     contact, nodes = s.contact, s.nodes
     for body in s.bodies.bodies:
@@ -290,7 +285,6 @@ def _follow(s, n, again):
 
 @noinline
 def _list_contacts(body, s):
-    """List the contacts of a body with deformable solids."""
     body.count[0] = 0
     for surface in body.surfaces:
         for c in range(s.kin.dimension):
@@ -306,7 +300,6 @@ def _list_contacts(body, s):
 
 @noinline
 def _push(body, s):
-    """Apply the impulses of a body to deformable solids; its nodes take its velocity."""
     if isinstance(s.contact, SeparateFields):
         _lead_nodes(body, s)
     else:
@@ -316,7 +309,6 @@ def _push(body, s):
 
 @kernel
 def _meet(s):
-    """Find the velocities of all bodies at the end of the step."""
     bodies, links = s.bodies.bodies, s.bodies.links
     if isinstance(links, rigid_links.Links):
         for body in bodies:
@@ -351,7 +343,7 @@ def _part(s):
 
 
 def _lead_point(s, block, p):
-    """Give a point of a body its mean velocity in the step, which displaces it exactly."""
+    """Give a body's point its mean velocity in the step, which displaces it exactly."""
     points, d, now = block.points, s.kin.dimension, s.control.motion[0].now
     for body in s.bodies.bodies:
         state, before = body.state[0], body.solution.before
@@ -367,11 +359,11 @@ class NoBodies(NamedTuple):
 
 
 class FreeBodies(NamedTuple):
-    """Bodies, and rows before and after contact, and around the velocity that deforms points."""
+    """Bodies, with rows around contact and around the deforming velocity."""
 
     bodies: tuple[motion.FreeBody, ...]
-    held: np.ndarray  # (N, d) 1 + slot of the reaction where the velocity is prescribed, else 0
-    torques: np.ndarray  # (values,) slot of the torque of the force in this slot, or 0
+    held: np.ndarray  # (N, d) 1 + slot of the reaction where v is prescribed, else 0
+    torques: np.ndarray  # (values,) slot of the torque of a force's slot, or 0
     links: rigid_links.NoLinks | rigid_links.Links
     rows_first = (Once(_meet),)
     rows_last = Once(_part), each_point(_lead_point, Rigid)

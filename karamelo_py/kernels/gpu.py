@@ -1,9 +1,9 @@
-"""A step on a GPU: functions of one thread for a point, a cell, a node, or the clock.
+"""A step on a GPU: thread functions for a point, a cell, a node, or the clock.
 
-A cell has the points that see the same nodes, and the number of its first node. Before each scatter
-a counting sort orders points by cell, then by id. One thread sums over a cell's points, another at
-a node over cells. No two threads add to one real number, so results are reproducible and do not
-depend on the order in memory. `fate` (5,) has errors and extremes.
+A cell holds the points that see the same nodes, and is numbered by the first of these. Before each
+scatter, points are sorted by cell, then by id. One thread sums over a cell's points, another at a
+node over cells; no two threads add to one number, so results are reproducible and independent of
+the order in memory. `fate` (5,) has errors and extremes.
 """
 
 import functools
@@ -32,11 +32,11 @@ from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
 MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; STATUS: 0, or 1 + a status of steps
-BEHIND = 2.0**53  # above all point numbers
-CHUNK = 64  # items that one thread sums
+BEHIND = 2.0**53  # above all point ids
+CHUNK = 64  # items summed per thread
 WARP = 32  # threads that read memory together
-REGISTERS = {4: 200, 8: 130}  # words summed by a cell's thread, by number size
-OCCUPIED = 1 << 40  # in `CellLists.sums`: added per cell with points
+REGISTERS = {4: 200, 8: 130}  # words summed per cell thread, by number size
+OCCUPIED = 1 << 40  # added to `CellLists.sums` per occupied cell
 
 
 # shown by `karamelo-py bench`
@@ -62,15 +62,15 @@ class CellLists(NamedTuple):
     """The n points of a block by cell, of N nodes; corner c of point p is listed as c n + p."""
 
     count: np.ndarray  # (N,) int32: points of each cell not yet listed
-    number: np.ndarray  # (n,) int32: cell of each point
-    first: np.ndarray  # (N + 1,) int32: points of cell c are order[first[c]:first[c + 1]]
-    box: np.ndarray  # (N + 1,) int32: number of an occupied cell, or -1; then the count
-    cell: np.ndarray  # (boxes,) int32: cell of a box
-    order: np.ndarray  # (n,) int32: points
-    sums: np.ndarray  # (m,) int64: counts plus OCCUPIED, summed by chunks, level by level
+    number: np.ndarray  # (n,) int32
+    first: np.ndarray  # (N + 1,) int32: cell c has order[first[c]:first[c + 1]]
+    box: np.ndarray  # (N + 1,) int32: index of an occupied cell, or -1; then the count
+    cell: np.ndarray  # (boxes,) int32
+    order: np.ndarray  # (n,) int32
+    sums: np.ndarray  # (m,) int64: counts plus OCCUPIED per chunk, level by level
     before: np.ndarray  # (m,) int64: prefix sums
-    loads: np.ndarray  # (numbers, n): loads of points before weighting
-    boxes: np.ndarray  # (columns, boxes): sums of cells for some of their nodes
+    loads: np.ndarray  # (numbers, n): unweighted loads
+    boxes: np.ndarray  # (columns, boxes): sums for some nodes of a cell
 
 
 def nodes_in_cell(basis: Any, kin: Any) -> int:
@@ -110,10 +110,9 @@ def is_last(s):
 
 
 class Stage:
-    """A visit of the points as thread functions.
+    """A pass over the points, as thread functions.
 
-    `columns` are (array, column, whether it adds) of the node columns it sums; the nodes of a cell
-    are summed in `parts`.
+    `columns` are the (array, column, adds) of nodes that it sums, the nodes of a cell in `parts`.
     """
 
     def __init__(self, row: Any, s: Any):
@@ -166,7 +165,7 @@ class Stage:
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
-            # from zero: the largest so far depends on the order of threads
+            # from zero, as the running maximum depends on the order of threads
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
             _report(fate, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
@@ -218,7 +217,7 @@ class Stage:
                 for k in range(begin, end):
                     room_of(name, rooms, None)[k, column] = c.dt - c.dt
             out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
-            template = load_all(quantities, pt)  # for its shape alone
+            template = load_all(quantities, pt)  # only for its shape
             for q in range(first, last):
                 behind = cells.order[min(q + 1, last - 1)]  # read ahead
                 here = pt._replace(p=p)
@@ -226,7 +225,7 @@ class Stage:
                 seen = stencil if corners == 1 else of_corner(stencil, corner)
                 numbers = tuple([cells.loads[k, p] for k in range(len(flat(template)))])
                 for k in range(begin, end):
-                    node = node_of(out, seen, k)._replace(i=index(k))  # numbered within the cell
+                    node = node_of(out, seen, k)._replace(i=index(k))  # index within the cell
                     scattered_all(quantities, nested_as(template, numbers), node)
                 p, corner = _point_and_corner(corners, size, behind)
             for j, (name, column, _) in enumerate(columns):
@@ -245,7 +244,7 @@ class Stage:
         return count * section // self.parts, count * (section + 1) // self.parts
 
     def sum(self, section: int, anew: bool) -> Callable:
-        """Return the function of a node that sums over cells, from zero if `anew`."""
+        """Return a node's function that sums over cells, from zero if `anew`."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(section)
 
@@ -267,7 +266,7 @@ class Stage:
         return sum_node
 
     def age(self) -> Callable:
-        """Return the function of a node before marking: 2 used, 1 to be cleared, 0 unused."""
+        """Return a node's function before marking: 2 in use, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):
@@ -303,7 +302,7 @@ def _steps_to(s, grid, k):
 
 
 def _with_cell(totals, cells, cell, first, step):
-    """Add a cell's sums, from rows `first`, `first` + `step`, ... of its box."""
+    """Add a cell's sums from rows `first`, `first` + `step`, ... of its box."""
     box = cells.box[index(max(cell, 0))]
     occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
@@ -326,7 +325,7 @@ def sum_counts(i, fate, cells):
 
 
 def sum_sums(i, fate, cells, level):
-    """Sum a chunk of sums; `level` is where they begin, their count, where the next begin."""
+    """Sum a chunk of sums; `level` is their begin and count, and the next level's begin."""
     begin, count, above = level
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
@@ -335,7 +334,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Sum the items before one of a level; `above` is the level above, or -1."""
+    """Sum the items before one of a level; `above` is the begin of the next level, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -344,7 +343,7 @@ def sum_before(i, fate, cells, begin, above):
 
 
 def place_list(i, fate, cells):
-    """Set where a cell's points are listed, and the number of its box."""
+    """Set the range of a cell's points and the number of its box."""
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):
@@ -391,9 +390,8 @@ def sort_cell(corners: int) -> Callable:
 
 
 # --- order in memory --------------------------------------------------------------------------
-#
-# The threads of a warp take adjacent cells: the first points of these cells should be adjacent in
-# memory, then their second points.
+# Threads of a warp take adjacent cells, so the first points of these should be adjacent in memory,
+# then the second points.
 
 
 def order_cell(i, fate, cells, come_from):

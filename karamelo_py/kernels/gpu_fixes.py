@@ -1,4 +1,4 @@
-"""Hooks of fixes, totals and the energy monitor on a GPU: functions of one thread.
+"""Hooks of fixes, totals and the energy monitor on a GPU, as functions of one thread.
 
 Members are processed one by one with private scratch (:mod:`karamelo_py.kernels.hook_loop`). Totals
 are sums of integers, in any order; several copies spread the traffic.
@@ -93,7 +93,7 @@ def work_of_loads(i, fate, s, about, target):
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Return the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
+    """Return the function of a member of a hook on nodes, ACT or RUB, over `length`."""
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):
@@ -217,7 +217,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks; `which` is a range, and whether before the end of a run."""
+    """Publish totals of hooks; `which` is (begin, end, always), else only in the last step."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):
@@ -267,7 +267,6 @@ def add_work_at_node(i, fate, s, copies):
 
 
 def add_work(i, fate, s, block, copies):
-    """Add a point's work of forces, and its energy of rotation or of water in its pores."""
     if isinstance(block.laws, Saturated):
         relative = field(block.points.fields, RelativeVelocity)
         energy = watch.water_energy(s.kin, known_to_laws(block.points), block.laws, relative, i)
@@ -290,7 +289,6 @@ def look_before(i, fate, s):
 
 
 def look_behind(i, fate, s):
-    """Check the energy, and end the run on spurious gain."""
     energy = s.control.energy[0]
     if energy.stored_at != int(s.control.values[TIMESTEP]) - 1:
         return

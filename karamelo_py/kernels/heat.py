@@ -1,7 +1,7 @@
 """Heat flow through the nodes, and the fixes that act on it.
 
-Heat capacity and temperature are treated like mass and velocity: nodes of heat are `Nodes` with one
-component, used by the same loops (:mod:`karamelo_py.kernels.equations.heat`).
+Capacity and temperature are treated like mass and velocity: nodes of heat are `Nodes` with one
+component, for the same loops (:mod:`karamelo_py.kernels.equations.heat`).
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ def at_heat_nodes(hooks, stage, target, s):
 
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
-    # temperatures always as in FLIP
+    # temperatures always use FLIP
     heat = s.control.heat[0]
     heat.set_low, heat.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
@@ -75,7 +75,7 @@ def at_its_nodes(s):
 
 
 def _take_factor(control):
-    # `Warming` reports how much faster conduction has become.
+    # `Warming` reports how much faster conduction has become
     heat = control.heat[0]
     heat.heat_limit = heat.heat_reference / control.motion[0].new_rate
 
@@ -102,12 +102,12 @@ def _at_heated_points(row, s, step):
 MAP = Visit((of_heat.Warming(),), (of_heat.HeatContent(),), OldWeights())
 FLOW = Visit((of_heat.TemperatureGradient(),), (of_heat.HeatFlow(),), OldWeights())
 
-# capacity, heat and temperature to the nodes
+# capacity, heat and temperature at nodes
 SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# also the heat flow from present gradients
+# and the heat flow from present gradients
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
@@ -115,15 +115,15 @@ FLOW_TO_NODES = (
     AtHeatedPoints(),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
-# fixes hold the new temperature of nodes
+# fixes hold the new nodal temperature
 HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
 
 class Conducting(NamedTuple):
-    """Heat flows through `nodes`, with the fields of velocities and of F-bar.
+    """Heat flows through `nodes`, with the fields of velocity and F-bar.
 
-    sums: capacity, heat, heat flow; update: T* and T* - T; velocity: T; mean: T weighted by
+    sums: capacity, heat, heat flow; update: T*, T* - T; velocity: T; mean: T weighted by
     conductance.
     """
 

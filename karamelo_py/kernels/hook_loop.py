@@ -1,7 +1,6 @@
-"""The loop of compiled hooks of fixes over members of groups, at nodes and at points.
+"""Loop of fixes' compiled hooks (`karamelo_py.kernels.hooks`) over members at nodes and points.
 
-The class of `members` selects how a block of them is chosen and processed;
-`karamelo_py.kernels.hooks` describes the functions of hooks.
+The class of `members` selects how a block is chosen and processed.
 """
 
 from typing import NamedTuple
@@ -29,7 +28,7 @@ from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.points.transfers import Moment
 
-# each bare number would be a type
+# typed, so that each bare number is not a type
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
 TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)  # rows of the stack, free after evaluation
@@ -37,7 +36,7 @@ END = np.iinfo(np.int64).max  # after the last member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # tasks
 LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or the re-mapped velocity
-DONE, FREE = -1, 1e-3  # no stage; fraction of its force that a fix gives a node that it holds
+DONE, FREE = -1, 1e-3  # no stage; least fraction of the force that marks a node as held
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
 _call_point_function = caller_of(kinds.POINT_FUNCTION)
@@ -66,7 +65,7 @@ class HookedNodes(NamedTuple):
 
 
 class WholeNodes(HookedNodes):
-    """Nodes for functions of whole nodes; `tag` of `kinds.vector_hook`."""
+    """Nodes for functions of whole nodes; `tag` is from `kinds.vector_hook`."""
 
 
 class MovingPoints(NamedTuple):
@@ -85,13 +84,13 @@ class MovingPoints(NamedTuple):
 class WholePoints(NamedTuple):
     """Points of one law for functions of whole points."""
 
-    tag: NamedTuple  # of `kinds.vector_hook`
+    tag: NamedTuple  # from `kinds.vector_hook`
     ids: np.ndarray
     kin: NamedTuple
     points: NamedTuple
     laws: NamedTuple
     x: np.ndarray  # (w, n)
-    heat: tuple  # supply and capacity, (1, n) each, if heat is supplied
+    heat: tuple  # supply and capacity, (1, n) each, or ()
 
 
 class HeatedPoints(NamedTuple):
@@ -106,11 +105,11 @@ class HeatedPoints(NamedTuple):
 
 
 def _turns(members, k, parts):
-    """Return begin, end and stride of the chunks of thread `k` of `parts`."""
+    """Return begin, end and stride of thread `k`'s chunks."""
     if isinstance(members, HookedNodes):
         shares = members.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # interleaved, because members may be clustered
+    # interleaved, as members may be clustered
     size = TURN if parts > 1 else max(members.ids.size, 1)
     return k * size, members.ids.size, parts * size
 
@@ -123,7 +122,7 @@ def _bounds(members, turn, parts):
 
 @point_function()
 def act(members, task, call, count):
-    """Do `task` with the chosen members, and add to totals; return how many count."""
+    """Do `task` with the chosen members and add to totals; return how many count."""
 
 
 @noinline
@@ -146,7 +145,7 @@ def _act_on_part(members, task, call, k, parts):
 
 @shared_out
 def _act_on_parts(members, task, call, k):
-    """Act on the members of thread `k`, with private scratch and totals (which do not round)."""
+    """Act on thread `k`'s members, with private scratch and exact private totals."""
     hooks, control, h = call.hooks, call.control, call.h
     private = record(hooks.apart, k)
     for i in range(control.values.size):
@@ -166,7 +165,7 @@ def _act_on_parts(members, task, call, k):
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)
-    # totals of other hooks that held the nodes change too
+    # Totals of other hooks that held the nodes change too.
     several = hooks.holders.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
@@ -195,7 +194,7 @@ def _act_on_all(members, task, call):
 
 
 def directions(hooks):
-    """Return the dimension at run time, so that loops are not unrolled."""
+    """Return the dimension as a run-time value, so that loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -222,7 +221,7 @@ def evaluate(call, component, count, result, shift):
 def _evaluate_now_and_before(call, c, count):
     evaluate(call, c, count, VALUE, 0.0)
     if call.hooks.table[call.h].uses_before:
-        # nothing precedes time 0
+        # the formulas start at time 0
         control = call.control
         step_back = min(control.step[0].last_dt, control.values[arrays.TIME])
         evaluate(call, c, count, BEFORE, -step_back)
@@ -242,13 +241,11 @@ def _published(hooks, h):
 
 
 def _torque_of(hooks, slot):
-    """Return the first row of the torque of the force in rows from `slot` on, or 0."""
     return hooks.torques[slot] if slot >= 0 else NONE
 
 
 @noinline
 def _add_torque(call, q, c, slot, force):
-    """Add the torque of component `c` of a force at the `q`-th chosen member."""
     place, row = call.hooks.scratch, _torque_of(call.hooks, slot)
     if row > 0 and force != 0:
         x = (place[0, q], place[1, q], place[2, q])
@@ -277,7 +274,7 @@ def publish_total(hooks, h, control):
 
 
 def _choose_nodes(members, call, row, end, member):
-    """Choose up to a block of used members with mass; return their number, and the next member."""
+    """Choose up to a block of members with mass; return their number and the next member."""
     hooks, h, ranges, sums = call.hooks, call.h, members.ranges, members.nodes.sums
     of_all = members.target >= LOADS or hooks.table[h].begin < 0
     behind = hooks.table[h].end
@@ -353,7 +350,7 @@ def _clear_held(members, holders):
 
 @noinline
 def _take_over(call, q, c, force):
-    """Make a hook hold chosen node `q` by `force`; return the force of the previous holders."""
+    """Let a hook hold chosen node `q` by `force`; return the previous holders' force."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     n = hooks.chosen[q]
     if hooks.holders.size > 0 and hooks.table[h].holds:
@@ -370,7 +367,6 @@ def _take_over(call, q, c, force):
 
 @noinline
 def _is_of_rigid(hooks, n):
-    """Return True for a node of a rigid solid, on which no work is done."""
     rigid = hooks.rigid_fields
     return rigid.size > 0 and rigid[n // (hooks.loads.shape[0] // rigid.size)]
 
@@ -422,8 +418,8 @@ def _change_force(members, call, c, q):
 def _change_update(members, call, c, q):
     """Change v* of a node; return total, work, and force of previous holders.
 
-    Work is impulse times the mean of the velocities before and after it, or of the holding hook: a
-    node stopped by a bound did not move with the wall before.
+    Work is the impulse times the mean velocity over the step. If the hook holds the node this is
+    the wall's, as a node stopped by a bound moved differently before.
     """
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, dt, kept, work, before = hooks.table[call.h], call.dt, members.kept, 0.0, 0.0
@@ -432,14 +428,14 @@ def _change_update(members, call, c, q):
     old = old_star - nodes.update[n, change]
     force = nodes.sums[n, arrays.of_force(kin) + c]
     v, star, _, total = _called(call, (mass, old, old_star), force, values)
-    # points take v* - v, so changing v is an impulse too
+    # Points take v* - v, so changing v is an impulse too.
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
         before = _take_over(call, q, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still change the velocity of a free node, a rigid body of any node.
+    # Contact may still move a free node, a rigid body any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     is_taken = rigid is not None and rigid[n, arrays.MASS] > 0
@@ -461,7 +457,7 @@ def _change_velocity(members, call, c, q):
     # Strain before the forces belongs to the last step and its holding hooks.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
-    # before the forces, v* is of the last step
+    # v* is of the last step
     remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
     star = last if remaps or (strains_first and last == value) else v
     state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]
@@ -474,7 +470,7 @@ def _change_velocity(members, call, c, q):
 def _rub_at_nodes(members, call, count):
     hooks = call.hooks
     if members.target == arrays.ON_VELOCITY:
-        # otherwise v* is of the last step
+        # else v* is of the last step
         if hooks.table[call.h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
                 stick(members.kin, members.nodes, hooks.programs[call.h], hooks.chosen[q])
@@ -488,9 +484,9 @@ def _rub_at_nodes(members, call, count):
 def _work_at_nodes(members, call, count):
     """Sum the work of loads on the chosen nodes, and clear them.
 
-    Work is force times the mean of the velocities before and after the step, with its stress,
-    constraints and contact. After the step this is what points took: for FLIP, mapped again, the
-    work on points is exact. v* is off by first order in dt, much at nodes with little mass.
+    Work is the force times the mean of the velocities before and after the step, including stress,
+    constraints and contact. The velocity mapped again after the step is what points received, so
+    for FLIP the work is exact; v* differs by first order in dt, strongly at light nodes.
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
     velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
@@ -502,10 +498,10 @@ def _work_at_nodes(members, call, count):
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n) and not _is_of_rigid(hooks, n)
-            # XPIC has replaced the change of v* by then
+            # XPIC has replaced the change of v* by now.
             moved = 2 * update[n, c] - update[n, change + c]
             if again and counts:
-                # Fixes that hold nodes prescribe v before the step, too. In free fall v is v*.
+                # Fixes that hold nodes prescribe v before the step too. In free fall v is v*.
                 v, mass, force = velocity[n, c], sums[n, arrays.MASS], arrays.of_force(members.kin)
                 before, pushed = sums[n, momentum + c] / mass, dt * sums[n, force + c] / mass
                 held = v == update[n, c] and abs(v - before - pushed) > FREE * abs(pushed)
@@ -547,12 +543,12 @@ def _act_on_whole_nodes(members, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points, for each of which loops would be compiled again."""
+    """Omit functions of whole points, for each of which loops would be recompiled."""
     return arrays.with_items(hooks, whole=())
 
 
 def known_to_hooks(nodes):
-    """Return the fields that the loop uses; others would have it compiled again."""
+    """Return the fields that the loop uses; others would cause recompilation."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
@@ -569,7 +565,7 @@ def whole_nodes(s, tag, stage, target):
 
 
 def node_hooks(stage, members, hooks, s, dt):
-    """Call the node functions of `stage` on `hooked_nodes`; for loads, sum the work."""
+    """Call the node functions of `stage`; for loads, sum the work."""
     tags = [tag for tag in hooks.whole if tag.of_nodes]
     whole = tuple([whole_nodes(s, tag, stage, members.target) for tag in tags])
     _node_hooks(stage, members, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))
@@ -602,7 +598,7 @@ def _node_hooks(stage, members, whole, call):
         else:
             _act_on_all(members, ACT, hook_call)
         publish_total(hooks, h, control)
-    # Friction follows, because now the walls that hold a node are known.
+    # Friction comes last: only now are the walls known that hold a node.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -622,7 +618,7 @@ def at_nodes(hooks, stage, target, s):
 def _at_nodes_hooks(hooks, stage, target, s):
     step, heat = s.control.step[0], s.control.heat[0]
     node_hooks(stage, hooked_nodes(s, target, step.kept), hooks, s, kick(s))
-    heat.set_low = heat.set_high = 0.0  # for temperatures only
+    heat.set_low = heat.set_high = 0.0  # temperatures only
 
 
 @point_function(otherwise=True)
@@ -636,7 +632,7 @@ def _add_work_hooks(hooks, s, again):
 
 
 def choose_points(members, call, p, end):
-    """Choose up to a block of members; return their number, and the next point."""
+    """Choose up to a block of members; return their number and the next point."""
     hooks, h = call.hooks, call.h
     begin, ids, where = hooks.table[h].begin, members.ids, hooks.scratch
     count = 0
@@ -662,7 +658,7 @@ def _act_on_motion(members, task, call, count):
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # Forces act while the hook moves a point from its initial velocity in the step.
+        # Forces act as the hook moves a point from its initial velocity.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
@@ -680,7 +676,7 @@ def _act_on_motion(members, task, call, count):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
             for moment in members.moments:
-                # otherwise nodes, and strains around, follow the point's velocity from the grid
+                # else nodes and strains follow the point's grid velocity
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
                 for k in range(d * d + c if leads else moment.shape[0], moment.shape[0], d):
@@ -712,7 +708,7 @@ def _act_on_warmth(members, task, call, count):
         members.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
-        # the bound is the prescribed temperature, not the resulting one
+        # the prescribed temperature is the bound
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
         elif members.capacity[0, p] > 0:
@@ -797,7 +793,7 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 
 
 def point_hooks(stage, then, hooks, s, arguments_of):
-    """Call the point functions of `stage` in each block; `arguments_of`: `what_of`, `heat_of`."""
+    """Call the point functions of `stage` in each block; `arguments_of` is (what_of, heat_of)."""
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]
@@ -841,7 +837,7 @@ def corners_that_move(s):
 
 @point_function(otherwise=True)
 def at_points(hooks, stage, then, s):
-    """Apply fixes to points; `then` is 1 if their new positions are known, else 0."""
+    """Apply fixes to points; `then` is 1 once their new positions are known, else 0."""
 
 
 @at_points.on(arrays.Hooks)

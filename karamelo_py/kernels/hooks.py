@@ -1,25 +1,23 @@
 """Compiled hooks of fixes: functions of one component at a node or point, or of whole points.
 
-A fix is a formula acting on a group, with a tiny function. The loops choose members, evaluate the
+A fix applies a formula to a group through a small function. The loops select members, evaluate the
 formula block by block and call the function by address, so only new functions are compiled.
 
 Node function ``(node: OneNode) -> (v, v_star, force, total)``: `value` and `before` are the formula
-at the step's time and one step earlier; `share` is 1 / number of members with mass; `kick` is the
-time forces act, half of the last step plus half of this one.
-Totals are summed and published, plus the momentum over kick that a change of v before the update
-adds to points. Of several hooks that hold a node, the last to set v_star to its value decides, and
-gets the others' totals there. Hooks set v of the deforming velocity if it is mapped separately from
-v_star; before the forces (usf, usavg) the hooks of the update do, and those that hold set it to
-their v_star.
+at the step's time and one step earlier; `share` is 1 / number of members with mass; `kick` is half
+of the last step plus half of this one. Totals are published, plus the momentum per kick by which a
+change of v before the update changes points. Where several hooks hold a node, the last one to set
+v_star to its value decides and gets the others' totals. Hooks also set v of the deforming velocity
+if it is mapped separately; before the forces (usf, usavg) those that hold set it to v_star.
 
 Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time of the move, `kick` the time
-forces act.
+that forces act.
 
-Heat function ``(pt: WarmPoint) -> (share, supply, T)``, of points where heat flows: `value` and
-`other` are the first and second formula, `face` the point's area, `supply` its heat per time,
-`share` the fraction of the nodal temperature change it takes. The total is the heat supplied; for a
-hook that holds, `other` is the target temperature. Node functions of heat see capacity, temperature
-before and after the step, and heat flow, in the order of `OneNode`.
+Heat function ``(pt: WarmPoint) -> (share, supply, T)``: `value` and `other` are the first and
+second formula, `face` the point's area, `supply` its heat per time, `share` the fraction it takes
+of the nodal temperature change. The total is the heat supplied; if the hook holds, `other` is the
+target temperature. Node functions of heat see capacity, temperature before and after the step, and
+heat flow, in the order of `OneNode`.
 
 Functions of whole points (:func:`vector_hook`) see vectors, fields and the law's state, and are
 compiled into the loop.
@@ -43,7 +41,7 @@ from karamelo_py.kernels.views import volume_of
 
 
 class OneNode(NamedTuple):
-    """View of node functions, in one direction."""
+    """Arguments of node functions, for one component."""
 
     mass: float
     v: float
@@ -56,7 +54,7 @@ class OneNode(NamedTuple):
 
 
 class OnePoint(NamedTuple):
-    """View of point functions, in one direction."""
+    """Arguments of point functions, for one component."""
 
     mass: float
     v: float
@@ -110,18 +108,18 @@ STAGES = NODE_STAGES | POINT_STAGES | HEAT_STAGES | ROTATION_STAGES
 
 
 class CompiledHook(NamedTuple):
-    """A function that the compiled loop applies to components of members."""
+    """A function that the compiled loop applies to its members."""
 
     function: Callable
     where: str  # "nodes" (also of heat), "points", "heated points", `WHOLE_POINTS`, `WHOLE_NODES`
-    publishes: bool  # totals become ID_x, ID_y, ID_z
-    uses_before: bool  # needs the formulas one step earlier
-    uses_share: bool  # needs 1 / number of members with mass
-    holds: bool  # sets or bounds v_star; prescribes a temperature
-    tag: Callable | None = None  # makes the tag of a function of whole points
+    publishes: bool  # totals, as ID_x, ID_y, ID_z
+    uses_before: bool  # the formulas one step earlier
+    uses_share: bool  # 1 / number of members with mass
+    holds: bool  # sets or bounds v_star, or prescribes a temperature
+    tag: Callable | None = None  # makes the tag of a whole-point function
     reads: tuple = ()
     writes: tuple = ()
-    internal: bool = False  # not for plug-ins, nor on cards
+    internal: bool = False  # neither for plug-ins nor on GPUs
 
     @property
     def on_nodes(self) -> bool:
@@ -133,7 +131,7 @@ class CompiledHook(NamedTuple):
 
 
 WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
-# Hooks on whole points may act wherever points are.
+# Hooks on whole points work at any point stage.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(ROTATION_STAGES, "nodes"),
@@ -143,8 +141,8 @@ ACTS_ON = {
 
 
 def of_numbers(view: type, function: Callable) -> Callable:
-    """Return the function of a `view` as one of numbers, which kernels call by its address."""
-    if not hasattr(function, "__name__"):  # the fix is refused
+    """Return a function of a `view` as one of plain numbers, callable by address."""
+    if not hasattr(function, "__name__"):  # refused with the fix
         return function
 
     def of_its_numbers(*numbers):
@@ -161,7 +159,7 @@ def node_hook(
     shares: bool = False,
     holds: bool = False,
 ) -> CompiledHook:
-    """Make a compiled hook on nodes from a node function (see the module)."""
+    """Make a hook from a node function (see the module)."""
     seen = of_numbers(OneNode, function)
     return CompiledHook(seen, "nodes", publishes, uses_before, shares, holds)
 
@@ -169,13 +167,13 @@ def node_hook(
 def point_hook(
     function: Callable, *, publishes: bool = True, uses_before: bool = False
 ) -> CompiledHook:
-    """Make a compiled hook on points from a point function (see the module)."""
+    """Make a hook from a point function (see the module)."""
     seen = of_numbers(OnePoint, function)
     return CompiledHook(seen, "points", publishes, uses_before, False, False)
 
 
 def heat_hook(function: Callable, *, publishes: bool = True, holds: bool = False) -> CompiledHook:
-    """Make a compiled hook for ``supply_heat`` from a heat function (see the module)."""
+    """Make a hook for ``supply_heat`` from a heat function (see the module)."""
     seen = of_numbers(WarmPoint, function)
     return CompiledHook(seen, "heated points", publishes, False, False, holds)
 
@@ -184,7 +182,7 @@ class Member(NamedTuple):
     p: Index
     law: Tag
     state: tuple
-    values: tuple  # of formulas
+    values: tuple  # of the formulas
     dt: float
 
 
@@ -195,7 +193,7 @@ def results(tag, members, one):
 
 @point_function()
 def written(tag, members, p, values):
-    """Write the results; return the numbers to publish."""
+    """Write the results; return the values to publish."""
 
 
 WORDS = {
@@ -228,7 +226,7 @@ NODE_WORDS = {
         members, members.nodes.sums, n, arrays.of_force(members.kin)
     ),
 }
-# stages of hooks on whole nodes, and what they can change besides fields
+# what hooks on whole nodes can change, besides fields
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
@@ -289,31 +287,30 @@ def vector_hook(
     nodes: bool = False,
     shares: bool = False,
 ) -> CompiledHook:
-    """Make a compiled hook that sees vectors, declared fields and the law's state of points.
+    """Make a hook that sees vectors, declared fields and the law's state of points.
 
-    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes; with `shares`, too,
-    1 / number of members with mass follows the values.
+    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes. With `shares`, 1 / number
+    of members with mass follows the values.
 
     Parameters
     ----------
     function
-        ``function(*read, values, dt)``: the quantities in `reads`, a tuple of the values of the
-        fix's `formulas`, and the time that the point moves for. It returns the new values of
-        `writes` and, with `publishes`, a number or vector whose sum is published; several as a
-        tuple.
+        ``function(*read, values, dt)`` gets the quantities in `reads`, the values of the fix's
+        `formulas`, and the time of the move. It returns the new values of `writes` and, with
+        `publishes`, a number or vector to sum and publish; several results as a tuple.
     reads
-        Of these: a word of `WORDS`; a class of a declared field, which is a number, a vector, or a
-        tuple of numbers; a function (law, kin, state) such as ``laws.cauchy_stress``.
+        Words of `WORDS`, classes of declared fields (a number, vector or tuple of numbers), or
+        functions (law, kin, state) such as ``laws.cauchy_stress``.
     writes
         ``"velocity"`` or classes of declared fields.
     """
     where = WHOLE_NODES if nodes else WHOLE_POINTS
-    if not getattr(function, "__name__", "").isidentifier():  # the fix is refused
+    if not getattr(function, "__name__", "").isidentifier():  # refused with the fix
         return CompiledHook(function, where, publishes, False, shares, False, None, reads, writes)
-    # In the function's module, so that cached kernels can import it.
+    # Cached kernels import it from the function's module.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
-    while hasattr(module, name):  # the function serves another hook too
+    while hasattr(module, name):  # the function has another hook
         name += "_"
     made = namedtuple(name, ("row", "values"), module=function.__module__)
     setattr(module, name, made)

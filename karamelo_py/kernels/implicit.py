@@ -1,9 +1,9 @@
 """Implicit steps: nodal forces after trial displacements, and their derivatives.
 
-Weights and gradients stay those before the step in Newton's iterations (as in Charlton, Coombs &
+Weights and gradients are those before the step in all Newton iterations (as in Charlton, Coombs &
 Augarde 2017). With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H) (I + H)^-T gives
-the forces V0 P grad N, and dP/dH (:mod:`karamelo_py.compiler.slopes`) the stiffness V0 grad N dP/dH
-grad N, with geometry and yielding.
+the forces V0 P grad N, and dP/dH (:mod:`karamelo_py.compiler.slopes`) the consistent stiffness V0
+grad N dP/dH grad N.
 """
 
 from typing import NamedTuple
@@ -34,7 +34,7 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
-PARTS = 64  # parts of a parallel loop; each has whole groups of lanes
+PARTS = 64  # of a parallel loop, each with whole groups of lanes
 GROUP = 8
 
 
@@ -42,20 +42,20 @@ class Seen(NamedTuple):
     """Nodes that a block's points see, with nonzero weight or gradient."""
 
     count: np.ndarray  # (n,) int32
-    nodes: np.ndarray  # (n, s) int32 index among unknown nodes (int64: in the grid)
+    nodes: np.ndarray  # (n, s) int32 index of the unknown (int64: in the grid)
     weights: np.ndarray  # (n, s)
     gradients: np.ndarray  # (n, s, c) before the step
-    starts: np.ndarray  # (m + 1,) int64: begin of each node in `entries`
-    entries: np.ndarray  # int32 or int64: p s + k of the points that see a node, in order
+    starts: np.ndarray  # (m + 1,) int64: range of each node in `entries`
+    entries: np.ndarray  # int32 or int64: p s + k, over the points that see a node
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes seen by one point: the blocks of K, row by row."""
+    """Pairs of nodes seen by one point: blocks of K, row by row."""
 
-    codes: np.ndarray  # (m,) int64 grid positions of the nodes; differences identify pairs
-    middle: int  # column of the difference 0 in `rank`
-    rank: np.ndarray  # (m, r) int32: index of the other node in a node's row; -1: no pair
-    first: np.ndarray  # (m + 1,) int64: begin of a node's pairs
+    codes: np.ndarray  # (m,) int64 grid positions, whose differences identify pairs
+    middle: int  # column of difference 0 in `rank`
+    rank: np.ndarray  # (m, r) int32: index of the other node in a row, or -1
+    first: np.ndarray  # (m + 1,) int64: range of a node's pairs
 
 
 class Blocks(NamedTuple):
@@ -64,20 +64,20 @@ class Blocks(NamedTuple):
 
 
 class Tangent(NamedTuple):
-    """Derivatives of the stress of points from `first` to `end`."""
+    """Stress derivatives of points from `first` to `end`."""
 
     first: int
     end: int
-    values: np.ndarray  # (t t, c) V0 dP/dH, a row of P after another
-    done: np.ndarray  # (m,) int64 entries of each node so far (`add_stiffness`)
+    values: np.ndarray  # (t t, c) V0 dP/dH, row by row
+    done: np.ndarray  # (m,) int64 entries done of each node
 
 
 class Response(NamedTuple):
-    """Stress of points after trial displacements; t components of a tensor."""
+    """Stress after trial displacements; t components of a tensor."""
 
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P
-    furthest: np.ndarray  # (PARTS,) largest component of a displacement in each part
+    furthest: np.ndarray  # (PARTS,) largest displacement component
 
 
 def row_of(pairs: Pairs, a: int, b: int) -> int:
@@ -116,7 +116,7 @@ def see(frame, at, matter, seen, chunk):
                 gives = gives | (g != 0)
             if gives:
                 slot = count
-                if isinstance(basis, AtCorners):  # corners may see one node
+                if isinstance(basis, AtCorners):  # corners may see the same node
                     for other in range(count):
                         if seen.nodes[p, other] == node:
                             slot = other
@@ -150,7 +150,7 @@ def gradient_at(kin, seen, p, k):
 
 @by_threads
 def strain(kin, seen, u, response, chunk):
-    """Compute H of each point from displacements (m, d)."""
+    """Compute each point's H from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
     most = 0.0
@@ -176,8 +176,8 @@ def strained_point(matter, response, p):
     return law, state, H, mass * specific_volume(law)
 
 
-# Rotation around an axis has an H and a stress conjugate to it that are linear in the unknowns of
-# nodes, but depend on the radius r of the point before the step.
+# Rotation about an axis has H and a conjugate stress linear in the nodal unknowns, but dependent on
+# the point's radius r before the step.
 
 
 @point_function(otherwise=True)
@@ -187,7 +187,7 @@ def radius_of(kin, points, p):
 
 @point_function(otherwise=True)
 def gradient_of(kin, u, slopes):
-    """Return the part of a node with the unknowns `u` in H."""
+    """Return the contribution to H of a node with unknowns `u`."""
     return outer(u, slopes)
 
 
@@ -208,11 +208,11 @@ def add_force(kin, start, stress, slopes):
 
 class IncrementAt(NamedTuple):
     H: tuple
-    r: object = ()  # radius
+    r: object = ()
 
 
 def nominal_stress(law, kin, state, trial, dt):
-    """Return P per reference volume, relative to the positions before the step."""
+    """Return P per reference volume, relative to positions before the step."""
     H, r = trial
     dl = increment_of(kin, H, r)
     after = advance(law, kin, state, large(dl) if by_rates(law) else dl, dt)
@@ -293,7 +293,7 @@ def list_points(seen):
 
 @kernel
 def spread(seen, places):
-    """Return the largest distance between nodes (at places) of one point, along a direction."""
+    """Return the largest distance, along an axis, of nodes (at `places`) seen by one point."""
     most = 0
     for p in range(seen.nodes.shape[0]):
         for i in range(places.shape[1]):
@@ -318,7 +318,7 @@ def mark_pairs(seen, pairs, chunk):
 
 @by_threads
 def add_forces(kin, seen, stress, f, chunk):
-    """Add the nodal forces V0 P grad N of stresses (t, n) to nodes (m, d)."""
+    """Add V0 P grad N of stresses (t, n) to nodal forces (m, d)."""
     seen = at_hand(seen)
     m, width = f.shape[0], seen.nodes.shape[1]
     for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
@@ -353,7 +353,7 @@ def by_gradient(kin, h, C):
 
 
 def by_displacement(kin, D, g):
-    """Return df/du (d d) by a node with gradient g, from df/dH (d t) of another."""
+    """Return df/du (d d) for a node with gradient g, from df/dH (d t) of another."""
     d, t = len(kin.Unknown._fields), kin.tensor_size
     return tuple(
         [
@@ -388,7 +388,7 @@ def add_stiffness(kin, seen, tangent, blocks, chunk):
 
 @kernel
 def add_conductance(kin, seen, conductance, pairs, C):
-    """Add conductances (1, n) of points times grad N_a grad N_b to pairs of nodes."""
+    """Add point conductances (1, n) times grad N_a grad N_b to pairs of nodes."""
     for a in range(pairs.codes.size):
         for e in range(seen.starts[a], seen.starts[a + 1]):
             p, k = seen.entries[e] // seen.nodes.shape[1], seen.entries[e] % seen.nodes.shape[1]
@@ -401,7 +401,7 @@ def add_conductance(kin, seen, conductance, pairs, C):
 
 @kernel
 def scatter(seen, mass, values, nodes):
-    """Add mass times values (d, n) of points to nodes (m, d)."""
+    """Add mass times point values (d, n) to nodes (m, d)."""
     for p in range(seen.nodes.shape[0]):
         for k in range(seen.count[p]):
             share = mass[p] * seen.weights[p, k]
@@ -411,7 +411,7 @@ def scatter(seen, mass, values, nodes):
 
 @kernel
 def gather(seen, nodes, values):
-    """Add values of nodes (m, d) to points (d, n)."""
+    """Add nodal values (m, d) to points (d, n)."""
     for p in range(seen.nodes.shape[0]):
         for k in range(seen.count[p]):
             for i in range(nodes.shape[1]):

@@ -4,14 +4,13 @@ With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k direction
 
     r_p = sum_i N_ip R_i,    R_i = sum_q N_iq V_q J_q / sum_q N_iq V_q.
 
-The energy e(A, r) of a point has P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, with the
-mean p of the stresses tau along these directions. Nodal forces are its derivatives by
-displacements: P grad N, and V J A^-T grad N times the average of q. With S = dR/du, their
-derivatives
+The energy e(A, r) of a point has P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, p being
+the mean of tau along these directions. Nodal forces are P grad N, plus V J A^-T grad N times the
+average of q. With S = dR/du, their derivatives
 
     K + X^T S + S^T Y + S^T Z S
 
-are sums over points, and products of matrices of their nodes: X of dP/dr, Y of dq/dA, Z of dq/dr.
+are sums over points and products of nodal matrices: X of dP/dr, Y of dq/dA, Z of dq/dr.
 """
 
 from typing import Any, NamedTuple
@@ -44,7 +43,7 @@ from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specifi
 
 
 class Averages(NamedTuple):
-    """Averaging of the n points of a block; t components of a tensor."""
+    """Averaging of a block's n points; t components of a tensor."""
 
     volume: np.ndarray  # (1, n) V
     grown: np.ndarray  # (1, n) V J
@@ -52,7 +51,7 @@ class Averages(NamedTuple):
     ratio: np.ndarray  # (1, n) r
     pressure: np.ndarray  # (1, n) q
     mean: np.ndarray  # (1, n) average of q
-    tangent: np.ndarray  # (t t, n) dP/dA, a row of P after another
+    tangent: np.ndarray  # (t t, n) dP/dA, row by row
     by_ratio: np.ndarray  # (t, n) dP/dr
     of_pressure: np.ndarray  # (t, n) dq/dA
     stiffness: np.ndarray  # (1, n) dq/dr
@@ -84,7 +83,7 @@ def grow(matter, response, averages, chunk):
 
 
 def averaged_stress(law, kin, state, change, dt):
-    """Return P and q per reference volume after an increment H, with averaged volume ratio."""
+    """Return P and q per reference volume after an increment H with averaged volume ratio."""
     (H, r), ratio = change
     strain = increment_of(kin, H, r)
     A = I + strain
@@ -139,7 +138,7 @@ def keep_averaged_stress(matter, response, averages):
 
 @by_threads
 def bring_mean(kin, response, averages, chunk):
-    """Add the terms of the average of q to P and its derivatives."""
+    """Add the terms of the averaged q to P and its derivatives."""
     response, averages = at_hand(response), at_hand(averages)
     count = averages.mean.shape[1]
     for p in range(points_of(count, chunk), points_of(count, chunk + 1)):
@@ -166,7 +165,7 @@ def sum_at_nodes(seen, values, sums, chunk):
 
 @by_threads
 def average(seen, nodes, values, chunk):
-    """Fill ``values`` (1, n) with averages at points of nodal values (m,)."""
+    """Fill ``values`` (1, n) with point averages of nodal values (m,)."""
     seen = at_hand(seen)
     count = seen.nodes.shape[0]
     for p in range(points_of(count, chunk), points_of(count, chunk + 1)):

@@ -28,7 +28,6 @@ def _lanes_with(parts, laws, mass):
 
 
 def points_from(lanes: Tag, q: int, end: int) -> Index:
-    """Return point `q`, or the points in lanes from there, before `end`."""
     if isinstance(lanes, OneByOne):
         return index(q)
     return group(lanes, q, min(lanes.width, end - q))
@@ -37,8 +36,8 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Return True if three loops over a stretch (gather, update, scatter) replace one.
 
-    They pay for visits in lanes that only strain: a law alone may fill the instruction cache. Where
-    points move, there is little to update, and finding stencils twice costs more.
+    They pay for passes in lanes that only strain, as a law may fill the instruction cache. Where
+    points move there is little to update, and finding stencils twice costs more.
     """
     strains = [isinstance(task, Strain) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
@@ -50,7 +49,6 @@ def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
 
 
 def zero_of(lanes: Tag, template: Number) -> Number:
-    """Return 0 in the type of `template`, or in lanes of it."""
     return (
         template - template if isinstance(lanes, OneByOne) else spread(lanes, template - template)
     )

@@ -1,7 +1,7 @@
 """Pairs of touching points of two bodies, found with linked cells, and their forces.
 
-Sums are in double precision, on one thread and in the order of the ids, so they do not depend on
-threads or the order in memory.
+Sums are double precision, on one thread and by id, so they depend neither on the number of threads
+nor on the order in memory.
 """
 
 from math import inf, sqrt
@@ -33,8 +33,7 @@ class TwoBodies(NamedTuple):
     mass: np.ndarray  # (n,)
     radius: np.ndarray  # (n,)
     force: np.ndarray  # (n, d)
-    grip: np.ndarray  # (n, d + 2) of the first body (`points.bodies.rub`); (n, 0) without
-    #                   friction
+    grip: np.ndarray  # (n, d + 2) of the first body (`points.bodies.rub`), or (n, 0)
     first2: int
 
 
@@ -46,10 +45,10 @@ class OneOfTwo(NamedTuple):
 
 
 class Push(NamedTuple):
-    law: Tag  # of `points.bodies`
+    law: Tag  # `points.bodies`
     kin: Tag
-    reach: float  # largest distance of touching points, in each direction
-    step: float  # time that points have moved
+    reach: float  # largest distance of touching points along an axis
+    step: float  # time since the last positions
     dt: float  # sets the stiffness, with `kick`
     kick: float
 
@@ -58,11 +57,11 @@ class Cells(NamedTuple):
     """Scratch of the search."""
 
     start: np.ndarray  # (c + 1,) int64, room for c cells
-    cell: np.ndarray  # (n,) int64; -1: nothing can touch it
-    order: np.ndarray  # (n,) int64: points of the second body by cell
-    corner: np.ndarray  # (3,) lower corner of the cells
-    length: np.ndarray  # (3,) lengths of their region
-    count: np.ndarray  # (3,) int64: cells along each direction
+    cell: np.ndarray  # (n,) int64; -1: touches nothing
+    order: np.ndarray  # (n,) int64: points of the second body
+    corner: np.ndarray  # (3,) lower
+    length: np.ndarray  # (3,) of the covered region
+    count: np.ndarray  # (3,) int64 number of cells
     contact: np.ndarray  # (7,) of a point (`_touch`)
     total: np.ndarray  # (3,) force on the first body
 
@@ -92,7 +91,7 @@ def _radius(matter, x, p):
 def extend(matter, x, ids, extents):
     """Extend the extents of two bodies by a block's points at `x` (w, n).
 
-    `extents` (2, 7) holds the largest -x, -y, -z, x, y, z and radius of each body.
+    `extents` (2, 7): largest -x, -y, -z, x, y, z and radius of each body.
     """
     matter = at_hand(matter)
     points = matter.points
@@ -107,7 +106,7 @@ def extend(matter, x, ids, extents):
 
 @kernel
 def pick(matter, x, ids, corners, rows):
-    """Fill `rows` with the points of two bodies between `corners` (2, d); return their number."""
+    """Fill `rows` with the two bodies' points between `corners` (2, d); return their number."""
     matter, count = at_hand(matter), 0
     points = matter.points
     for p in range(points.id.size):
@@ -122,7 +121,7 @@ def pick(matter, x, ids, corners, rows):
 
 @kernel
 def collect(matter, x, rows, out):
-    """Put id, mass, radius, position and velocity of points in `out` (n, 3 + 2 d)."""
+    """Put id, mass, radius, position and velocity of points into `out` (n, 3 + 2 d)."""
     matter = at_hand(matter)
     points, d = matter.points, matter.kin.dimension
     for i in range(rows.size):
@@ -153,7 +152,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover by cells where the bodies may touch; return a cell's width, 0 if nowhere."""
+    """Cover with cells where the bodies may touch; return the cell width, 0 if nowhere."""
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -162,7 +161,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # this form excludes NaN
+        # excludes NaN
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -200,7 +199,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[number + 1] += 1
     for c in range(used):
         cells.start[c + 1] += cells.start[c]
-    # start[c] moves to the end of cell c, where cell c + 1 begins
+    # Moves start[c] to the end of cell c, where c + 1 begins.
     for j in range(n, m):
         c = cells.cell[j]
         if c >= 0:
@@ -237,8 +236,8 @@ def _add(bodies, i, j, force, total):
 def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points; return 1 if they touch, else 0.
 
-    For the friction on `i`, `cells.contact` sums load, normal force, and each partner's stiffness
-    times tangential velocity.
+    For friction on `i`, `cells.contact` sums load, normal force, and stiffness times tangential
+    velocity.
     """
     kin, contact = push.kin, cells.contact
     force, d = _push_between(push, bodies, i, j), kin.dimension
@@ -312,7 +311,7 @@ def push_apart(push, bodies, cells):
                 _rub(push, bodies, i, contact)
             for a in range(max(cx - 1, 0), min(cx + 2, nx)):
                 for b in range(max(cy - 1, 0), min(cy + 2, ny)):
-                    # cells along the last direction are adjacent in `order`
+                    # cells along the last axis are adjacent in `order`
                     first = (a * ny + b) * nz + max(cz - 1, 0)
                     last = (a * ny + b) * nz + min(cz + 1, nz - 1)
                     begin = cells.start[first - 1] if first > 0 else 0

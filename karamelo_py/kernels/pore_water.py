@@ -45,8 +45,7 @@ def _at_water(row, s, step):
 
 
 def _rim(s):
-    # With hats every node is at the rim. Splines: inside, B differs from 0 by the positions of
-    # points.
+    # With hats every node is at the rim. With splines, positions of points make B nonzero inside.
     return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
 
 
@@ -74,7 +73,7 @@ SLOW_COMPANIES = COMPANIES[:1]
 
 
 class Water(NamedTuple):
-    """Water in the pores: its fields and the parts that join tasks and quantities."""
+    """Fields of pore water, and what accompanies tasks and quantities."""
 
     point_fields = pores.POINT_FIELDS
     node_fields = pores.NODE_FIELDS
@@ -86,7 +85,7 @@ def _companies_water(tag):
 
 
 class SlowWater(NamedTuple):
-    """Water in load steps, whose equations are in `run.implicit.pore_water`."""
+    """Water in load steps, with equations in `run.implicit.pore_water`."""
 
 
 @companies.on(SlowWater)

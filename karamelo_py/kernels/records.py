@@ -1,4 +1,4 @@
-"""Node records: rows of node arrays (nodes, components), read and written for numbers and lanes."""
+"""Node records, rows of node arrays (nodes, components), for numbers and lanes."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +11,7 @@ from karamelo_py.compiler.lanes import REGISTER_BYTES, Beside, ask, at_lane, lan
 from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.points.basis.weighted import Weighted
 
-AHEAD = 16  # prefetch distance in nodes
+AHEAD = 16  # nodes to prefetch ahead
 
 
 def put_at(array, i, first, values):
@@ -50,8 +50,8 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
 def accumulate_affine(array, nodes, first, weights, field):
     """Add an affine field times the weights to nodes, from component `first`.
 
-    `field` is the value at the first node, and slopes: the value grows by ``slopes[d]`` to the next
-    node in direction `d` (nodes form a square or cube, last direction fastest), or is constant.
+    `field` is the value at the first node, and its increments ``slopes[d]`` to the next node along
+    axis `d` (nodes form a square or cube, last axis fastest); () if constant.
     """
     value, slopes = field
     width = _width(nodes, slopes)
@@ -63,7 +63,7 @@ def accumulate_affine(array, nodes, first, weights, field):
 
 
 def move_record(target, source, first, template, keep):
-    """Move components of a record of `source` to one of `target`, or add them if `keep`."""
+    """Move components of a record of `source` to `target`, adding if `keep`."""
     array, i = target
     other, j = source
     for k in range(first, first + len(template)):
@@ -88,7 +88,7 @@ _fma = llvm.of_library("llvm.fma")  # a b + c, rounded once
 
 
 def _transposed(builder: ir.IRBuilder, rows: list) -> list:
-    """Transpose four vectors of four or two numbers, from records to lanes."""
+    """Transpose four vectors of four or two numbers."""
     if rows[0].type.count == 2:
         ab = shuffle(builder, rows[0], rows[1], [0, 2, 1, 3])
         cd = shuffle(builder, rows[2], rows[3], [0, 2, 1, 3])
@@ -204,7 +204,7 @@ def _row(array, i, first, template):
 
 @intrinsic
 def _scatter(array, nodes, first, values):
-    """Add to node records lane by lane; sum first if all go to one node."""
+    """Add to node records lane by lane; if all have one node, sum first."""
     lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
@@ -299,7 +299,7 @@ def _scatter_affine(*kinds):
             count = widest if left > 4 else _chunks(left)[0][1]
             column = builder.add(first, I64(begin))
             one = Lanes(array.dtype, count)
-            # by the node's position in the first directions
+            # by the node's position along the first axes
             at = {(): _records_of(builder, components[some], lanes, count)}
             grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
 

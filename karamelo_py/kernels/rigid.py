@@ -1,7 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
-Rigid points scatter to separate sums (`RigidSums`), so nodal sums belong to other solids whatever a
-rigid body's density. The force for its velocity acts on these.
+Rigid points scatter to separate sums (`RigidSums`), so the nodal sums belong to other solids,
+whatever the body's density. The body's force acts on these.
 """
 
 from typing import NamedTuple
@@ -28,10 +28,10 @@ def _at_nodes(s):
 
 @noinline
 def _impose(at, dt, control, n):
-    """Set the velocity of a node with rigid points, and store the force for that in `rigid`.
+    """Set the velocity of a node with rigid points, and store the force in `rigid`.
 
-    Work is as for a prescribed velocity. The change v* - v includes that force, or FLIP points
-    would never acquire the body's velocity.
+    Work is as for a prescribed velocity. The change v* - v includes the force, or FLIP points would
+    never acquire the body's velocity.
     """
     kin, nodes, rigid = at
     d = kin.dimension
@@ -45,7 +45,7 @@ def _impose(at, dt, control, n):
         impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
-            # From the points' momentum, because a fix may have held the node, leaving no change.
+            # from the points' momentum, as a fix may have held the node
             change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity
@@ -107,6 +107,6 @@ class RigidBodies(NamedTuple):
     rows = (each_node(_impose_node), *PUBLISH)
     rows_before = rows_after = (each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
 
-    force: np.ndarray  # (n,) slot of the force on each point's solid, by id, or -1
-    torque: np.ndarray  # (n,) slot of the torque
-    slots: np.ndarray  # (r,) slots of forces and torques
+    force: np.ndarray  # (n,) slot of the force on each point's solid, or -1
+    torque: np.ndarray  # (n,)
+    slots: np.ndarray  # (r,) of forces and torques

@@ -1,22 +1,21 @@
 """Contacts and joints between rigid bodies, solved together with all other loads.
 
 A link has a position, 3 x 6 matrices A and B, and the relative velocity r = A U_a - B U_b of two
-bodies there; its impulse p acts on the first body, and -p on the second, so momentum and angular
-momentum are conserved to round-off. Impulses are stiff and implicit in the velocities at the end of
-the step (`SOFT` is the part of an approach that remains)::
+bodies; its impulse p acts on the first, -p on the second. Impulses are stiff and implicit in the
+velocities at the end of the step (`SOFT` is the fraction of an approach that remains)::
 
     contact:  p_n = max(-(n . r + g / dt), 0) / (SOFT w_n), p_t = -r_t / (SOFT w_t), at most mu p_n
     joint:    p_k = -(e_k . r + c_k / dt) / (SOFT w_k), for each direction e_k that it holds
 
-with g the gap, c the displacement from where the joint holds, and w what a unit impulse changes.
-Newton's method finds the velocities of all bodies together, with their contacts with points.
+with gap g, displacement c of the joint, and w the velocity change per impulse. Newton's method
+finds the velocities of all bodies, with their contacts with points.
 
-Collisions come first, with the velocities before the forces of the step, so bodies at rest do not
-bounce (Guendelman, Bridson & Fedkiw 2003, "Nonconvex rigid bodies with stacking"). They are taken
-one by one, the fastest approach first, so an impulse travels through a row of balls that touch.
+Collisions come first and use the velocities before the forces of the step, so bodies at rest do not
+bounce (Guendelman, Bridson & Fedkiw 2003, "Nonconvex rigid bodies with stacking"). The fastest
+approach is resolved first, so an impulse travels through a row of touching balls.
 
-The surface of a body meets balls in another one: a whole disk or sphere, or small balls in corners
-and along edges, which round these by their radius.
+Contacts are found between the surface of one body and balls in the other: a whole disk or sphere,
+or small balls that round corners and edges.
 """
 
 from math import sqrt
@@ -40,41 +39,41 @@ from karamelo_py.kernels.surfaces import (
 )
 
 SOFT = 1e-5
-GIVEN_BACK = 0.1  # fraction of a penetration removed in a step
-SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # square of the residual over the squared momentum
-SEARCHES, NEAR_MINIMUM = 40, 0.1  # along a step; slope there over the slope at its start
-SLOW = 1e-9  # largest approach without a collision, over the fastest one
-COLLISIONS = 50  # at most, for each contact
+GIVEN_BACK = 0.1  # fraction of a penetration removed per step
+SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # squared residual over squared momentum
+SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope over initial slope
+SLOW = 1e-9  # largest approach without a collision, over the fastest
+COLLISIONS = 50  # at most, per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
 LINK = np.dtype([
     ("kind", np.int64), ("first", np.int64), ("second", np.int64),  # bodies
-    ("at", *_VECTOR), ("ways", *_MATRIX),  # directions; of a contact the first is its normal
+    ("at", *_VECTOR), ("ways", *_MATRIX),  # a contact's first direction is its normal
     ("gap", *_NUMBER), ("mu", *_NUMBER), ("restitution", *_NUMBER),
-    ("stiff", *_VECTOR), ("bias", *_VECTOR),  # by direction
+    ("stiff", *_VECTOR), ("bias", *_VECTOR),  # per direction
     ("constant", *_NUMBER),  # impulse along the first direction
-    ("impulse", *_VECTOR), ("hit", *_VECTOR),  # on the first body; of collisions
+    ("impulse", *_VECTOR), ("hit", *_VECTOR),  # on the first body; by collisions
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
-    ("most", *_NUMBER),  # bound of friction
-    ("slot", np.int64), ("torque", np.int64),  # slots of force and torque, torque 0: none
-    ("sign", *_NUMBER),  # 1 if they are of the first body, -1 of the second
+    ("most", *_NUMBER),  # friction bound
+    ("slot", np.int64), ("torque", np.int64),  # of force and torque; torque 0: none
+    ("sign", *_NUMBER),  # 1: they are of the first body, -1: of the second
 ])  # fmt: skip
 JOINT = np.dtype([
     ("first", np.int64), ("second", np.int64),
-    ("at", *_VECTOR), ("end", *_VECTOR),  # positions in the first and second body, at the start
-    ("axes", *_MATRIX),  # by rows, at the start
-    ("holds", np.int64, 6),  # displacement and rotation along and about each axis
+    ("at", *_VECTOR), ("end", *_VECTOR),  # initial positions in the first and second body
+    ("axes", *_MATRIX),  # initial, as rows
+    ("holds", np.int64, 6),  # displacement along, rotation about each axis
     ("spring", np.int64), ("stiffness", *_NUMBER), ("damping", *_NUMBER), ("length", *_NUMBER),
     ("slot", np.int64), ("torque", np.int64),
 ])  # fmt: skip
 
 
 class LinkedPart(NamedTuple):
-    """A body, or a region that does not move, in contact with others."""
+    """A body, or a fixed region, in contact with others."""
 
-    body: int  # index; the last one does not move
+    body: int  # index; the last body is fixed
     shape: arrays.Tag
-    balls: np.ndarray  # (n, 4) centres at the start, and radii
+    balls: np.ndarray  # (n, 4) initial centres, radii
 
 
 class Meeting(NamedTuple):
@@ -83,7 +82,7 @@ class Meeting(NamedTuple):
     first: LinkedPart
     second: LinkedPart
     numbers: np.ndarray  # (2,) mu, restitution
-    slots: np.ndarray  # (3,) of force and torque, and 1 if they are of the first part, else -1
+    slots: np.ndarray  # (3,) of force and torque; 1 if of the first part, else -1
 
 
 class NoLinks(NamedTuple):
@@ -91,17 +90,17 @@ class NoLinks(NamedTuple):
 
 
 class Links(NamedTuple):
-    """Links, and the state of B bodies and of a last one that does not move."""
+    """Links, and the state of B bodies and one fixed body."""
 
     touches: tuple[Meeting, ...]
     joints: np.ndarray  # (k,) JOINT
     published: np.ndarray  # (k, 2) slots of forces and torques
     rows: np.ndarray  # (n,) LINK
     count: np.ndarray  # (1,) int64
-    dt: np.ndarray  # (1,) of the step
+    dt: np.ndarray  # (1,)
     states: np.ndarray  # (B + 1,) motion.STATE: x, R
     constants: np.ndarray  # (B + 1,) motion.CONSTANTS: start, bound
-    free: np.ndarray  # (B + 1, 6) int64: number of the unknown, or -1
+    free: np.ndarray  # (B + 1, 6) int64: index of the unknown, or -1
     u: np.ndarray  # (B + 1, 6) velocities
     old: np.ndarray  # before the step
     jump: np.ndarray  # by collisions
@@ -109,10 +108,10 @@ class Links(NamedTuple):
     rest: np.ndarray
     trial_rest: np.ndarray
     given: np.ndarray  # impulses of links
-    inverse: np.ndarray  # (B + 1, 6, 6) of the mass matrix, 0 where prescribed
-    slope: np.ndarray  # (m, m + 1), with the right-hand side
+    inverse: np.ndarray  # (B + 1, 6, 6) inverse mass matrix, 0 where prescribed
+    slope: np.ndarray  # (m, m + 1), right-hand side last
     levers: np.ndarray  # (2, 3, 6): A, B
-    weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, with a right-hand side
+    weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, right-hand side last
 
 
 # --- surfaces ---------------------------------------------------------------------------------
@@ -120,9 +119,7 @@ class Links(NamedTuple):
 
 @point_function()
 def closest(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, and the unit direction out of it (d,); 0: further away
-    than `reach`.
-    """
+    """Return the depth of `x` in a shape and the outward unit direction (d,), 0 beyond `reach`."""
 
 
 @closest.on(Convex)
@@ -188,7 +185,6 @@ def _closest_of_parts(shape, kin, x, reach):
 
 @noinline
 def _set_levers(links, link):
-    """Set A and B of a link."""
     for side in range(2):
         body = link.first if side == 0 else link.second
         A, x, centre = links.levers[side], link.at, links.states[body].x
@@ -204,7 +200,6 @@ def _set_levers(links, link):
 
 @noinline
 def _relative(links, link, u, k):
-    """Component `k` of A U_a - B U_b."""
     A, B, r = links.levers[0], links.levers[1], 0.0
     for c in range(6):
         r += A[k, c] * u[link.first, c] - B[k, c] * u[link.second, c]
@@ -213,7 +208,7 @@ def _relative(links, link, u, k):
 
 @noinline
 def _set_weight(links, link):
-    """Set W = A M^-1 A^T + B M^-1 B^T: the change of relative velocity per impulse."""
+    """Set W = A M^-1 A^T + B M^-1 B^T."""
     W = links.weight
     for k in range(3):
         for j in range(3):
@@ -239,7 +234,7 @@ def _along(links, a, b):
 
 @noinline
 def _give(links, link, p, into, by_mass):
-    """Add the impulse `p` of a link to (B + 1, 6) impulses, or the velocities that it changes."""
+    """Add impulse `p` of a link to (B + 1, 6) impulses, or its velocity changes if `by_mass`."""
     for side in range(2):
         A, body = links.levers[side], link.first if side == 0 else link.second
         sign = 1.0 if side == 0 else -1.0
@@ -254,7 +249,7 @@ def _give(links, link, p, into, by_mass):
 
 @noinline
 def _solve_dense(J, m):
-    """Solve J (m, m + 1) by elimination with pivots; the result replaces the last column."""
+    """Solve J (m, m + 1) by pivoted elimination; the solution replaces the last column."""
     for k in range(m):
         best = k
         for a in range(k + 1, m):
@@ -277,7 +272,6 @@ def _solve_dense(J, m):
 
 @noinline
 def _begin(links, body, k):
-    """Copy the state of body `k`, and invert its mass matrix."""
     state, work, inverse = body.state[0], body.solution, links.inverse[k]
     for a in range(3):
         links.states[k].x[a] = state.x[a]
@@ -297,14 +291,14 @@ def _begin(links, body, k):
         links.u[k, c] = work.u[c]
 
 
-# --- which links there are --------------------------------------------------------------------
+# --- finding links ----------------------------------------------------------------------------
 
 
 @noinline
 def _speed(links, body):
     u = links.u[body]
     spin = sqrt(u[3] ** 2 + u[4] ** 2 + u[5] ** 2)
-    # The last body does not move, and its extent is infinite.
+    # The fixed body has an infinite bound.
     return sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2) + (
         spin * links.constants[body].bound if spin > 0 else 0.0
     )
@@ -312,7 +306,7 @@ def _speed(links, body):
 
 @noinline
 def _apart(links, a, b):
-    """Return the distance between the spheres about two bodies; negative if they overlap."""
+    """Return the gap between bounding spheres."""
     x, y, square = links.states[a].x, links.states[b].x, 0.0
     for c in range(3):
         square += (x[c] - y[c]) ** 2
@@ -321,7 +315,6 @@ def _apart(links, a, b):
 
 @noinline
 def _list_touch(links, touch, kin, dt):
-    """List the contacts of balls of the first part with the surface of the second."""
     a, b, d = touch.first.body, touch.second.body, kin.dimension
     reach = 2 * dt * (_speed(links, a) + _speed(links, b)) + 1e-6 * links.constants[a].bound
     if _apart(links, a, b) > reach:
@@ -358,7 +351,6 @@ def _list_touch(links, touch, kin, dt):
 
 @noinline
 def _set_stiffness(links, link, dt):
-    """Set the stiffness and the bias of a contact."""
     _set_levers(links, link)
     _set_weight(links, link)
     along = _along(links, link.ways[0], link.ways[0])
@@ -411,8 +403,9 @@ def _list_joint(links, joint, dt, kick):
 
 @noinline
 def _rotation_between(links, joint):
-    """Return the small rotation vector from the second body's axes to the first's; without the part
-    about the first axis, if this is free.
+    """Return the small rotation vector from the second body's axes to the first's.
+
+    Rotation about the first axis is omitted if free.
     """
     total = [0.0, 0.0, 0.0]
     alone = not joint.holds[3]
@@ -447,10 +440,7 @@ def _set_spring(links, link, joint, way, times):
 
 @noinline
 def _set_impulse(links, link, u, bounded):
-    """Set the impulse of a link at the velocities `u`.
-
-    With `bounded`, friction is limited by the normal impulse of an earlier pass.
-    """
+    """Set the impulse of a link at velocities `u`; `bounded` uses an earlier friction bound."""
     _set_levers(links, link)
     for k in range(3):
         link.slip[k], link.impulse[k] = _relative(links, link, u, k), 0.0
@@ -479,7 +469,7 @@ def _set_impulse(links, link, u, bounded):
 
 @noinline
 def _slope_of(link, k, j, bounded):
-    """Return -dp_k/dr_j of a link whose impulse is known."""
+    """Return -dp_k/dr_j of a link."""
     if link.kind != CONTACT:
         total = 0.0
         for i in range(3):
@@ -499,7 +489,6 @@ def _slope_of(link, k, j, bounded):
 
 @noinline
 def _add_slope(links, link, bounded):
-    """Add the slopes of a link's impulse to the matrix of all bodies."""
     _set_levers(links, link)
     for k in range(3):
         for j in range(3):
@@ -523,7 +512,7 @@ def _add_slope(links, link, bounded):
 
 @noinline
 def _residual(links, bodies, u, rest, bounded):
-    """Put M U - P and all impulses into `rest`; return its square, in units of energy."""
+    """Put M U - P minus all impulses into `rest`; return its square, in units of energy."""
     links.given[:] = 0.0
     for i in range(links.count[0]):
         _set_impulse(links, links.rows[i], u, bounded)
@@ -559,7 +548,6 @@ def _add_body(links, body, n, bounded):
 
 @noinline
 def _try(links, bodies, part, bounded):
-    """Try `part` of the step in the last column of the slope; return the residual's square."""
     m = links.slope.shape[0]
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -571,7 +559,7 @@ def _try(links, bodies, part, bounded):
 
 @noinline
 def _fall(links, rest):
-    """Return the product of a residual with the step in the last column of the slope."""
+    """Return residual . Newton step."""
     m, total = links.slope.shape[0], 0.0
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -582,7 +570,7 @@ def _fall(links, rest):
 
 @noinline
 def _descend(links, bodies):
-    """Go to the minimum along the step; return the square of the residual there, 0 if none.
+    """Move to the minimum along the Newton step; return the squared residual, 0 if not a descent.
 
     With bounded friction the residual is the gradient of a convex function.
     """
@@ -605,7 +593,7 @@ def _descend(links, bodies):
 
 @noinline
 def _iterate(links, bodies, bounded):
-    """Newton's method with halved steps; return whether it has converged."""
+    """Newton's method with halved steps; return whether it converged."""
     m, energy = links.slope.shape[0], 0.0
     size = _residual(links, bodies, links.u, links.rest, bounded)
     for body in bodies:
@@ -643,8 +631,8 @@ def _iterate(links, bodies, bounded):
 def _solve(links, bodies):
     if _iterate(links, bodies, False):
         return
-    # Friction bounds fixed from the last normal impulses: convex, so Newton's method converges. The
-    # first pass has none.
+    # With friction bounds fixed from the last normal impulses the problem is convex, and Newton's
+    # method converges. The first pass has no friction.
     for n, body in enumerate(bodies):
         for a in range(6):
             links.u[n, a] = body.solution.u[a]
@@ -668,7 +656,7 @@ def _solve(links, bodies):
 
 @noinline
 def _approach(links, link, dt):
-    """Return the speed of approach before the step if bodies collide in it, else 0."""
+    """Return the speed of approach before the step if the bodies collide in it, else 0."""
     _set_levers(links, link)
     before = after = 0.0
     for k in range(3):
@@ -680,7 +668,7 @@ def _approach(links, link, dt):
 
 @noinline
 def _hit(links, link):
-    """Take the collision of a contact; friction stops its slip, with at most mu times the push."""
+    """Resolve the collision of a contact; friction stops its slip, up to mu times the push."""
     _set_levers(links, link)
     _set_weight(links, link)
     W, n, r, p = links.weight, link.ways[0], link.slip, link.impulse
@@ -696,7 +684,7 @@ def _hit(links, link):
     if link.mu > 0 and square > 0:
         for k in range(3):
             W[k, 3] = -link.restitution * along * n[k] - r[k]
-            W[k, k] += 1e-12 * trace  # directions in which neither can move
+            W[k, k] += 1e-12 * trace  # directions that neither can move in
         _solve_three(W, p)
         normal = total = 0.0
         for k in range(3):
@@ -707,7 +695,7 @@ def _hit(links, link):
                 p[k] = n[k] - link.mu * (r[k] - along * n[k]) / sqrt(square)
             rate = _along(links, n, p)
             for k in range(3):
-                # A contact that friction jams is taken without it.
+                # Omit friction that would jam the contact.
                 p[k] = -(1 + link.restitution) * along / rate * p[k] if rate > 0 else push * n[k]
     work = 0.0
     for k in range(3):
@@ -721,7 +709,7 @@ def _hit(links, link):
 
 @noinline
 def _solve_three(W, p):
-    """Solve W p = b for a symmetric W (3, 4) with b in its last column, by the adjugate."""
+    """Solve W p = b, W (3, 4) symmetric with b last, by the adjugate."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         total = 0.0
@@ -773,7 +761,7 @@ def _collide(links, bodies, dt):
 
 @noinline
 def find(links, bodies, control, kin):
-    """List the links of this step; return whether there are any."""
+    """List this step's links; return whether there are any."""
     dt, values = control.values[arrays.DT], control.values
     links.count[0], links.dt[0] = 0, dt
     for i in range(links.published.shape[0]):
@@ -801,7 +789,7 @@ def _sum_impulses(links):
 
 @noinline
 def solve(links, bodies, control):
-    """Find the velocities of all bodies at the end of the step, and the impulses of their links."""
+    """Find the bodies' velocities at the end of the step, and the links' impulses."""
     dt, kick, values = control.values[arrays.DT], control.step[0].kick, control.values
     _collide(links, bodies, dt)
     _solve(links, bodies)
@@ -816,7 +804,7 @@ def solve(links, bodies, control):
             link.impulse[c] += link.hit[c]
         _set_levers(links, link)
         _publish(link, values, kick)
-    # with the hits, for the forces that bodies publish
+    # including hits, for published forces
     _sum_impulses(links)
     for n, body in enumerate(bodies):
         for a in range(6):

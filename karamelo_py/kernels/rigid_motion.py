@@ -1,22 +1,20 @@
 """Motion of free rigid bodies, and the impulses of their contacts.
 
-A body is its mass, inertia, position, rotation, momentum and surface. A contact is a position x
-with a mass m and velocity v* of the other body, a normal n out of the rigid one, and a gap g. U =
-(V, w) is the rigid body's velocity at the end of the step, and A U = V + w x (x - X) its velocity
-at x. The impulse of the contact is then known in closed form::
+A contact has a position x, the mass m and velocity v* of the other body, a normal n out of the
+rigid body, and a gap g. With the rigid body's velocity U = (V, w) at the end of the step, its
+velocity at x is A U = V + w x (x - X), and the impulse has a closed form::
 
     p_n = s m max(n . (A U - v*) - g / dt, 0)
     p_t = m (A U - v*)_t, but at most mu p_n
 
-so only the body's equations remain, at most six: M (U - U*) + sum A^T p = 0. Newton's method solves
-them. As this is implicit, the mass of the other body does not limit the step. Contact at points has
-s = 0.1 (dt / dt0)^2, dt0 being the unshortened step: an implicit spring of constant stiffness.
-Contact at nodes has s = 1.
+Newton's method solves the body's equations, at most six: M (U - U*) + sum A^T p = 0. Being
+implicit, it does not limit the step. Contact at points has s = 0.1 (dt / dt0)^2, with dt0 the
+unshortened step: an implicit spring of constant stiffness. Contact at nodes has s = 1.
 
-Forces act over `kick`, motion over dt. While it moves, its angular momentum is constant, and the
-body rotates about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma &
-Wisdom 1994, "Lie-Poisson integrators for rigid body dynamics in the solar system"): the energy of a
-free top oscillates by O(dt^2) and does not drift.
+Forces act over `kick`, motion over dt. With constant angular momentum the body rotates about one
+principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma & Wisdom 1994, "Lie-Poisson
+integrators for rigid body dynamics in the solar system"), so the energy of a free top oscillates by
+O(dt^2) without drift.
 """
 
 from math import atan2, cos, sin, sqrt
@@ -30,42 +28,42 @@ from karamelo_py.kernels.arrays import DT
 from karamelo_py.kernels.contact import ListedPairs
 
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
-# Vectors have three components in any dimension. Restart files have this layout.
+# Vectors have three components in any dimension. Restart files use this layout.
 STATE = np.dtype([
     ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # of the centre
     ("momentum", *_VECTOR),  # angular
-    ("q", np.float64, 4),  # rotation since the start, a quaternion
-    ("angle", *_VECTOR),  # rotation about z in 2D, may exceed 2 pi; rotation vector in 3D
-    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step, about the centre
+    ("q", np.float64, 4),  # rotation since the start (quaternion)
+    ("angle", *_VECTOR),  # 2D: rotation about z, may exceed 2 pi; 3D: rotation vector
+    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step; about the centre
     ("R", *_MATRIX),  # rotation matrix of q
-    ("move", *_VECTOR),  # displacement of the centre in this step, over dt
-    ("spread", *_MATRIX),  # velocity gradient of its points: (rotation in this step - 1) / dt
-    ("passes", *_NUMBER),  # of Newton's method, in this step
-    ("failed", *_NUMBER),  # steps without a solution
+    ("move", *_VECTOR),  # displacement of the centre in this step / dt
+    ("spread", *_MATRIX),  # velocity gradient: (rotation in this step - 1) / dt
+    ("passes", *_NUMBER),  # Newton iterations in this step
+    ("failed", *_NUMBER),  # steps that did not converge
 ])  # fmt: skip
-NUMBERS = STATE.itemsize // 8  # indices from here on, in `slots`: torque about the origin
+NUMBERS = STATE.itemsize // 8  # indices from here on: torque about the origin
 CONSTANTS = np.dtype([
     ("mass", *_NUMBER), ("inertia", *_VECTOR),  # principal moments
-    ("axes", *_MATRIX),  # principal axes, by columns
+    ("axes", *_MATRIX),  # principal axes, as columns
     ("start", *_VECTOR),
-    ("bound", *_NUMBER),  # largest distance of its points from x
-    ("speed", *_NUMBER),  # upper bound of the speeds of its points in this step
-    ("offset", *_VECTOR),  # of the centre of mass from x, in the frame of the start
+    ("bound", *_NUMBER),  # largest distance of a point from x
+    ("speed", *_NUMBER),  # bound of point speeds in this step
+    ("offset", *_VECTOR),  # centre of mass minus x, in the initial frame
 ])  # fmt: skip
 CONTACT = np.dtype([
     ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
     ("mass", *_NUMBER), ("v", *_VECTOR),  # of the other body
     ("mu", *_NUMBER), ("share", *_NUMBER),  # s
     ("impulse", *_VECTOR),
-    # In the last pass:
+    # of the last iteration:
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
-    ("most", *_NUMBER),  # bound of friction
-    ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point, and of its force
+    ("most", *_NUMBER),  # friction bound
+    ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point and its force
     ("torque", np.int64),  # slot, or 0
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
-SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # fractions of the squared residual at the start
-# Formulas of a body: prescribed velocity and spin, force and torque, acceleration.
+SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the initial squared residual
+# Formulas of a body: prescribed velocity and spin, force and torque, acceleration
 LED, LOADED, FALLS, FORMULAS = 0, 6, 12, 15
 
 
@@ -78,40 +76,39 @@ class Formulas(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """Work arrays of a step, (6,): three components of motion, then of rotation."""
+    """Work arrays of a step, (6,): translation, then rotation."""
 
     momentum: np.ndarray  # without contact
     u: np.ndarray  # velocities
     trial: np.ndarray
     residual: np.ndarray
     trial_residual: np.ndarray
-    total: np.ndarray  # of impulses
+    total: np.ndarray  # impulses
     given: np.ndarray  # impulses of other bodies
-    after: np.ndarray  # momentum, with contact
+    after: np.ndarray  # momentum with contact
     before: np.ndarray  # centre before the step, (3,)
     mass: np.ndarray  # (6, 6)
-    slope: np.ndarray  # (6, 7), with the right-hand side
-    lever: np.ndarray  # (3, 6): A; its first half is the unit matrix
+    slope: np.ndarray  # (6, 7), right-hand side last
+    lever: np.ndarray  # (3, 6): A, first half constant (unit matrix)
 
 
 class FreeBody(NamedTuple):
-    field: int  # its velocity field, for contact at nodes
-    ids: np.ndarray  # (2,) first id of its points, and the end
-    dofs: np.ndarray  # (6,) int64: 1 if it moves freely, 0 if prescribed
+    field: int  # velocity field, for contact at nodes
+    ids: np.ndarray  # (2,) ids of its points: first, end
+    dofs: np.ndarray  # (6,) int64: 1 free, 0 prescribed
     constants: np.ndarray  # (1,) CONSTANTS
     state: np.ndarray  # (1,) STATE
-    numbers: np.ndarray  # (NUMBERS,) the state, viewed as numbers
-    slots: np.ndarray  # (k, 2) slots of published values, and their indices in `numbers`
+    numbers: np.ndarray  # (NUMBERS,) view of the state
+    slots: np.ndarray  # (k, 2) slots of published values, indices in `numbers`
     formulas: Formulas
     solution: Solution
     contacts: np.ndarray  # (n,) CONTACT
-    count: np.ndarray  # (1,) int64: number of contacts
-    pairs: ListedPairs  # scratch, of contact at nodes
-    surfaces: tuple  # of `kernels.free_bodies.TouchingSurface`
+    count: np.ndarray  # (1,) int64
+    pairs: ListedPairs  # scratch of contact at nodes
+    surfaces: tuple  # `kernels.free_bodies.TouchingSurface`
 
 
 def index_of(field: str) -> int:
-    """Return the index of a field of STATE in `FreeBody.numbers`."""
     return STATE.fields[field][1] // 8  # type: ignore[index]
 
 
@@ -129,7 +126,7 @@ def records(kind: np.dtype, count: int = 1) -> Any:
 
 @noinline
 def _turn_about(state, axis, angle):
-    """Rotate by `angle` about a principal axis (3,), in the frame of the start."""
+    """Rotate about a principal axis (3,) of the initial frame."""
     q, c, s = state.q, cos(0.5 * angle), sin(0.5 * angle)
     a, b, d, e = q[0], q[1], q[2], q[3]
     x, y, z = s * axis[0], s * axis[1], s * axis[2]
@@ -166,7 +163,7 @@ def _axis(constants, k):
 
 @noinline
 def _along_axis(body, k):
-    """Angular momentum about the `k`-th principal axis."""
+    """Return angular momentum about principal axis `k`."""
     state, (a, b, c), total = body.state[0], _axis(body.constants[0], k), 0.0
     R, L = state.R, state.momentum
     for i in range(3):
@@ -182,7 +179,6 @@ def _drift_about(body, k, dt):
 
 @noinline
 def _set_spin(body):
-    """Set the spin from the angular momentum, after a rotation."""
     state, constants = body.state[0], body.constants[0]
     state.spin[:] = 0.0
     for k in range(3):
@@ -193,7 +189,7 @@ def _set_spin(body):
 
 @noinline
 def _turn_by_spin(body, dt):
-    """Rotate a body whose rotation is partly prescribed, by the spin of the step."""
+    """Rotate by the spin of the step, for partly prescribed rotation."""
     state = body.state[0]
     w = state.spin
     size = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
@@ -204,7 +200,7 @@ def _turn_by_spin(body, dt):
 
 @noinline
 def to_start(state, a):
-    """Rotate a vector back to the frame of the start."""
+    """Rotate a vector back to the initial frame."""
     R, (x, y, z) = state.R, a
     return (
         R[0, 0] * x + R[1, 0] * y + R[2, 0] * z,
@@ -225,7 +221,7 @@ def from_start(state, a):
 
 @noinline
 def place_of(state, constants, x):
-    """Return the present position of a point at `x` (3,) at the start."""
+    """Return the present position of the point initially at `x` (3,)."""
     begin = constants.start
     way = from_start(state, (x[0] - begin[0], x[1] - begin[1], x[2] - begin[2]))
     return way[0] + state.x[0], way[1] + state.x[1], way[2] + state.x[2]
@@ -233,7 +229,6 @@ def place_of(state, constants, x):
 
 @noinline
 def set_mass(body):
-    """Put the mass and the inertia about the present axes into the mass matrix."""
     M, state, constants = body.solution.mass, body.state[0], body.constants[0]
     M[:] = 0.0
     for a in range(3):
@@ -250,7 +245,7 @@ def set_mass(body):
 
 @noinline
 def set_lever(body, x):
-    """Set the matrix A (3, 6) of a position: the velocity of the body there is A U."""
+    """Set A (3, 6), with A U the body's velocity at `x`."""
     A, centre = body.solution.lever, body.state[0].x
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -259,7 +254,7 @@ def set_lever(body, x):
 
 @noinline
 def velocity_there(body, u, k):
-    """Component `k` of A U."""
+    """Return component `k` of A U."""
     v = 0.0
     for a in range(6):
         v += body.solution.lever[k, a] * u[a]
@@ -268,10 +263,7 @@ def velocity_there(body, u, k):
 
 @noinline
 def _set_impulse(body, u, i, dt, bounded):
-    """Set the impulse of contact `i` at the velocities `u`.
-
-    With `bounded`, friction is limited by the normal impulse of an earlier pass.
-    """
+    """Set the impulse of contact `i` at `u`; `bounded` friction uses an earlier pass's bound."""
     c = body.contacts[i]
     slip, normal = c.slip, c.normal
     set_lever(body, c.at)
@@ -312,7 +304,7 @@ def residual(body, dt, u, rest, bounded):
 
 @noinline
 def add_slope(body, i, bounded):
-    """Add A^T (dp/dr) A of contact `i`, whose impulse is known, to the slope."""
+    """Add A^T (dp/dr) A of contact `i` to the slope; its impulse is known."""
     c, A, J = body.contacts[i], body.solution.lever, body.solution.slope
     if not c.push > 0:
         return
@@ -333,7 +325,7 @@ def add_slope(body, i, bounded):
 
 @noinline
 def solve_system(J):
-    """Solve J (6, 7) by elimination with pivots; the result replaces the last column."""
+    """Solve J (6, 7) by pivoted elimination; the solution replaces the last column."""
     for k in range(6):
         best = k
         for a in range(k + 1, 6):
@@ -354,7 +346,7 @@ def solve_system(J):
 
 @noinline
 def _iterate(body, dt, bounded):
-    """Newton's method with halved steps; return whether it has converged."""
+    """Newton's method with halved steps; return whether it converged."""
     work = body.solution
     M, J, energy = work.mass, work.slope, 0.0
     size = residual(body, dt, work.u, work.residual, bounded)
@@ -393,12 +385,12 @@ def _iterate(body, dt, bounded):
 
 @noinline
 def solve(body, dt):
-    """Find the velocities at the end of the step and the impulses."""
+    """Find impulses and velocities at the end of the step."""
     state = body.state[0]
     state.passes = 0
     if _iterate(body, dt, False):
         return
-    # Friction bounds fixed from the last normal impulses: convex, so Newton's method converges.
+    # With friction bounds fixed from the last normal impulses the problem is convex.
     for _ in range(BOUNDS_AT_MOST):
         change = largest = 0.0
         for i in range(body.count[0]):
@@ -417,7 +409,6 @@ def solve(body, dt):
 
 @noinline
 def _value(body, values, k):
-    """Return the value of formula `k` of a body now; 0 if there is none."""
     evaluate, programs, code, numbers, scratch = body.formulas
     program = programs[k]
     if program.begin < 0:
@@ -457,7 +448,7 @@ def start_step(body, control):
 
 @noinline
 def _velocities_of(body, momentum):
-    """Solve M U = P for the free components of U; the others are prescribed."""
+    """Solve M U = P for the free components of U."""
     work = body.solution
     M, J = work.mass, work.slope
     for a in range(6):
@@ -512,7 +503,7 @@ def finish_step(body, control, dimension):
 
 @noinline
 def kinetic_energy(body):
-    """Kinetic energy, with the mass matrix at the start of this step."""
+    """Return the kinetic energy, with the mass matrix at the start of this step."""
     u, M, energy = body.solution.u, body.solution.mass, 0.0
     for a in range(6):
         for b in range(6):
@@ -535,6 +526,6 @@ def _set_angle(state, dt, dimension):
 
 @noinline
 def _about_origin(body, k):
-    """Torque of contact about the origin, with the position of the centre before this step."""
+    """Return the contact torque about the origin, for the position before this step."""
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

@@ -13,12 +13,12 @@ from karamelo_py.points.kinematics import zero_vector
 class Rubbing(NamedTuple):
     normal: np.ndarray  # (n, d) unit
     load: np.ndarray  # (n,)
-    pull: np.ndarray  # (n, d) forces by which the step stretches the springs
-    stop: np.ndarray  # (n, d) forces that stop the slip
+    pull: np.ndarray  # (n, d) stretch of springs in the step, as force
+    stop: np.ndarray  # (n, d) force that would stop the slip
 
 
 def rubbed(mu, load, hold, stop, at):
-    """Return the friction (d,) on a point; ``at`` is its memory, (grip, row), which is updated."""
+    """Return the friction (d,) on a point; ``at`` is (grip, row), its memory, which is updated."""
     (grip, i), d = at, len(hold)
     memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
     force, (hold, mean, unused) = rub(mu, load, memory, stop)

@@ -15,9 +15,9 @@ from karamelo_py.points.grid import Grid, cells_along, in_cells
 
 
 class TileGrid(NamedTuple):
-    size: np.ndarray  # (d,) cells
+    size: np.ndarray  # (d,) in cells
     count: np.ndarray  # (g, d) tiles
-    first: np.ndarray  # (g + 1,) number of the first tile
+    first: np.ndarray  # (g + 1,) first tile
 
 
 class Neighbourhood(NamedTuple):
@@ -40,21 +40,21 @@ class SortedOrder(NamedTuple):
 
     width: int  # of groups of points
     ends: np.ndarray  # (parts, T) ends of tiles; the last row is final
-    share: np.ndarray  # (parts + 1,) first tile of each part of about equally many points
-    boxes: np.ndarray  # (2, T, d) first and last nodes that a tile's points may see
+    share: np.ndarray  # (parts + 1,) first tile of each part, by number of points
+    boxes: np.ndarray  # (2, T, d) first and last nodes a tile's points may see
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
-    order: np.ndarray  # (n,) previous numbers of points
+    order: np.ndarray  # (n,) previous indices
     tile: np.ndarray  # (n,)
     room: np.ndarray  # (2, n) scratch
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Return the cell of a point at `at` cells, clamped: a hook may have moved it anywhere."""
+    """Return the cell of a point at `at` cells, clamped, as a hook may have moved it anywhere."""
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 def _seen(grid, around, g, direction, at):
-    """Return the first and last node that a point of grid `g`, at `at` cells, may see."""
+    """Return the first and last node in reach of a point at `at` cells."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]
@@ -84,7 +84,7 @@ def find_tiles(at, tiles, ends, tile, k):
 
 @noinline
 def _begin_tiles(sorting):
-    """Set where each part's points begin in each tile; divide the tiles by points."""
+    """Set where each part's points begin in each tile; divide tiles by number of points."""
     ends, share, points = sorting.ends, sorting.share, sorting.order.size
     parts = ends.shape[0]
     position = shares = 0
@@ -152,7 +152,7 @@ def _order_in_all_tiles(at, by, sorting, k):
             c, p = cell[0, q], cell[1, q]
             last = bins[k, 1, c]
             bins[k, 1, c] += 1
-            # insertion sort, because nearly all are in order
+            # insertion sort, as nearly all are in order
             while last > bins[k, 0, c] and ids[order[last - 1]] > ids[p]:
                 order[last] = order[last - 1]
                 last -= 1
@@ -203,7 +203,7 @@ def _put_all_rows(rows, room, parts, k):
 
 @noinline
 def _permute(mode, rows, order, room, parts):
-    """Permute rows by `order`, a few at a time to avoid copying a whole field."""
+    """Permute rows by `order`, a few at a time to save memory."""
     first = 0
     while first < rows.shape[0]:
         last = min(first + room.shape[0], rows.shape[0])

@@ -1,6 +1,6 @@
-"""Gather from the nodes of a stencil and scatter to them, node by node or all at once.
+"""Gather and scatter over the nodes of a stencil, one by one or all at once.
 
-Moments along the arms of a stencil, affine sums and corners of domains are done at once.
+Moments along a stencil's arms, affine sums and domain corners are done at once.
 """
 
 from karamelo_py.compiler import all_lanes, point_function, real
@@ -19,10 +19,8 @@ from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block,
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
 from karamelo_py.points.kinematics import from_columns
 
-# --- sums that are affine around a point: mass, momentum, force of MLS ------------------------
-#
-# In lanes, arranged like node records once per point, not per node: half of a scatter's work in 2D,
-# two thirds in 3D.
+# --- affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point,
+# not per node. This is half of a scatter's work in 2D, two thirds in 3D.
 
 
 def _beside(a, b):
@@ -58,7 +56,7 @@ def gathered_by_arms(w):
 
 @point_function(otherwise=True)
 def gathered_at_once(task: Tag, w: Work, stencil: tuple, total: tuple) -> tuple:
-    """Return the total over all nodes of a stencil, or () to gather node by node."""
+    """Return the total over a stencil's nodes, or () to gather node by node."""
     return ()
 
 
@@ -68,8 +66,8 @@ def _gathered_at_once_move(task, w, stencil, total):
     if not len(factor):
         return ()
     velocities = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
-    # sum N v (X - x)^T follows from sum N v and sum N v k, X being k nodes from the first: by rows,
-    # then planes, as weights are products.
+    # sum N v (X - x)^T follows from sum N v and sum N v k, X being k nodes from the first. It is
+    # summed by rows, then planes, as weights are products.
     sums = tuple([(v,) for v, _ in velocities])
     changes = tuple([dv for _, dv in velocities])
     for line in reversed(stencil.lines):
@@ -94,9 +92,9 @@ def _tails(weights, vectors):
 
 
 def _with_moment(weights, row):
-    """Return sum_k w_k v_k and sum_k k w_k v_k of a row (Horner: the sum of suffix sums).
+    """Return sum_k w_k v_k and sum_k k w_k v_k of a row, the latter as the sum of suffix sums.
 
-    `row` is (nodes, vectors); the moment is of the first vectors only.
+    `row` is (nodes, vectors); only the first vectors have a moment.
     """
     first, *others = zip(*row[: len(weights)], strict=True)
     *tails, total = _tails(weights, first)
@@ -108,11 +106,9 @@ def affine_parts(quantities, w, stencil, loads):
     return tuple([eq.affine_part(quantity, w, stencil, load) for quantity, load in pairs])
 
 
-# --- corners of domains, used as nodes -------------------------------------------------------
-#
-# CPDI functions are sums over corners, N_I = sum_c w_c N_I^lin(x_c). What is linear in the weight
-# or gradient of a node is done with the few corners: a corner interpolates from the nodes around
-# it, and distributes contributions to them.
+# --- corners of domains as nodes. CPDI functions are sums over corners, N_I = sum_c w_c
+# N_I^lin(x_c). What is linear in a node's weight or gradient is done with the few corners: a corner
+# interpolates from the nodes around it and distributes to them.
 
 
 def all_by_corners(parts, w):
@@ -174,7 +170,7 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
         return _gather(tasks, w, stencil, totals)
     if isinstance(lanes, OneByOne):
         return _gather_parts(tasks, w, stencil, totals)
-    # Sorted points mostly see the same nodes, with one load for all lanes.
+    # Sorted points mostly see the same nodes, loaded once for all lanes.
     if product.sees_same_nodes(stencil):
         return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)
@@ -196,7 +192,6 @@ def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
 
 
 def _ask_ahead(tags, w, stencil):
-    """Prefetch records after the last node of a stencil."""
     last = entry(w.basis, w.kin, w.grid, stencil, support(w.basis, w.kin) - 1)[0]
     for array in [type(tag).records for tag in tags]:
         if array:

@@ -1,6 +1,6 @@
 """The rows of a step, compiled or interpreted, and the loop over steps.
 
-Many steps run in one compiled call. With hooks written in Python the same source runs interpreted.
+Many steps run in one compiled call; with hooks in Python the same source is interpreted.
 """
 
 import functools
@@ -24,11 +24,11 @@ from karamelo_py.points.laws import wave_speed_squared
 
 
 class Fused(NamedTuple):
-    """As few visits of the points as possible; no hooks on points in between."""
+    """As few passes over the points as possible, without hooks on points between."""
 
 
 class Staged(NamedTuple):
-    """One visit per stage; hooks on points act in between."""
+    """One pass per stage, with hooks on points between."""
 
 
 def rows_of(scheme: Any, visits: Any) -> list[Any]:
@@ -36,7 +36,7 @@ def rows_of(scheme: Any, visits: Any) -> list[Any]:
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """List the rows before the first fused step: the scatter of its last visit."""
+    """List the rows before the first fused step: the scatter of its last pass."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]
@@ -128,8 +128,8 @@ def _take_all(rows, s, step):
 
 
 def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
-    """Make a function that takes the rows of a scheme; it returns whether no point failed."""
-    cached: Any = functools.cache(rows_of_kind)  # interpreted
+    """Make a function that takes a scheme's rows and returns whether no point failed."""
+    cached: Any = functools.cache(rows_of_kind)  # for interpreted runs
 
     def take_all(kind, s, hooks, more):
         scheme, visits, mode = kind
@@ -143,7 +143,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# a step (with `more`, a fused one leaves the next sums), and the rows before the first
+# A step (with `more`, a fused one leaves the next sums); the rows before the first
 step, begin = _taking(rows_of), _taking(first_rows)
 
 
@@ -164,7 +164,7 @@ def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
 
     DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt near
     0), GAINED (spurious energy), HEATED (unexplained temperatures), SORT (a point may soon leave
-    the nodes of its tile; wherever the run resumed).
+    the nodes of its tile).
     """
     values = s.control.values
     stepping, motion = s.control.step[0], s.control.motion[0]
@@ -196,7 +196,6 @@ _by_team = by_team(lambda mode, kind, s, hooks, count: run_steps(kind, s, hooks,
 
 @kernel
 def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
-    """Run `run_steps`, with a team of threads if there is one."""
     return _by_team(kind.mode, kind, s, hooks, count)
 
 
@@ -217,7 +216,6 @@ def _fastest(frame, kin, points, laws, control):
 
 
 def measure(s: Setup) -> None:
-    """Store the present rate in the clock, for the first dt."""
     s.control.motion[0].rate = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

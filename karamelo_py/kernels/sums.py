@@ -1,4 +1,4 @@
-"""Sums at nodes over the boxes of all tiles, in one order for any number of threads."""
+"""Nodal sums over the boxes of all tiles, in one order for any number of threads."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -16,8 +16,8 @@ def adds(quantity: NamedTuple) -> bool:
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List column ranges of the quantities, with adjacent ones joined."""
-    ends: dict[tuple[Any, int], int] = {}  # first column of each array that ends there
+    """List column ranges, adjacent ones joined."""
+    ends: dict[tuple[Any, int], int] = {}  # first column, by array and end
     for one in [one for quantity in quantities for one in type(quantity).gives]:
         array, first = one.into.array, one.into.first(kin)
         ends[array, one.into.end(kin)] = ends.pop((array, first), first)
@@ -37,7 +37,7 @@ def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[An
 
 
 def arrays_given(quantities: tuple, kin: Tag) -> int:
-    """Encode the arrays of the quantities: 1 sums + 2 velocities + 4 fields."""
+    """Encode the quantities' arrays: 1 sums + 2 velocities + 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields

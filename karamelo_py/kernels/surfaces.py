@@ -1,10 +1,10 @@
 """Faces in trees of boxes: distance to the nearest, and whether they enclose a position.
 
-Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes. Node k
-has the children 2k and 2k + 1, so a walk needs no stack. A position is enclosed if the faces wind
-around it: each face crossed by a ray along the last axis counts 1 or -1, by its side. Faces find
-the crossings of a common edge bit for bit, so none is counted twice or omitted. (Winding number:
-Sunday 2001; triangles: Ericson 2005, section 5.1.5.)
+Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes; node k
+has children 2k and 2k + 1, so walks need no stack. A position is enclosed if its winding number is
+not 0: each face crossed by a ray along the last axis counts 1 or -1. Crossings of a common edge are
+computed bit for bit alike, so none is missed or counted twice. (Sunday 2001; triangles: Ericson
+2005, section 5.1.5.)
 """
 
 from collections.abc import Callable
@@ -17,36 +17,36 @@ from karamelo_py.compiler import at_hand, noinline, point_function
 from karamelo_py.compiler.threads import Serial, by_threads
 from karamelo_py.points.kinematics import KINEMATICS, dot
 
-LEAF = 4  # faces
-CHUNK = 1024  # positions that a thread takes at a time
+LEAF = 4
+CHUNK = 1024  # positions per thread at a time
 TINY = float(np.finfo(float).tiny)
 
 
 class Surface(NamedTuple):
     """Faces in a tree of boxes, nodes numbered from 1."""
 
-    low: np.ndarray  # (2 l, d) corners of boxes; the last l nodes are leaves
+    low: np.ndarray  # (2 l, d) box corners; the last l nodes are leaves
     high: np.ndarray
-    faces: np.ndarray  # (m, d, d): face, corner, direction
-    odd: bool  # enclosed by an odd number of crossings: faces have no sides
+    faces: np.ndarray  # (m, d, d): face, corner, axis
+    odd: bool  # faces have no sides: an odd number of crossings encloses
 
 
 class Convex(NamedTuple):
-    """The region below planes and in a ball or (infinite) cylinder."""
+    """Region below planes and within a ball or (infinite) cylinder."""
 
-    planes: np.ndarray  # (k, d + 1): inward normals, and their products with a point
+    planes: np.ndarray  # (k, d + 1): inward normals, and their products with a point on the plane
     across: np.ndarray  # (d,) 1 along axes across which it is round, else 0
     centre: np.ndarray  # (d,)
     radius: float
 
 
 def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
-    """Put `faces` (m, d, d) into a tree with boxes wider by `margin`."""
+    """Put `faces` (m, d, d) into a tree, boxes wider by `margin`."""
     count, _, d = faces.shape
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
     index = ((middle - middle.min(axis=0, initial=np.inf)) / extent * 1023).astype(np.int64)
-    code = np.zeros(count, np.int64)  # along a space-filling curve (Morton 1966)
+    code = np.zeros(count, np.int64)  # along a Morton curve (1966)
     for bit in range(10):
         for k in range(d):
             code |= (index[:, k] >> bit & 1) << (d * bit + k)
@@ -146,7 +146,7 @@ def distance(surface, kin, x, reach):
     leaves = surface.low.shape[0] // 2
     best = reach * reach
     k = 1
-    while k < leaves:  # descend to a near face first, so that the walk enters few boxes
+    while k < leaves:  # descend to a near face first, so that few boxes are entered
         left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
         if min(left, right) >= best:
             break
@@ -201,7 +201,7 @@ def _place_on_triangle(kin, surface, i, x):
 
 @noinline
 def nearest(kin, surface, x, reach):
-    """Return the closest point on the nearest face, which must be nearer than `reach`."""
+    """Return the closest point on the nearest face, which must be within `reach`."""
     leaves = surface.low.shape[0] // 2
     best, face = reach * reach, 0
     k = 1
@@ -220,7 +220,7 @@ def nearest(kin, surface, x, reach):
 
 
 def _offset(surface, kin, x, reach):
-    """Return the largest component of the way to the nearest face, at most `reach`."""
+    """Return the largest component of the vector to the nearest face, at most `reach`."""
     far = reach * sqrt(kin.dimension)
     if distance(surface, kin, x, far) >= far:
         return reach
@@ -243,7 +243,7 @@ def _crossed(a, b, point):
 
 @point_function()
 def _crossing(kin, surface, i, x):
-    """Return 1 or -1, by the side, if a ray from `x` along the last axis crosses face `i`; or 0."""
+    """Return 1 or -1, by side, if a ray from `x` along the last axis crosses face `i`; else 0."""
 
 
 @_crossing.on(KINEMATICS[1])
@@ -269,7 +269,7 @@ def _crossing_triangle(kin, surface, i, x):
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # edge-on: any height between its ends will do
+    # edge-on: any height between its ends serves
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
@@ -300,7 +300,7 @@ def encloses(kin, surface, x):
 
 class HalfSpace(NamedTuple):
     normal: np.ndarray  # (d,) inward
-    offset: float  # its product with a point on the plane
+    offset: float  # product of the normal with a point on the plane
 
 
 class Joined(NamedTuple):
@@ -317,12 +317,12 @@ class Outside(NamedTuple):
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, < 0 outside; exact below `reach`."""
+    """Return the depth of `x` in a shape, negative outside; exact below `reach`."""
 
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within_and_step):
-    """Return depth a step before minus a step after `x`, per axis; `within` is the depth at `x`."""
+    """Return the depth a step before minus a step after `x` along each axis."""
     return _slopes_across(shape, kin, x, reach, within_and_step[1])
 
 
@@ -410,7 +410,7 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Positions (n, d) and a reach give depths (n,), < 0 outside, distances, and largest components of
-# these, at most `reach`.
+# Functions of positions (n, d) and a reach: depths (n,), < 0 outside; distances and their largest
+# components, at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
 offsets = _of_positions(_offset)

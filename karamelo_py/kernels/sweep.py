@@ -1,8 +1,8 @@
-"""Sweeps over the points, tile by tile, and over the nodes in use.
+"""Sweeps over points, tile by tile, and over the nodes in use.
 
-The points of a tile scatter to a separate buffer, a dense box of the nodes they may reach. Then
-each tile of nodes sums the boxes that reach it. Threads divide tiles, without atomics, so the order
-of sums does not depend on their number.
+A tile's points scatter to a separate buffer, a dense box of the nodes in reach. Then each tile of
+nodes sums the boxes that reach it. Threads divide tiles without atomics, so the order of sums does
+not depend on their number.
 """
 
 from math import inf
@@ -42,12 +42,12 @@ from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
-ROUNDING = 1e-3  # rounding error of distances, in cells
-STRETCH = 64  # points whose totals and arrays fit in the nearest cache
+ROUNDING = 1e-3  # of distances, in cells
+STRETCH = 64  # points whose totals and arrays fit in the L1 cache
 
 
 class Visit(NamedTuple):
-    """Tags of a visit of points: tasks, then quantities to scatter."""
+    """A pass over points: tasks, then quantities to scatter."""
 
     tasks: tuple
     quantities: tuple
@@ -71,12 +71,12 @@ class Context(NamedTuple):
     averaging: Tag
     grids: Grid
     nodes: Nodes
-    buffers: Nodes  # nodes to scatter to
+    buffers: Nodes  # to scatter to
     now: int
     room: Number  # cells that points may still move within their tile's box
     stride: Number
     common: tuple  # (d,)
-    then: int  # index of the array of new locations
+    then: int  # index of the new locations
     gathers: bool
     scatters: bool
     dt: Number
@@ -105,7 +105,7 @@ def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points fit their tile's box; else they scatter after sorting."""
+    """Return True while points fit their tile's box; otherwise they scatter after sorting."""
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
@@ -131,15 +131,15 @@ class TileVisit(NamedTuple):
     visit: Visit
     s: Context
     lanes: Tag
-    w: Work  # with the nodes to gather from
-    out: Work  # with the nodes to scatter to
+    w: Work  # nodes to gather from
+    out: Work  # nodes to scatter to
     begin: int
     end: int
 
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of the t-th tile of a block; after a failed point, scatter nothing."""
+    """Visit the points of a block's t-th tile; after a failed point, scatter nothing."""
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
@@ -257,7 +257,7 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
 
 def context_of(s: Setup, extent: Extent) -> Context:
     step, motion, (dt, gathers, scatters, moves) = s.control.step[0], s.control.motion[0], extent
-    # A little more, because points are sorted whenever one did not fit (run.tiles).
+    # slightly more, as points are sorted whenever one did not fit (run.tiles)
     room = motion.drift_limit - motion.drift - motion.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, step.kept), s.averaging, s.grids, s.nodes,

@@ -1,9 +1,9 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
-A scheme's class attribute ``rows`` lists its stages once. Derived from it are the staged step, in
-which fixes act on points between stages; the fused step with the fewest visits of the points, whose
-first scatter joins the last visit of the previous step; the words of `karamelo-py check`; and the
-memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
+A scheme lists its stages once, in ``rows``. From these come the staged step, in which fixes act on
+points between stages; the fused step with the fewest passes over the points, whose first scatter
+joins the last pass of the previous step; the text of `karamelo-py check`; and the memory traffic of
+`karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -39,13 +39,14 @@ class Processor(NamedTuple):
 def take(row: Any, backend: Any) -> Any:
     """Take a row on a back end, `Processor` or `~.compiler.gpu.Card`: ``take.on(Row, Card)``.
 
-    Processor: traced ``(row, s, step)`` of a `Setup` and an `~.kernels.step.InStep`; may return
-    whether no point failed. Card: ``(row, steps)`` of a `~.run.gpu.StepsOnCard`; yields launches.
+    Processor: ``(row, s, step)`` with a `Setup` and `~.kernels.step.InStep` is traced; it may
+    return whether no point failed. Card: ``(row, steps)`` with a `~.run.gpu.StepsOnCard` yields
+    launches.
     """
 
 
 class AtPoints(NamedTuple):
-    """Fixes act on points; `then` is 1 if new positions are known, else 0."""
+    """Fixes act on points; `then` is 1 once new positions are known, else 0."""
 
     stage: int
     then: int
@@ -59,11 +60,11 @@ class AtNodes(NamedTuple):
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task for a fraction of dt."""
+    """Grid to points, over a fraction of dt."""
 
     task: NamedTuple
     share: float = 1.0
-    of_last_step: bool = False  # of the last step: the velocity before the update
+    of_last_step: bool = False  # uses the velocity before the update
 
 
 class Scatter(NamedTuple):
@@ -74,10 +75,10 @@ class Scatter(NamedTuple):
 class NodeTask(NamedTuple):
     """A task at every node in use."""
 
-    task: Any  # a tag, or the class of those that `make` returns
+    task: Any  # a tag, or the class of tags that `make` returns
     at: Any = None  # function of the setup: one with other nodes
-    length: Any = None  # function of the setup: the time interval, not `kick`
-    make: Any = None  # function of the setup that returns the tag
+    length: Any = None  # function of the setup: time interval instead of `kick`
+    make: Any = None  # function of the setup: the tag
 
 
 class EachNode(NamedTuple):
@@ -88,7 +89,7 @@ class EachNode(NamedTuple):
 
 
 class EachPoint(NamedTuple):
-    """``function(s, block, p)`` at every point with a kind of law, called by ``loop(s, block)``."""
+    """``function(s, block, p)`` at every point of one kind of law, called by ``loop(s, block)``."""
 
     function: Any
     law: type
@@ -102,13 +103,13 @@ class Once(NamedTuple):
 
 
 class WorkOfLoads(NamedTuple):
-    """Sum the work of the loads on nodes; `again`: the moved points' velocity is mapped again."""
+    """Sums the work of nodal loads; with `again`, velocity has been mapped again after the move."""
 
     again: bool = False
 
 
 class Repeated(NamedTuple):
-    """``rows(k)`` for k from 0 to ``count(s)`` - 1."""
+    """``rows(k)`` for k < ``count(s)``."""
 
     count: Any
     rows: Any
@@ -120,7 +121,7 @@ class SceneTask(NamedTuple):
 
 
 class Check(NamedTuple):
-    """Check new positions again, after fixes on them."""
+    """Checks new positions after fixes changed them."""
 
 
 class Sweep(NamedTuple):
@@ -130,9 +131,9 @@ class Sweep(NamedTuple):
     gathers: bool = True
     scatters: bool = True
     moves: bool = True  # new positions go to the other array
-    only_if_more: bool = False  # the scatter belongs to the next step
+    only_if_more: bool = False  # the scatter is for the next step
     at: Any = None
-    reported: Any = take_reports  # accepts the points' reports, unless None
+    reported: Any = take_reports  # receives the points' reports, unless None
 
 
 def each_node(function: Any) -> EachNode:
@@ -155,7 +156,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of one visit; strain depends on a move before it, and the step of its v."""
+    """List the tasks of one pass; strain depends on a preceding move, and on the step of its v."""
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -165,7 +166,7 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: Any) -> Any:
-    """Return the classes of tags, because tags without numbers are all equal tuples."""
+    """Return the classes of tags; tags without numbers would compare equal."""
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
@@ -173,8 +174,8 @@ class _FusedStep:
     def __init__(self, rows: Iterable[Any]):
         self.rows: list[Any] = []
         self.visits: list[Visit] = []
-        self.gathers: list[Gather] = []  # of the next visit
-        self.next_sums: Scatter | None = None  # the first scatter, of the last visit
+        self.gathers: list[Gather] = []  # of the next pass
+        self.next_sums: Scatter | None = None  # the first scatter, for the last pass
         for row in rows:
             _FUSED.get(type(row), _FusedStep.add)(self, row)
         self.visit(self.next_sums, more=True)
@@ -213,18 +214,18 @@ _FUSED: dict[type, Any] = {
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step with the fewest visits; sums are on the nodes before it."""
+    """List the rows of a step with the fewest passes; nodal sums exist at its start."""
     return _FusedStep(rows).rows
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows one by one, as parts of the fused step's visits where possible."""
+    """List the rows one by one, as parts of the fused step's passes where possible."""
     rows = list(rows)
     return one_by_one(rows, _FusedStep(rows).visits)
 
 
 def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
-    """List rows as separate visits, or as parts of `loops`."""
+    """List rows as separate passes, or as parts of `loops`."""
 
     def loop_of(single: Visit, items: slice) -> Visit:
         kinds = _kinds(single[items])
@@ -269,18 +270,18 @@ def says(row: Any, setup: Any) -> str | None:
     """Describe a row with the parts that join it in a scene; None if it does nothing there."""
     return _described.find((type(row),))(row, setup)
 
-    # Kinds of rows that are replaced before a step.
+    # Kinds of rows that are replaced before a step
 
 
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
 class Company(NamedTuple):
-    """Company of a task or quantity in a scene (`Setup.company`)."""
+    """Rows and tasks that accompany a task or quantity in a scene (`Setup.company`)."""
 
     before: tuple = ()  # rows before it
-    first: tuple = ()  # tasks or quantities in the same visit, before it
-    then: tuple = ()  # and after it
+    first: tuple = ()  # in the same pass, before it
+    then: tuple = ()  # in the same pass, after it
 
 
 class NoCompany(NamedTuple):
@@ -289,7 +290,7 @@ class NoCompany(NamedTuple):
 
 @point_function(otherwise=True)
 def companies(tag: Any) -> tuple:
-    """Return pairs of a class of tasks or quantities, and its `Company`."""
+    """Return pairs of a class of tasks or quantities and its `Company`."""
     return ()
 
 
@@ -327,7 +328,7 @@ def _after_others(row, s):
 
 @in_scene.on(Sweep)
 def _in_company(row, s):
-    """Add parts that join the visit, and rows before it; F-bar adds a visit before strains."""
+    """Add tasks that join the pass, and rows before it; F-bar adds a pass before strains."""
     averages = average_volumes(row) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)
@@ -382,8 +383,8 @@ def _hold_node(s, n):
 
 
 def hold_axis(s: Setup) -> tuple:
-    """Hold the nodes on an axis of symmetry: v_r = 0, where N / r is unbounded."""
-    # contact normals there are along the axis
+    """Set v_r = 0 on an axis of symmetry, where N / r is unbounded."""
+    # normals on the axis are axial
     return (EachNode(_hold_node, _hold_axis),) if s.kin.hoops else ()
 
 
@@ -440,8 +441,8 @@ def any_node(s):
 def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
-    It is at most 1: below m / m_p, the node's strain would run ahead of its stress. Moments in the
-    total frame return all of the node's velocity, which any limit would make grow.
+    It is at most 1; below m / m_p the node's strain would outrun its stress. Moments in the total
+    frame return the whole nodal velocity, which any limit would make grow.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return any_node(s)
@@ -452,7 +453,7 @@ def light_node(s):
 
 
 def seams(task: type, across: dict) -> Any:
-    """Return rows that join the images of nodes in periodic directions."""
+    """Return the rows that join images of nodes in periodic directions."""
     further = tuple(NodeTask(kind, make=make) for kind, make in across.items())
 
     def rows(s):
@@ -485,7 +486,7 @@ CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
 )
 WORK_OF_LOADS = WorkOfLoads()
-# the deforming velocity must satisfy contact too, unless it is v*
+# The deforming velocity must satisfy contact too, unless it is v*.
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
@@ -496,7 +497,7 @@ BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
 MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
-# schemes that strain first: nodal velocity before the forces act
+# for schemes that strain first: nodal velocity before the forces
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
     AXIS,
@@ -505,7 +506,7 @@ VELOCITY_BEFORE = (
     CONTACT_BEFORE,
 )
 FORCE = Scatter((InternalForce(),), OldWeights())
-# v* = v + dt f / m, with loads, prescribed velocities, contact; heat flow
+# v* = v + dt f / m with loads, prescribed velocities, contact; heat flow
 UPDATE = (
     SceneTask(sort_in_time),
     SEAM,
@@ -527,7 +528,7 @@ MOVE = (
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
-# the moved points' velocity, mapped to the nodes again
+# velocity of the moved points, mapped again
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
     SEAM_AGAIN,

@@ -1,8 +1,8 @@
 """Sums independent of the order of their terms: reactions, work, energies.
 
-A total is a superaccumulator: a fixed-point number as wide as the range of doubles, in limbs of 32
-bits with room for carries. Terms are added without rounding; a published total is right within a
-unit of its last digit (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
+A total is a superaccumulator: a fixed-point number over the range of doubles, in limbs of 32 bits
+with room for carries. Terms are added without rounding; a published total is right within a unit in
+the last place (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
 superaccumulators").
 """
 
@@ -15,15 +15,15 @@ from karamelo_py.compiler import kernel, noinline, point_function
 from karamelo_py.compiler.threads import add_among, many_threads
 
 LIMBS = 68
-LOST = LIMBS - 1  # counts terms that are NaN or infinite
+LOST = LIMBS - 1  # counts NaN and infinite terms
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
-MANY = 1 << 10  # terms whose integers can be summed without overflow
-COARSE, FINE = 1e-200, 1e200  # range of the largest term for which terms are summed as integers
-MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign, ordered like the numbers
+MANY = 1 << 10  # terms whose integers sum without overflow
+COARSE, FINE = 1e-200, 1e200  # range of the largest term that allows integer sums
+MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign; ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# rows of the totals, in slots of published values (time, timestep, dt) that are not sums
+# rows of totals, in slots of published values that are not sums (time, timestep, dt)
 KINETIC, STORED, WORK = 0, 1, 2
 
 
@@ -170,7 +170,7 @@ def add_torque(totals, row, x, c, force):
 
 @point_function(otherwise=True)
 def collect(ranks, control, first, count):
-    """Put the values of `count` totals, from row `first` on, into `control.answer`."""
+    """Put the values of `count` totals from row `first` on into `control.answer`."""
     _round(control.totals, control.digits, control.answer, first, count)
 
 
@@ -197,7 +197,7 @@ def agree_on_heat(ranks, control):
 
 @point_function(otherwise=True)
 def take_over(ranks, due):
-    """Wait for the contributions of other processes' tiles to nodes in use here."""
+    """Wait for contributions of other processes' tiles to nodes in use here."""
 
 
 def publish(control, slot, count):

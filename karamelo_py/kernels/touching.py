@@ -1,6 +1,6 @@
-"""Contact of points with the surface of a shape, which may move, in the loop over points.
+"""Contact of points, as balls, with the surface of a shape that may move.
 
-A point is a ball; its force is along the steepest descent of its depth.
+Forces act along the steepest descent of the depth.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
 from karamelo_py.points.kinematics import dot, zero_vector
 
-STIFF = 0.5  # contact stiffness, over m / dt^2
-DAMPED = 0.02  # contact damping, over m / dt
-STIFFENING = 0.02  # fraction of the depth removed in a step, of a deep contact
-ASIDE = 0.05  # step of depth differences, over the reach
-LEVEL = 1e-3  # change of depth over that step, below which there is no direction
+STIFF = 0.5  # stiffness / (m / dt^2)
+DAMPED = 0.02  # damping / (m / dt)
+STIFFENING = 0.02  # growth of the stiffness of a deep contact per step
+ASIDE = 0.05  # step of depth differences / reach
+LEVEL = 1e-3  # relative change of depth below which there is no direction
 CALL = types.int64(types.int64)
 
 _call = caller_of(CALL)
@@ -37,14 +37,14 @@ class Touch(NamedTuple):
     shape: NamedTuple
     mu: float
     reach: float  # largest known depth
-    lost: int  # address of a function called for a point without a way out
+    lost: int  # address of a function for points without a way out
 
     of_nodes = False
     of_time = True  # formulas of time, also at the end of the step
 
 
 def direction_of(falls, step):
-    """Return the unit direction of depth differences over two steps; 0 if level."""
+    """Return the unit direction of depth differences, 0 if level."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
@@ -55,17 +55,17 @@ def memory_of(tag, members):
 
 
 def ball_at_first(ball, within, closer):
-    """Return the radius of a point at its first touch, which came `closer` in the last step.
+    """Return the radius of a point at first touch, after approaching by `closer` in the last step.
 
-    Points that begin in the region, as at stair-stepped faces, have no energy of that: their balls
-    reach to the surface.
+    Points that begin inside, as at stair-stepped faces, must not gain energy from this: their balls
+    only reach to the surface.
     """
     room = max(closer, 0.0) - within
     return min(ball, room) if room > 0 else ball
 
 
 def spring_rate(before, now, within, reach):
-    """Return stiffness over mass, as at the first touch, which conserves energy.
+    """Return stiffness over mass, constant from the first touch on to conserve energy.
 
     A larger one would add energy, a much softer one let points through.
     """
@@ -75,13 +75,13 @@ def spring_rate(before, now, within, reach):
 
 
 class NearPoint(NamedTuple):
-    """A point near a shape (or n points, in rows): depth of its centre, way out, first radius."""
+    """A point near a shape (or n points, in rows): centre, depth, way out, first radius."""
 
-    x: Any  # (d,) in the frame of the shape
+    x: Any  # (d,) in the shape's frame
     within: Any
     normal: Any  # (d,)
     whole: Any
-    slip: Any  # (d,) velocity of the shape, seen from the point
+    slip: Any  # (d,) velocity of the shape relative to the point
     mass: Any
 
 
@@ -105,7 +105,7 @@ def leave(memory, p, near):
 
 
 def push(terms, memory, p, near):
-    """Return the force (d,) on a point that touches; update its `memory`.
+    """Return the force (d,) on a touching point; update its `memory`.
 
     `terms`: friction coefficient, largest known depth, dt, contact dt and kick, and kick.
     """
@@ -114,7 +114,7 @@ def push(terms, memory, p, near):
     d, last_dt, closer = len(x), dt, dt * dot(slip, normal)
     ball, aside = reach_of(lever, p, whole, d)
     rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, reach)
-    if lever[d + 1, p] > 0:  # from positions, because velocities are noisy
+    if lever[d + 1, p] > 0:  # from positions, as velocities are noisy
         closer, last_dt = within + ball + aside - float(lever[d + 2, p]), 2 * kick - dt
     else:
         ball = ball_at_first(ball, within, closer)
@@ -129,7 +129,7 @@ def push(terms, memory, p, near):
     hold = x._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = x - x
-    if mean > 0:  # from positions, because velocities are noisy
+    if mean > 0:  # from positions, as velocities are noisy
         slid = x._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + mass * rate * slid, normal)
@@ -142,7 +142,7 @@ def push(terms, memory, p, near):
 
 @kernel
 def push_points(kin, terms, memory, near, force):
-    """Set the forces (n, d) of a shape that kernels do not know on n points."""
+    """Set the forces (n, d) on n points of a shape unknown to kernels."""
     d, none = kin.dimension, zero_vector(kin, 0.0)
     x, within, normal, whole, slip, mass = near
     for p in range(mass.size):

@@ -1,4 +1,4 @@
-"""Views of a point, `pt`, and of a node it sees, `node`: what equations read.
+"""Views of a point, `pt`, and of a node it sees, `node`, which equations read.
 
 They exist only while a kernel is traced. docs/house/kernels.md lists their attributes, with shapes
 and units.
@@ -36,7 +36,7 @@ from karamelo_py.points.transfers import Moment, gradient_weight, zero_moment
 
 
 class Work(NamedTuple):
-    """Arrays and tags of a visit; made once per tile."""
+    """Arrays and tags of a pass, made once per tile."""
 
     frame: Tag
     kin: Tag
@@ -46,9 +46,9 @@ class Work(NamedTuple):
     averaging: Tag
     nodes: Nodes
     points: Points
-    laws: NamedTuple  # parameters of materials, (m,) each
+    laws: NamedTuple  # material parameters, (m,) each
     locations: Locations
-    common: tuple  # (d,) reference velocity for speeds
+    common: tuple  # (d,) reference velocity
     kick: Number
 
 
@@ -74,7 +74,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 
     def v_star(self, template):
-        """v* and v* - v, in the type of `template`; one record in 2D, two in 3D."""
+        """Return v* and v* - v in the type of `template`; one record in 2D, two in 3D."""
         kin, records, i = self.w.kin, self.w.nodes.update, self.i
         first, d = of_change(kin), kin.dimension
         if many_threads() and not isinstance(i, Weighted):  # adjacent records
@@ -93,7 +93,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return vector_at(kin, records, self.i, 0, self.grad_N[: kin.dimension])
 
     def of(self, kind):
-        """The array of a field of nodes, or None."""
+        """Return the array of a field of nodes, or None."""
         return field(self.w.nodes.fields, kind)
 
 
@@ -120,7 +120,7 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
         return tuple([node_of(w, self.stencil, k) for k in range(support(w.basis, w.kin))])
 
     def of(self, kind):
-        """The array of a field of points, or None."""
+        """Return the array of a field of points, or None."""
         return field(self.w.points.fields, kind)
 
     def load(self, kind, template):
@@ -129,7 +129,7 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
 
 
 def location_at(basis: Tag, kin: Tag, array: np.ndarray, p: Index) -> tuple:
-    """Load a location (w,): position, and domain shape."""
+    """Load a location (w,): position and domain shape."""
     return load(array, p, blank(basis, kin, load_vector(kin, array, p)))
 
 
@@ -151,7 +151,7 @@ def volume_of(kin: Tag, points: Points, law: Tag, state: tuple, p: Index) -> Num
 
 
 def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Index) -> tuple:
-    """Return F of a point if the frame needs it, else (); `material`: law and state."""
+    """Return F of a point if the frame needs it, else (); `material` is (law, state)."""
     if frame.moves:
         return ()
     law, state = material
@@ -160,7 +160,7 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
 
 
 def ask_ahead(w: Work, p: Index, template: Number, apart: bool) -> None:
-    """Prefetch the next points in 3D, if more arrays than hardware prefetchers follow."""
+    """Prefetch the next points in 3D, if more arrays are read than hardware prefetchers follow."""
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, template))
     if d == 3 and (apart or moment):

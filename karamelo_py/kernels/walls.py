@@ -1,7 +1,7 @@
 """Coulomb friction at walls: nodes that a fix holds across a wall rub along it.
 
-The normal force is the one for the prescribed velocity; the tangential force is at most mu times as
-large, and at most what stops the motion. The wall does not move along itself.
+The normal force is the one for the prescribed velocity. The tangential force is at most mu times as
+large, and stops at most the motion. The wall does not move along itself.
 """
 
 from math import sqrt
@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, add_torque, counts
 
-FRICTION = 3  # program of the coefficient, after the components'
+FRICTION = 3  # program of the coefficient, after the components
 
 
 @noinline
@@ -22,7 +22,7 @@ def _is_free(holders, programs, n, c):
 
 @noinline
 def rub(members, call, q, mu):
-    """Apply wall friction to chosen node `q`; the normal impulse is the holder's change of v*."""
+    """Apply wall friction to chosen node `q`; the holder's change of v* is the normal impulse."""
     kin, nodes, hooks, control, dt = members.kin, members.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], members.kept
     d, holders, n = kin.dimension, hooks.holders, hooks.chosen[q]
@@ -59,13 +59,13 @@ def rub(members, call, q, mu):
                 if torque > 0:
                     x = (place[0, q], place[1, q], place[2, q])
                     add_torque(control.totals, torque, x, c, -mass * taken / dt)
-    # a wall takes no heat
+    # walls take no heat
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Also stop a stuck node's deforming velocity: stress would do work on spurious slip."""
+    """Stop a stuck node's deforming velocity too, or stress would do work on spurious slip."""
     d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:

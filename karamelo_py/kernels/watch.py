@@ -1,10 +1,10 @@
-"""The monitor of energy and temperatures, at intervals of steps, in the compiled loop.
+"""Compiled monitor of energy and temperatures.
 
-Kinetic plus stored plus dissipated energy minus the work of loads cannot grow. Velocities belong to
-the middles of steps, stresses to their ends: two consecutive steps give energies at one time, to
-second order. Growth is relative to the energy without drift (of the centres of mass), which could
-hide vibrations. The same checks measure how many cells stressed material moves through
-(`note_crossing`), by which a linear basis in the updated frame loses stress.
+Kinetic plus stored plus dissipated energy minus the work of loads must not grow. Velocities belong
+to mid-steps and stresses to ends, so two consecutive steps are combined, to second order. Growth is
+relative to the energy without the drift of centres of mass, which could hide vibrations. The checks
+also count the cells that stressed material crosses (`note_crossing`), by which a linear basis in
+the updated frame loses stress.
 """
 
 from math import exp, inf, sqrt
@@ -35,20 +35,20 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.across import Across
 from karamelo_py.points.laws.pore_water import Saturated, water_content
 
-LOOK = 10  # steps between two checks
+LOOK = 10  # steps between checks
 FEW = 3  # checks compared before a window is full
-LOOKS = 10  # checks averaged in a window, 100 steps
-GROWTH = 0.01  # fraction of the largest energy in a window that gives a warning
-WITHIN = 0.1  # fraction of the unit since the start that gives a warning
-DRIFTING = 1e-3  # fraction of drift energy in the unit: relevant vibrations have more
-BOUND = 10.0  # times initial energy and work of loads: more stops the run
-ROUND_OFF = 1e-14  # fraction of m c^2; smaller energies are noise
+LOOKS = 10  # checks per window
+GROWTH = 0.01  # growth per window that gives a warning
+WITHIN = 0.1  # growth since the start that gives a warning
+DRIFTING = 1e-3  # least fraction of drift energy in the unit; relevant vibrations exceed it
+BOUND = 10.0  # times initial energy plus work of loads: a larger gain stops the run
+ROUND_OFF = 1e-14  # fraction of m c^2 below which energy is noise
 COARSE = 1000.0  # round-off errors: a strain of this size is noise
-ENERGIES, OF_SOLID = 3, 5  # columns of the reports of tiles
-HEAT_NOISE = 1e-4  # fraction of a temperature that is tolerated if all are equal
-OVERSHOOT = 0.1  # fraction of the range of temperatures from the sources that stops the run
-# Tolerated multiple of the stable step of conduction: point temperatures in the null space decay
-# (measured with 2 points per cell: 4 and 5.8 with and without convection).
+ENERGIES, OF_SOLID = 3, 5  # columns of tile reports
+HEAT_NOISE = 1e-4  # tolerated fraction of a uniform temperature
+OVERSHOOT = 0.1  # fraction of the range of source temperatures that stops the run
+# Tolerated multiple of conduction's stable step: null-space temperatures decay (measured with 2
+# points per cell: 4, and 5.8 without convection).
 BORNE = 4.0
 
 
@@ -57,7 +57,7 @@ def solid_of(firsts, number):
 
 
 def energies_of(kin, points, laws, p):
-    """Return mass, velocity, kinetic, elastic, and elastic plus dissipated energy of a point."""
+    """Return mass, velocity, kinetic energy, elastic energy, elastic plus dissipated energy."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
@@ -122,7 +122,6 @@ def water_energy(kin, points, laws, relative, p):
 
 @kernel
 def _add_water(matter, relative, control):
-    """Add the kinetic energy of the water in pores."""
     (kin, points, laws), relative = at_hand(matter), at_hand(relative)
     for p in range(points.mass.size):
         energy = water_energy(kin, points, laws, relative, p)
@@ -142,7 +141,6 @@ def _take_work_across(matter, control):
 
 @kernel
 def _take_work_at_nodes(spans, work, control):
-    """Add work at nodes, and clear it."""
     for r in range(1, 1 + spans[0, 0]):
         for n in range(spans[r, 0], spans[r, 1]):
             counted = totals.counts(control.ranks, n)
@@ -152,7 +150,7 @@ def _take_work_at_nodes(spans, work, control):
 
 
 def sum_energies(s, mode):
-    """Sum kinetic, stored plus dissipated energy, and work in the clock, without rigid bodies."""
+    """Sum energies and work in the clock, without rigid bodies."""
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
@@ -184,7 +182,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, motion, tiling, control):
-    """Add the solids' mass and momentum, then elastic energy and this times velocity."""
+    """Add the solids' mass and momentum, then elastic energy and that times velocity."""
     (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
@@ -244,7 +242,7 @@ def take_drift(s):
 def note_crossing(control, d):
     """Add the cells that elastic energy moved through since the last check.
 
-    New energy has no path; vibrations renew it in the time of a wave there and back.
+    New energy has no path; vibrations renew it in one wave period.
     """
     energy, row = control.energy[0], (control.firsts.size - 1) * (1 + d)
     now, before = control.answer[row], energy.elastic
@@ -260,7 +258,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((energy.kinetic - energy.of_drift) / now, 0.0), 1.0) * lasting / energy.to_and_fro
     )
-    # the loss by a linear basis does not count as leaving
+    # loss by a linear basis does not count as leaving
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -288,7 +286,7 @@ def keeps(first, later, unit, within=WITHIN):
 
 
 def unit_of(energy):
-    """Return the largest energy, with a limited part of drift."""
+    """Return the largest energy, with limited drift."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 
@@ -296,9 +294,8 @@ def unit_of(energy):
 def judge(control):
     """Update the balance; return whether energy is within its bound."""
     energy = control.energy[0]
-    # Mean of the balances at the middle and the end of a step, the other energy interpolated. With
-    # the phase omega dt of a step, each oscillates by (omega dt)^2/8, in opposite phase, and the
-    # mean by (omega dt)^3/16.
+    # Mean of the balances at mid-step and end, the other energy interpolated. They oscillate by
+    # (omega dt)^2/8 in opposite phase, the mean by (omega dt)^3/16.
     moving = energy.kinetic - energy.work
     balance = moving + energy.level * (energy.moving_before - moving)
     balance += energy.stored_before + energy.level * (energy.stored - energy.stored_before)
@@ -316,8 +313,7 @@ def judge(control):
         energy.supplied,
         energy.of_bodies,
     )
-    # A small part of a rigid body's energy may be all of the energy of a body that it
-    # touches.
+    # A small part of a rigid body's energy may be all of what a touched body has.
     vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
@@ -329,15 +325,15 @@ def judge(control):
         if loss > energy.lost:
             energy.lost = loss
             energy.crossed = way
-            # means, because a single check also shows the shortest waves
+            # means, as a single check shows the shortest waves
     unit = unit_of(energy)
     if energy.looks == FEW:
         energy.first_few = energy.first_mean = energy.largest_mean = (
             balance + energy.last_balance + energy.last_but_one
         ) / FEW
     if energy.looks >= 2 * FEW:
-        # Minimum of a few, because a check or two may be wrong in collisions; stored, so that the
-        # result does not depend on the last check.
+        # A minimum, as single checks may err in collisions; stored, so the last check does not
+        # decide.
         least = min(balance, energy.last_balance, energy.last_but_one)
         energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
     energy.sum_of_balance += balance
@@ -351,7 +347,7 @@ def judge(control):
         energy.grown = max(energy.grown, growth(energy.first_mean, mean, unit))
         energy.largest_mean = max(energy.largest_mean, mean)
     reference = abs(energy.first_balance) + energy.supplied
-    # this form notices NaN
+    # False for NaN
     return balance - energy.first_balance <= max(BOUND * reference, energy.energy_floor)
 
 
@@ -363,7 +359,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # this form notices NaN
+            # also replaced by NaN
             heat.T_low = T if not heat.T_low <= T else heat.T_low
             heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)
@@ -391,9 +387,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store energies if a check is due; `level` is the fraction of the later stored energy in
-    balances.
-    """
+    """Store energies if a check is due; `level` is the weight of the later stored energy."""
     energy = s.control.energy[0]
     energy.level = level
     if anew:
@@ -423,7 +417,7 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Check the energy after an implicit step, with velocities and stresses of one time."""
+    """Check the energy after an implicit step, with velocities and stresses at the same time."""
     if s.control.energy[0].watch_energy == 0:
         return True
     _sum_before(s, mode, int(s.control.values[TIMESTEP]))

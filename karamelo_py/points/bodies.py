@@ -1,4 +1,4 @@
-"""Size of points as bodies, and the force between two points that touch as spheres."""
+"""Size of points as bodies, and the force between two touching spheres."""
 
 from math import pi, sqrt
 from typing import Any, NamedTuple
@@ -7,17 +7,17 @@ from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import dot, product
 
-NEW = 0.05  # weight of the latest step in the running mean of the load
+NEW = 0.05  # weight of the latest step in the mean load
 
 
 class Hertz(NamedTuple):
-    """Spheres (in 2D disks) pressed together elastically."""
+    """Spheres (disks in 2D) pressed together elastically."""
 
     modulus: float  # E* with 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2
 
 
 class MinimizePenetration(NamedTuple):
-    """Removes the overlap of two free points within one step, with Coulomb friction."""
+    """Removes the overlap of two free points within a step, with Coulomb friction."""
 
     friction: float
 
@@ -75,8 +75,8 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 
 class FrictionMemory(NamedTuple):
-    hold: Any  # spring force along the surface, a vector
-    mean: Any  # running mean of the load
+    hold: Any  # spring force along the surface
+    mean: Any  # of the load
     unused: Any  # friction left from earlier steps
 
 
@@ -85,16 +85,16 @@ def rub(mu, load, memory, stop):
 
     `stop` = m v/dt would stop a free point, but lets loaded points creep. So slip also stretches a
     spring as stiff as the normal contact, whose force `hold` is returned to the friction cone
-    (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Because points bounce on a stiff
-    contact, a step may spend friction `unused` in earlier steps, up to mu times the `mean` load. A
-    point that always slides has mu times the load of each step.
+    (Wriggers 2006, "Computational Contact Mechanics", chapter 5). As points bounce on a stiff
+    contact, a step may spend friction `unused` earlier, up to mu times the `mean` load. A point
+    that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)
     unused = (1 - NEW) * unused + mu * load
     bound = mu * max(mean, load)
     force = _shortened(hold + stop, min(bound, unused))
-    # Rounding must not make friction negative: it would accelerate the slip.
+    # Rounding must not make friction negative, which would accelerate the slip.
     left = max(unused - sqrt(force.squared()), 0.0)
     return force, FrictionMemory(_shortened(hold, bound), mean, left)
 

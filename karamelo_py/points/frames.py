@@ -34,14 +34,14 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """Convert the frame's `dl` to the spatial increment dt grad v, with F before the step."""
-    # F + dt Fdot = (I + dt Fdot F^-1) F (exact)
+    """Convert the frame's `dl` to the spatial increment dt grad v; F is from before the step."""
+    # F + dt Fdot = (I + dt Fdot F^-1) F, exactly
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
-    """Convert `dl` after a motion to the positions before it."""
-    # grad v changes by (I - dl)^-1, so F grows by (I - dl)^-1 exactly; accurate for small dl.
+    """Convert `dl` after a move to the positions before it."""
+    # grad v changes by (I - dl)^-1, so F grows by (I - dl)^-1 exactly.
     return dl @ inv(I - dl) if frame.moves else dl
 
 

@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
-Length = Any  # of one grid; of all grids, as arrays, in the setup of a scene
+Length = Any  # of one grid, or an array over all
 Count = Any
 
 
 class Grid(NamedTuple):
-    """One grid of a scene; lengths in units of the scene, counts in cells."""
+    """One grid of a scene, lengths in scene units."""
 
     x0: Length  # lower corner
     y0: Length
@@ -24,10 +24,10 @@ class Grid(NamedTuple):
     lx: Length  # in cells, may be fractional
     ly: Length
     lz: Length
-    slack: Length  # points this far outside (in cells) count as inside
+    slack: Length  # cells by which points outside count as inside
     step_x: Count  # stride of node numbers
     step_y: Count
-    first: Count  # first node number
+    first: Count  # node number
     first_cell: Count
 
 
@@ -52,7 +52,7 @@ def inside(grid, kin, x):
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
-        # False for NaN.
+        # False for NaN
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
 
@@ -65,7 +65,7 @@ def node_position(grid, n):
 
 
 class Bounces(Field):
-    """Reflections of a point at the edge of the domain, per direction."""
+    """Reflections of a point at the domain's edges, per direction."""
 
     shape = vector
 
@@ -111,7 +111,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """Return the mirrored tensor R L R, R = diag(signs), or an empty one."""
+    """Return the mirrored tensor R L R, R = diag(signs), or ()."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

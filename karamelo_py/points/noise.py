@@ -11,18 +11,18 @@ from karamelo_py.language.rules import known_failure
 
 
 class DriftLimits(NamedTuple):
-    """Limits of (cells crossed) x c dt/h for conserved energy, as (two points per cell, one)."""
+    """Limits of (cells crossed) x c dt/h that conserve energy, with (two points per cell, one)."""
 
     drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
     line: float  # 1D
     averaged: tuple[float, float]  # as `drift`, with usavg
-    rim: tuple[float, float]  # rim of a rotating body, musl and usf
-    rim_averaged: tuple[float, float]  # with usavg
-    fastest: float = inf  # times the wave speed; a faster drift adds no noise
+    rim: tuple[float, float]  # rotating body, musl and usf
+    rim_averaged: tuple[float, float]  # usavg
+    fastest: float = inf  # wave speeds; a faster drift adds no noise
     damps: bool = False  # a faster drift damps vibrations in 3D
 
 
-JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # bases with gradient jumps
+JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # for bases with gradient jumps
 BOXES = DriftLimits((18, 18), 6, (inf, inf), (60, 25), (inf, inf))
 QUADRATIC = DriftLimits((54, 20), 6, (inf, inf), (inf, 25), (inf, inf))
 CUBIC = DriftLimits((135, 70), 6, (inf, inf), (inf, inf), (inf, inf), fastest=1, damps=True)

@@ -76,7 +76,7 @@ class Newmark(NamedTuple):
     @property
     def alphas(self) -> tuple[float, float]:
         """Return the fractions of the old accelerations and forces in a step."""
-        # At radius 1 both are 1/2: balance at the end follows from balance at the start.
+        # At radius 1 both are 1/2, and balance at the end follows from balance at the start.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property

@@ -17,20 +17,20 @@ IMPLICIT = Restrictions(
 class SchemeTraits(NamedTuple):
     """Traits of a scheme; a plug-in sets those that differ from the defaults."""
 
-    # Newton's method solves each step, with or without inertia.
+    # Newton's method solves each step
     implicit: bool = False
-    restrictions: Restrictions | None = None  # what the scheme does not support
+    restrictions: Restrictions | None = None
     inertia: bool = True
-    # Stable step in h/c with two points per cell and direction, and with one.
+    # stable step in h/c with two points per cell and direction, and with one
     courant: tuple[float, float] = (1.0, 1.0)
     # Fractions of the stable step that conserve a drifting body's energy with (2, 1) points per
     # cell: smooth gradients, gradient jumps, nodes within cells. None: drift adds no energy.
     keeping: tuple[tuple[float, float], ...] | None = None
-    # fraction of a step's strain that precedes the forces
+    # fraction of a step's strain before the forces
     strained_before: float = 0.0
-    # maps the velocity of the moved points to the nodes again
+    # maps the moved points' velocity to the nodes again
     maps_velocity_again: bool = False
-    # scheme for steps in which fixes move points of deformable bodies; None: this one
+    # scheme for steps in which fixes move deformable points; None: this one
     leading: Any = None
     # drifting bodies gain no energy
     bears_drift: bool = False

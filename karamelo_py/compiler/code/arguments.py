@@ -1,4 +1,4 @@
-"""Arguments of kernels: words in memory, passed as one address."""
+"""Arguments of kernels, as words in memory passed by one address."""
 
 import ctypes
 import functools
@@ -20,11 +20,11 @@ from karamelo_py.compiler.trace.session import session
 class _Array(NamedTuple):
     """A living array; NumPy does not resize referenced ones."""
 
-    alive: weakref.ref  # ids of deleted arrays are reused
+    alive: weakref.ref  # ids are reused after deletion
     shape: tuple[int, ...]
     writeable: bool
     kind: int  # equal for arrays of one type
-    words: tuple[int, ...]  # as kernels have them
+    words: tuple[int, ...]  # as in kernels
 
 
 def _array(array: np.ndarray) -> _Array:
@@ -61,25 +61,25 @@ def forget_array(array: np.ndarray) -> None:
 
 
 class Address(int):
-    """Address of a Python function, which lives as long as this number."""
+    """Address of a Python function, which lives as long as this object."""
 
     callback: Any
 
 
 class Plan(NamedTuple):
     text: struct.Struct
-    tuples: tuple[tuple[int, int], ...]  # index of a word that is a nested tuple, and its start
+    tuples: tuple[tuple[int, int], ...]  # index of each word that is a nested tuple, and its start
     first: int  # start of the arguments themselves
     types: tuple[types.Type, ...]  # of the arguments
 
 
 class ArgumentBuffer:
-    """Words of arguments: held tuples, inner ones first."""
+    """Words of the arguments' tuples, inner ones first."""
 
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []  # determine the types of the arguments
+        self.kinds: list = []  # determine the argument types
         self.words: list = []  # numbers in the tuples; 0 for a nested tuple
         words, _ = self._of(arguments)
         self.words += words
@@ -114,14 +114,14 @@ class ArgumentBuffer:
             elif issubclass(kind, np.generic):
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
-                words.append(signed.item())  # same bits; words are signed
+                words.append(signed.item())  # same bits, but signed as words are
             else:  # nothing to write: None, classes
                 kinds.append(item)
                 words.append(0)
         return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments to memory, later at `at`; return it and the tuple's address."""
+        """Write the arguments to memory that will be at `at`; return it and the tuple's address."""
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
             at = ctypes.addressof(ctypes.c_char.from_buffer(memory))

@@ -20,7 +20,7 @@ from karamelo_py.compiler.llvm import Lanes, scalar_of
 
 class Operation(NamedTuple):
     result: types.Type
-    arguments: tuple[types.Type, ...]  # to which operands are cast
+    arguments: tuple[types.Type, ...]  # types that operands are cast to
     code: Callable  # ``code(builder, values)``
 
 
@@ -160,7 +160,7 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 
 
 def _whole_division(remainder: bool) -> Callable:
-    """Return Python's floor division, or its remainder; of integers, 0 for a divisor of 0."""
+    """Return Python's floor division or remainder; of integers, 0 for a divisor of 0."""
 
     def write(builder: ir.IRBuilder, kind: types.Type, *values: ir.Value) -> ir.Value:
         of = _whole_parts if _is_whole(kind) else _real_parts
@@ -175,7 +175,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
     bad = None
     if not safe:
         bad = builder.icmp_signed("==", y, zero)
-        if kind.signed:  # the smallest number divided by -1
+        if kind.signed:  # smallest number divided by -1
             least = builder.icmp_signed("==", x, x.type(kind.minval))
             bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
         y = builder.select(bad, one, y)
@@ -193,7 +193,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
 
 
 def _real_parts(builder: ir.IRBuilder, kind: types.Float, x: ir.Value, y: ir.Value) -> tuple:
-    """Divide like Python (Objects/floatobject.c); division by 0 gives NumPy's results."""
+    """Divide like Python (Objects/floatobject.c); division by 0 like NumPy."""
     real = x.type
     zero, one = real(0.0), real(1.0)
     rest = builder.frem(x, y)
@@ -396,7 +396,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma, whose bits do not depend on the C library."""
+    """Call Python's gamma, as the C library's bits vary."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
@@ -473,7 +473,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names, and functions that convert to reals
+# NumPy's names of these, and functions that convert to reals
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,
@@ -499,7 +499,7 @@ IN_LANES = {
 }  # fmt: skip
 
 
-_POWERS = {operator.pow, math.pow, np.power}  # as products for known exponents
+_POWERS = {operator.pow, math.pow, np.power}  # products for known exponents
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
@@ -510,5 +510,5 @@ def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | 
         return None
     try:
         return made(*(kinds if function in _POWERS else plain))
-    except TypeError:  # wrong number of arguments, or lanes that do not agree
+    except TypeError:  # wrong number of arguments, or inconsistent lanes
         return None

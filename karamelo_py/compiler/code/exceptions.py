@@ -1,6 +1,6 @@
-"""Exceptions in kernels, which Python raises again after the kernel.
+"""Exceptions in kernels, raised by Python after the kernel.
 
-Each call by Python has a `Failure`, whose address is the last argument of LLVM functions.
+Each call from Python has a `Failure`, whose address is the last argument of LLVM functions.
 """
 
 import ctypes
@@ -18,7 +18,7 @@ from karamelo_py.compiler.code import machine
 
 
 class Failure(ctypes.Structure):
-    """The first exception of a kernel call; kernels read only the first word."""
+    """First exception of a kernel call; kernels read only the first word."""
 
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 
@@ -38,12 +38,12 @@ def note(error: BaseException, at: int) -> None:
     with _noting:
         if not failure.failed:
             failure.first = error
-            ctypes.pythonapi.Py_IncRef(ctypes.py_object(error))  # `failure` is a temporary object
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(error))  # `failure` is temporary
             failure.failed = 1
 
 
 def noting(function: Callable) -> Callable:
-    """Record exceptions, also Ctrl-C, of a Python function called by kernels.
+    """Record exceptions, including Ctrl-C, of a Python function called by kernels.
 
     Its last argument is the address of the `Failure`.
     """

@@ -1,6 +1,6 @@
 """LLVM: target processor, optimisation, loading of code.
 
-There is no fast math: contraction would depend on inlining, so results on threads and restarts.
+Fast math is off: contraction depends on inlining, and so would results on threads and restarts.
 """
 
 import contextlib
@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 from llvmlite import binding as llvm
 
-# Loops over up to 27 stencil nodes must be unrolled for weights in registers: quadratic splines in
-# 3D run 1.7 times as fast. In long loops, a counter per array costs registers.
+# Loops over up to 27 stencil nodes must be unrolled to have weights in registers: quadratic splines
+# in 3D run 1.7 times as fast. In long loops, a counter per array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
-# At 0, compiling takes half the time, steps up to four times; bits are equal.
+# 0 halves compile time, slows steps up to fourfold; bits are equal.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 
@@ -45,7 +45,7 @@ def _target() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     _set_options()
     triple = llvm.get_process_triple()
-    # Code stays where it is loaded, so x86 needs no tables.
+    # Code does not move after loading, so x86 needs no tables.
     where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
     return llvm.Target.from_triple(triple).create_target_machine(
         opt=LEVEL, cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,

@@ -1,11 +1,11 @@
 """Compiled kernels on disk, in two levels.
 
-A file ``.kernel`` has a kernel's name, result and callees. Its key is a hash of the function, the
-argument types and the sources of all that write kernels. Without it the kernel is traced, and its
-machine code looked up in a file ``.code`` by a hash of the LLVM text.
+A file ``.kernel`` has a kernel's name, result and callees. Its key hashes the function, the
+argument types and the sources of everything that writes kernels. If it is missing, the kernel is
+traced, and its machine code looked up in a file ``.code`` by the hash of the LLVM text.
 
-Files become code, so only those that no other user can write, with a correct checksum, are read.
-Otherwise the kernel is compiled, and the user warned once.
+As files become code, only those with a correct checksum that no other user can write are read.
+Otherwise the kernel is compiled, with one warning.
 """
 
 import contextlib
@@ -86,7 +86,7 @@ def _stamp(name: str) -> str:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
-        if not one.startswith(__package__.partition(".")[0]):  # checked by its import contract
+        if not one.startswith(__package__.partition(".")[0]):  # others obey the import contract
             named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))
@@ -117,7 +117,7 @@ def _words(thing: Any) -> str:
         named = _names_in(thing.__module__).get(thing.__name__)
         if named is thing or (hasattr(named, "function") and named.function is thing):
             return f"{thing.__module__}:{thing.__name__}"  # determined by its source
-    function = thing.definition if hasattr(thing, "definition") else thing  # of an intrinsic
+    function = thing.definition if hasattr(thing, "definition") else thing  # for an intrinsic
     if not isinstance(function, python.FunctionType):
         raise Unknown(repr(thing))
     parts = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
@@ -134,7 +134,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    Raise `Unknown` for a class not found by its name, if of a plug-in or `by_name`.
+    Raise `Unknown` for a class not found by its name, if from a plug-in or `by_name`.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -147,7 +147,7 @@ def _class(one: type, by_name: bool = False) -> str:
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type, equally in every process; tags with fields."""
+    """Describe a type, equally in every process."""
     how = type(numba_type).__name__  # held or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
@@ -159,7 +159,7 @@ def describe(numba_type: Any) -> str:
 
 
 class KernelFiles:
-    """The cached kernels of one function for a `processor`, which `load` loads.
+    """Cached kernels of one function for a `processor`, loaded by `load`.
 
     `called` are functions inlined in them.
     """
@@ -179,7 +179,7 @@ class KernelFiles:
         unit = self._found(key)
         if unit is None:
             with lock.lock(files.folder() / f"{key}.lock"):
-                # another process may have compiled it since the first look
+                # another process may have compiled it meanwhile
                 unit = self._found(key)
                 if unit is None:
                     unit = compiled()
@@ -274,7 +274,7 @@ def _keep(path: Path, content: bytes) -> None:
 
 @functools.cache
 def make_room(folder: Path) -> None:
-    """Delete the least recently used files above `ROOM` bytes: 13 ms with 2000 files."""
+    """Delete the least recently used files above `ROOM` bytes."""
     ages, room = [], ROOM
     for one in folder.iterdir():
         if _OURS.fullmatch(one.name):

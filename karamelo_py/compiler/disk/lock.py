@@ -1,6 +1,6 @@
-"""A lock by which one process compiles a kernel while others wait for its file.
+"""Lock by which one process compiles a kernel while others wait for its file.
 
-It only saves work: on read-only folders, file systems without locks, and after a timeout each
+It only saves work: without locks (read-only folders, some file systems) and after a timeout, each
 process compiles. The system releases it when its process ends.
 """
 
@@ -17,10 +17,10 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-PATIENCE = 120.0  # seconds; a longer holder is probably stopped
-PAUSE = 0.02  # seconds between two attempts
+PATIENCE = 120.0  # seconds, after which the holder is probably stopped
+PAUSE = 0.02  # seconds between attempts
 
-waiting = contextlib.nullcontext  # while a process waits, reported as compilation
+waiting = contextlib.nullcontext  # context of a waiting process, which reports compilation
 
 
 @contextlib.contextmanager
@@ -44,7 +44,7 @@ def _take(path: Path, stack: contextlib.ExitStack) -> None:
             session.waits = _locked(file, PATIENCE)
         if not session.waits:
             return
-    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked in the meantime
+    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also for a process forked meanwhile
     # Waiting processes have this file open, and find the kernel once they get the lock.
     stack.callback(_take_away, path)
 

@@ -1,4 +1,4 @@
-"""Implementations selected by type, and the modules they are written in.
+"""Implementations selected by type, and their modules.
 
 Keys of kernels on disk contain the sources of these modules (`cache`).
 """
@@ -20,10 +20,10 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-# folders whose sources all keys have
+# folders whose sources are in all keys
 ROOMS = "compiler", "script", "points", "kernels", "schemes", "styles"
 
-# modules outside `ROOMS` of the functions that are being compiled, innermost last
+# modules outside `ROOMS` of functions being compiled, innermost last
 _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("noted", default=())
 
 
@@ -35,7 +35,7 @@ def is_elsewhere(module: str) -> bool:
 
 
 def modules_of(*things: Any) -> set[str]:
-    """List modules elsewhere in which functions or classes are written."""
+    """List modules elsewhere that define functions or classes."""
     names = [one.__name__ if isinstance(one, python.ModuleType) else "" for one in things]
     names += [one.__module__ for one in things if hasattr(one, "__module__")]
     functions = (one for one in things if isinstance(one, python.FunctionType))

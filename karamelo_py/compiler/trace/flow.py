@@ -197,7 +197,7 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Start a loop; return the variables, with phis for changing ones; `grown`: see `Grows`."""
+        """Start a loop; return the variables, with phis for changing ones; `grown`: `Grows`."""
         phis: list[Phi] = []
         paths: list[tuple] = []
 

@@ -59,7 +59,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from vars(error).get("places", ())  # in the text that was compiled
+    yield from vars(error).get("places", ())  # in the compiled text
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 
@@ -156,7 +156,7 @@ def _copied(function: Callable) -> AstFunction:
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Trace a method or point function that plain Python calls."""
+    """Trace a method or point function called from plain Python."""
     return _seen(dispatch)(*arguments)
 
 
@@ -164,7 +164,7 @@ class TracedFunction(NamedTuple):
     run: Callable
     result: types.Type
     modules: frozenset[str]  # outside `choices.ROOMS`
-    plain: bool  # whether the result's type determines it
+    plain: bool  # the result's type determines it
     name: str
 
 
@@ -233,7 +233,7 @@ def outdate_kernels() -> None:
 class PointFunction:
     """Function of one point, implemented for classes of its first `tags` arguments.
 
-    Plain Python calls choose by classes of the arguments, kernels by their types.
+    Plain Python selects by the arguments' classes, kernels by their types.
     """
 
     def __init__(self, stub: Callable, tags: int, otherwise: bool):
@@ -244,7 +244,7 @@ class PointFunction:
         self._nearest: dict[tuple[type, ...], Callable | None] = {}
 
     def find(self, classes: tuple) -> Callable | None:
-        """Return the implementation for classes, or the nearest of their bases."""
+        """Return the implementation for classes, or for their nearest bases."""
         nearest = self._nearest  # another Python thread may add implementations
         if classes not in nearest:
             bases = [c.__mro__ if isinstance(c, type) else (c,) for c in classes]

@@ -1,8 +1,8 @@
 """Tuples of arrays stored in memory and passed as one pointer.
 
 A setup has about forty arrays of seven to nine numbers: three hundred arguments, and half of the
-code to compile. So kernels hold their setup: a tuple with arrays becomes a pointer to its items,
-nested tuples too. Its type is still a tuple type.
+code to compile. So kernels hold their setup: a (nested) tuple with arrays becomes a pointer to its
+items. Its type is still a tuple type.
 """
 
 import hashlib
@@ -36,7 +36,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
-        # short, because it is part of function names
+        # short, as part of function names
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -100,9 +100,8 @@ def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -
 
 
 def at_hand(value: Any) -> Any:
-    """Copy a held tuple to private memory before a loop, so that items stay in registers.
-
-    Otherwise LLVM cannot know that items do not change.
+    """Copy a held tuple to private memory before a loop, so that LLVM can retain items in
+    registers.
     """
     return value
 

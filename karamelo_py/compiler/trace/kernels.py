@@ -1,7 +1,7 @@
 """Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one LLVM function for argument types; other kernels refer to it by its name, which
-contains the hash of its text. Python calls its entry with the arguments' address.
+A kernel is one LLVM function for argument types, named by the hash of its text. Python calls its
+entry with the arguments' address.
 """
 
 import contextvars
@@ -43,10 +43,10 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 class Unit(NamedTuple):
     name: str  # the entry for Python adds ENTRY
     result: types.Type
-    code: bytes  # an object file; empty if it is to be read from the disk
+    code: bytes  # object file; empty if to be read from disk
     needs: tuple  # units that it calls
     modules: frozenset[str]  # modules elsewhere in it and its needs
-    raises: bool  # whether something in it raises exceptions
+    raises: bool  # something in it raises exceptions
 
 
 def load(unit: Unit) -> list[int]:
@@ -238,7 +238,7 @@ class Kernel:
 
 
 def kernel(function: Callable) -> Callable:
-    """Make a kernel, or leave the function if interpreted."""
+    """Make a kernel, or return the function if interpreted."""
     return function if choices.INTERPRETED else Kernel(function)
 
 
@@ -253,7 +253,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain it, so another function does not compile them again.
+    Callers do not contain it, so another function does not recompile them.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -276,7 +276,7 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
         address = Address(next(session.numbers))
         session.interpreted[int(address)] = callback
     else:
-        count = len(signature.args) + 1  # the last one is for exceptions
+        count = len(signature.args) + 1  # the last is for exceptions
         callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
         address = Address(ctypes.cast(callback, ctypes.c_void_p).value or 0)
     address.callback = callback
@@ -284,7 +284,7 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
 
 
 def caller_of(signature: Any) -> Callable:
-    """Make ``call(address, ...)`` of functions of this signature."""
+    """Make ``call(address, ...)`` for functions of this signature."""
     result, parameters = signature.return_type, signature.args
 
     if choices.INTERPRETED:

@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 100_000  # limit for a function; a loop is better for more
+MOST_OPERATIONS = 100_000  # limit for a function; more need a loop
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
@@ -42,13 +42,13 @@ class Lowering:
     """Writes code with a builder, or only determines types; ``seen(thing)`` replaces globals."""
 
     dispatch: Callable  # calls functions selected by type
-    key: tuple | None = None  # of the function whose result type is being determined
+    key: tuple | None = None  # of the function whose result type is sought
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
         self.operations = 0
-        self.regardless = False  # whether it continues when a called function raises
-        self.read: dict[tuple, Any] = {}  # items already read from held tuples in this branch
+        self.regardless = False  # continues when a called function raises
+        self.read: dict[tuple, Any] = {}  # items read from held tuples in this branch
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
         if _is_of_values(type(kind)):

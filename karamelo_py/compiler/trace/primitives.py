@@ -66,8 +66,8 @@ def point_function(
     """Declare a pure function of one point, selected by the classes of its first `tags` arguments.
 
     ``name.on(Class, ...)`` adds implementations, also in plug-ins; derived classes inherit them.
-    They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, where selection
-    happens at compile time. With ``otherwise`` the decorated function is the default.
+    They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, which select them at
+    compile time. With ``otherwise`` the decorated function is the default.
 
     They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those in
     ``scalarised`` of a class, because they branch, are called point by point.
@@ -203,7 +203,7 @@ def _all_bits(builder: ir.IRBuilder, mask: Any, sign: str, wanted: int) -> ir.Va
 def in_lanes(result: Callable, code: Callable) -> Callable[[Callable], Callable]:
     """Decorate a helper of numbers with its code for lanes, the type of its first argument.
 
-    There it returns ``result(lanes)``, written by ``code(builder, lanes, *values)``.
+    It returns ``result(lanes)``, written by ``code(builder, lanes, *values)``.
     """
 
     def declare(function: Callable) -> Callable:

@@ -1,6 +1,6 @@
 """Memory of the compiler: implementations, functions, types, arrays and machine code.
 
-There is one per process, like LLVM's engine and the names by which machine code calls other code.
+There is one per process, like LLVM's engine and the names in machine code.
 """
 
 import itertools
@@ -21,14 +21,14 @@ class Session:
         self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)
         self.seen: dict[Any, Any] = {}  # replacements of globals
         self.walked: dict[Callable, Any] = {}  # texts of functions
-        self.functions: dict[tuple, Any] = {}  # with result types, by types of arguments
+        self.functions: dict[tuple, Any] = {}  # with result types, by argument types
         self.operations: dict[tuple, Any] = {}
-        self.outdated = False  # whether functions have to be selected again
-        self.changes = 0  # number of changed implementations that compiled kernels may contain
-        self.loaded: dict[str, list[int]] = {}  # addresses by names of kernels
+        self.outdated = False  # functions have to be selected again
+        self.changes = 0  # number of changed implementations that kernels may contain
+        self.loaded: dict[str, list[int]] = {}  # addresses by kernel name
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
-        self.arrays: dict[int, Any] = {}  # that kernels were called with, by id
+        self.arrays: dict[int, Any] = {}  # passed to kernels, by id
         self.array_types: dict[tuple, int] = {}
         self.numbers = itertools.count()  # safe in threads
         self.waits = True  # for other processes that compile; False after a timeout

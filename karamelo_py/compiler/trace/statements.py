@@ -1,8 +1,8 @@
 """Compiles a function's text, statement by statement.
 
-Python's own values are computed at once. For conditions known only at run time, both branches are
-written, and variables merge as phis of SSA form. A loop over a known range is unrolled if short or
-necessary; other loops remain loops.
+Python values are computed at once. Conditions known only at run time have both branches written,
+with variables merged as phis of SSA form. A loop over a known range is unrolled if short or
+necessary; others remain loops.
 """
 
 import ast
@@ -105,7 +105,7 @@ class AstFunction:
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
         # Types of initial literals by name, for each loop and all that determines its code; None:
-        # unrolled.
+        # unrolled
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
@@ -115,7 +115,7 @@ class AstFunction:
         others = code.co_kwonlyargcount or code.co_flags & (
             inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
         )
-        self.plain = -1 if others else code.co_argcount  # parameters, where all are positional
+        self.plain = -1 if others else code.co_argcount  # parameters if positional
 
     def free(self) -> dict[str, Any]:
         cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
@@ -146,7 +146,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within` are functions whose closures are read."""
+    """Replace values by types; `within` are functions whose closures are being read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):

@@ -1,7 +1,7 @@
-"""Quantities that points scatter, and tasks that gather: one file each.
+"""Quantities that points scatter, and tasks that gather, one file each.
 
 A quantity is a tag with equations as data (`takes`, `gives`), a task one with functions `empty`,
-`gathered` and `updated`. Examples: docs/house/kernels.md.
+`gathered` and `updated`. See docs/house/kernels.md for examples.
 """
 
 from collections import namedtuple
@@ -28,7 +28,7 @@ class NodeColumns(NamedTuple):
     array: Any
     first: Callable  # functions of the kinematics
     count: Callable
-    end: Callable  # including padding to registers
+    end: Callable  # with padding to registers
 
 
 def _zero(kin):
@@ -36,10 +36,10 @@ def _zero(kin):
 
 
 class Sum(NamedTuple):
-    """Sum over points at a node; ``of(pt, node)`` is a point's contribution, a tuple.
+    """Nodal sum over points; ``of(pt, node)`` is a point's contribution, a tuple.
 
-    If that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none if b =
-    0), else (). Lanes arrange affine sums like records once per point, not per node.
+    If that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none if 0),
+    else (). Lanes arrange affine sums like records once per point, not per node.
     """
 
     into: NodeColumns
@@ -48,13 +48,12 @@ class Sum(NamedTuple):
 
 
 def whole(kind: Any, count: Callable | None = None) -> NodeColumns:
-    """Return the columns of a field, or of its first `count(kin)`."""
     count = count or kind.shape
     return NodeColumns(kind, _zero, count, count)
 
 
 class RigidSums(SummedField):
-    """Sums of rigid points at a node, as in `Nodes.sums`, and the force on them."""
+    """Nodal sums of rigid points, as in `Nodes.sums`, and the force on them."""
 
     @staticmethod
     def shape(kin):
@@ -73,13 +72,13 @@ def of_point(**functions: Callable) -> MappingProxyType:
 
 
 class NodalQuantity(NamedTuple):
-    """Base of quantities; they work in lanes. See `kernels.stencils` for `not_at_corners`."""
+    """Base of quantities, in lanes. See `kernels.stencils` for `not_at_corners`."""
 
     in_lanes = True
     not_at_corners = ()
-    records = ""  # array of nodes to prefetch
-    adds = False  # whether it adds to values at nodes
-    also_reads = ()  # fields of points besides `takes`
+    records = ""  # node array to prefetch
+    adds = False  # adds to present nodal values
+    also_reads = ()  # point fields besides `takes`
     takes = of_point()
     gives = ()
 
@@ -89,7 +88,7 @@ class NodalQuantity(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Base of tasks that work in lanes, with ``empty``, ``gathered`` and ``updated``."""
+    """Base of tasks in lanes, with ``empty``, ``gathered`` and ``updated``."""
 
     in_lanes = True
     not_at_corners = ()
@@ -103,15 +102,15 @@ class Task(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Result of a point in a task; NaN or infinity if it failed."""
+    """Result of a point in a task; NaN or infinite if it failed."""
 
     moved: Number  # in cells
-    rate: Number  # largest so far (`Sweep.reported`)
+    rate: Number  # largest so far
 
 
 @point_function()
 def empty(task: Tag, w: Work, x: tuple) -> tuple:
-    """Return the totals at the start of a gather."""
+    """Return the initial totals of a gather."""
 
 
 @point_function()
@@ -173,12 +172,11 @@ def _register(kind: Any) -> None:
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:
-    """Return an array of nodes by name or field class, or None."""
+    """Return a node array by name or field class, or None."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
 
 def _at_first(w, stencil, value, slopes):
-    """Return an affine field's value at the first node, and its increments per node."""
     value = value if isinstance(value, tuple) else (value,)
     if not len(slopes):
         return value, ()
@@ -210,13 +208,12 @@ def reads(*names: str) -> Callable:
 
 
 def is_apart(w):
-    """Return True for rigid points with separate sums."""
     return laws.is_rigid(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @reads("mass")
 def mass(pt):
-    """Return the mass given to the common sums: 0 for rigid points with separate sums."""
+    """Return the mass for the common sums: 0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 

@@ -1,8 +1,8 @@
 """Nodal accelerations with the error of the lumped mass removed.
 
-The lumped mass matrix m_I averages what the transfer maps to a node: a wave of wave number k loses
-the fraction kappa (k h)^2 of its acceleration, with kappa = D / h^2. Adjacent nodes along the axes
-return it in pairs, which conserves linear momentum to round-off::
+Lumping averages what the transfer maps to a node: a wave of wave number k loses the fraction kappa
+(k h)^2 of its acceleration, kappa = D / h^2. Adjacent nodes along the axes return it in pairs,
+which conserves linear momentum to round-off::
 
     a_I + kappa / m_I sum_J min(m_I, m_J) (a_I - a_J)
 """
@@ -20,7 +20,7 @@ from karamelo_py.points.kinematics import zero_vector
 
 
 class Acceleration(StepField):
-    """Change of a node's velocity by the forces, 0 where the velocity is prescribed; its mass."""
+    """A node's velocity change by forces, 0 where the velocity is prescribed; and its mass."""
 
     @staticmethod
     def shape(kin):
@@ -28,8 +28,8 @@ class Acceleration(StepField):
 
 
 class Sides(StepField):
-    """Bits of a node: HELD << k for a fix that prescribes its velocity along axis k; at an edge of
-    its grid, LOWER << k or UPPER << k.
+    """Bits of a node: HELD << k if a fix prescribes velocity k, LOWER << k or UPPER << k at an
+    edge.
     """
 
 
@@ -38,7 +38,7 @@ HELD, LOWER, UPPER = 1, 8, 64
 
 @node_task
 class UpdateToCorrect(NamedTuple):
-    """`NodalUpdate`; stores the change of the velocity for the next nodes."""
+    """`NodalUpdate` that stores the velocity change for adjacent nodes."""
 
     says = NodalUpdate.says
     goes_through = (*NodalUpdate.goes_through, "sides", "acceleration")
@@ -58,7 +58,7 @@ class UpdateToCorrect(NamedTuple):
 
 @node_task
 class CorrectAcceleration(NamedTuple):
-    """Add the differences from the next nodes to v* and its change."""
+    """Adds the differences from adjacent nodes to v* and its change."""
 
     spread: Any  # kappa
     grids: Grid
@@ -85,7 +85,7 @@ class CorrectAcceleration(NamedTuple):
 
 
 def _strides(grids, kin, n):
-    """Return the differences of the numbers of next nodes along the axes."""
+    """Return the differences in number of adjacent nodes along the axes."""
     g = 0
     while g + 1 < grids.first.size and int(n) >= grids.first[g + 1]:
         g += 1

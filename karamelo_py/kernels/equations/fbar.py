@@ -1,8 +1,8 @@
 """F-bar: volume changes averaged over the surroundings.
 
-The volume ratio J_p of an increment becomes the average of Jbar_i = sum_q N_iq V_q J_q / sum_q N_iq
-V_q over the nodes (after Coombs et al. 2018, "Overcoming volumetric locking in material point
-methods", eq. 23, who average over the points of a cell).
+The volume ratio J_p of an increment becomes the average over the nodes of Jbar_i = sum_q N_iq V_q
+J_q / sum_q N_iq V_q (after Coombs et al. 2018, "Overcoming volumetric locking in material point
+methods", eq. 23, who average over a cell).
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ class VolumeRatio(StepField):
 
 
 class NodalMean(SummedField):
-    """Weighted sum and weights at a node, then the mean (volume ratios, temperatures)."""
+    """Weighted sum and weights at a node, then the mean."""
 
     shape = pair
 
@@ -36,7 +36,7 @@ class PressureBeside(Field):
 
 
 class NodalStress(SummedField):
-    """Sums of N V times mean stress, and of N V, at a node; then the mean."""
+    """Nodal sums of N V times mean stress and of N V, then the mean."""
 
     shape = NodalMean.shape
 
@@ -46,7 +46,7 @@ class PointByPoint(NamedTuple):
 
 
 class FBar(NamedTuple):
-    """Averages volume changes against volumetric locking.
+    """Averages volume changes, against volumetric locking.
 
     Volume rates d_p become sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. This is self-adjoint:
     forces of the mean stress, averaged alike, have the power of the averaged strain.
@@ -60,9 +60,8 @@ class FBar(NamedTuple):
 class FBarOfSoil(FBar):
     """F-bar for laws whose yield surface uses part of the averaged pressure.
 
-    With the point's pressure alone, soil that dilates less than its friction requires would lose
-    strength in stripes
-    (:func:`~karamelo_py.points.laws.strengths.frictional.fraction_by_dilatancy`).
+    With its point's pressure alone, soil that dilates less than associated flow would lose strength
+    in stripes (:func:`~karamelo_py.points.laws.strengths.frictional.fraction_by_dilatancy`).
     """
 
     point_fields = (*FBar.point_fields, PressureBeside)
@@ -140,7 +139,7 @@ def gathered_ratio(node, total):
 
 
 def averaged(pt, dl, ratio):
-    """Scale `dl` to the averaged volume change; in the total frame, F + dl is scaled."""
+    """Scale `dl` to the averaged volume change; in the total frame, scale F + dl."""
     if not len(ratio):
         return dl
     _, _, f = pt.law_state_F

@@ -1,9 +1,9 @@
 """Heat: capacity and heat of nodes, conduction, and the temperature of points.
 
-C_i = sum_p N_ip C_p, C_i T_i = sum_p N_ip C_p (T_p + grad T_p (X_i - x_p)), and the flow to a node
--sum_p k_p V_p grad T_p grad N_ip. Sources: Sulsky, Zhou & Schreyer 1995 for FLIP; Wallstedt &
-Guilkey 2007 for points with gradients; Tao et al. 2016, "A generalized interpolation material point
-method for coupled thermo-mechanical processes", for heat.
+C_i = sum_p N_ip C_p, C_i T_i = sum_p N_ip C_p (T_p + grad T_p (X_i - x_p)), flow to a node -sum_p
+k_p V_p grad T_p grad N_ip. After Sulsky, Zhou & Schreyer 1995 (FLIP); Wallstedt & Guilkey 2007
+(gradients at points); Tao et al. 2016, "A generalized interpolation material point method for
+coupled thermo-mechanical processes".
 """
 
 from karamelo_py.compiler import fma, real, round_off, where
@@ -16,7 +16,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line
 
-# the heat flow is where a line has its force
+# the flow takes the column of a 1D force
 HEAT = eq.NodeColumns("sums", lambda kin: 0, pair, lambda kin: of_force(Line()))
 FLOW = eq.NodeColumns("sums", HEAT.end, scalar, lambda kin: of_force(Line()) + 1)
 
@@ -30,7 +30,7 @@ class Capacity(StepField):
 
 
 class Conductance(StepField):
-    """Conductivity times volume of a point."""
+    """Conductivity times volume."""
 
 
 class Volume(StepField):
@@ -38,7 +38,7 @@ class Volume(StepField):
 
 
 class Supply(StepField):
-    """Heat per time that fixes supply to a point."""
+    """Heat per time supplied by fixes."""
 
     columns = ("gamma",)
 
@@ -52,11 +52,11 @@ class HeatGradient(Field):
 
 
 FIELDS = Temperature, Capacity, Conductance, Volume, Supply, TemperatureShare, HeatGradient
-HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # as in `HeatedPoints`
+HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # in the order of `HeatedPoints`
 
 
 def at_least_round_off(weight):
-    """Return `weight`, but not 0: nodes with only a gradient need a temperature."""
+    """Return `weight`, or round-off for 0: nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 
@@ -72,7 +72,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # for fixes to change
+    # for fixes
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -147,7 +147,7 @@ class TemperatureGradient(eq.Task):
         return x - x
 
     def gathered(task, node, total):
-        # a scalar has no hoop part
+        # no hoop part
         return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
 
     def updated(task, pt, total, totals, fastest):
@@ -174,7 +174,7 @@ class Warming(eq.Task):
         return fma(weight, node.w.nodes.update[node.i, 1], change), mean
 
     def updated(task, pt, total, totals, fastest):
-        """Report the factor by which conduction has become faster."""
+        """Report the factor by which conduction is faster than in the undeformed body."""
         law, state, f = pt.law_state_F
         T, p = pt.of(Temperature)[0, pt.p], pt.p
         capacity = pt.of(Capacity)[0, p]
@@ -186,7 +186,6 @@ class Warming(eq.Task):
         change = total[0] + min(hidden, real(1, hidden)) * (total[1] - T)
         T = where(some, fma(pt.of(TemperatureShare)[0, p], change, T), T)
         store(pt.w.points.state, p, laws.with_temperature(law, pt.kin, state, T))
-        # compared with the undeformed body
         faster = laws.jacobian(law, pt.kin, state) * inverse_stretch_squared(
             pt.w.frame, pt.kin, f, pt.dt
         )

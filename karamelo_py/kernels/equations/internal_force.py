@@ -1,6 +1,6 @@
-"""Forces on nodes: f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), with the force f_p of fixes.
+"""Nodal forces f_i = sum_p (-V_p sigma_p grad N_ip + N_ip f_p), f_p being the force of fixes.
 
-The total frame has reference volume and gradients, and the first Piola-Kirchhoff stress.
+The total frame has reference volumes and gradients, and the first Piola-Kirchhoff stress.
 """
 
 from math import sqrt
@@ -25,22 +25,22 @@ class Force(StepField):
 
 
 class Lever(Field):
-    """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
+    """Contact at a point's surface: sqrt(f r) n (d,), and its distance r along n; 0: no contact.
 
-    The force f n at x - r n acts like a force at x and the stress f r n n / V. 0: no contact.
-    The others are stiffness over mass, depth, the damping part of f, the depth that is due to
-    `follow_strain`, and the last increment of strain along n.
+    The force f n at x - r n acts like a force at x plus the stress f r n n / V. Then follow
+    stiffness over mass, depth, the damping part of f, the depth due to `follow_strain`, and the
+    last increment of strain along n.
     """
 
     shape = staticmethod(lambda kin: kin.dimension + 6)
 
 
 class ContactLoss(Field):
-    """Energy that damping and friction of contact have taken from a point."""
+    """Energy that contact damping and friction took from a point."""
 
 
 class WorkOfForces(Field):
-    """Work of `Force` since the last check of the energy."""
+    """Work of `Force` since the last energy check."""
 
 
 @eq.reads("mass", "state", "material", "deformation gradient")
@@ -63,7 +63,7 @@ def _levers(pt):
 
 
 def stretch_levers(pt, growth, mean):
-    """Stretch the levers of contacts with a spatial increment dt grad v, and add their work.
+    """Stretch levers by a spatial increment dt grad v, and add their work.
 
     `mean`: forces act between two increments; else within this one.
     """
@@ -78,10 +78,10 @@ def stretch_levers(pt, growth, mean):
 
 
 def follow_strain(pt, v, dt):
-    """Let contact and the work of forces follow the velocity v (d,) that strains, mapped again.
+    """Let contact and the work of forces follow the re-mapped velocity v (d,), which strains.
 
-    Points moved by v*, which differs from v by a part of dt f / m. A spring that followed it would
-    generate energy.
+    Points moved by v*, which differs by a part of dt f / m; a spring following that would generate
+    energy.
     """
     further = dt * v - (pt.y - pt.x)
     increase(pt.of(WorkOfForces), pt.p, (0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further),))
@@ -93,7 +93,7 @@ def follow_strain(pt, v, dt):
 
 @point_function(otherwise=True)
 def force_around(kin, pt):
-    """Return the force (d,) of a rotation around the axis, or ()."""
+    """Return the force (d,) of rotation around the axis, or ()."""
     return ()
 
 
@@ -103,7 +103,7 @@ def force_on_point(pt):
     force, around = pt.load(Force, pt.v), force_around(pt.kin, pt)
     if not len(force):
         return around
-    # A force on rigid points would act on other points at their nodes.
+    # A force on rigid points would act on others at their nodes.
     force = of_present(pt.p, real(0 if laws.is_rigid(pt.w.laws) else 1, force[0])) * force
     return force + around if len(around) else force
 
@@ -120,7 +120,7 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Return the force at the point and its slope, where gradients are moments of weights (MLS)."""
+    """Return the force and its slope, if gradients are moments of weights (MLS), else ()."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

@@ -1,20 +1,17 @@
 """Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
 A point p of mass m gives node i, with weight N_ip m, the velocity a_ip: v_p plus its moment's part.
-Nodes take the mean v_i and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is stored per mass and
-returned by the same weights. On the way back points retain the mean and the moment of v_i, and lose
-m sum_i N_ip |v_i - v_p|^2 / 2 minus the energy of the moment. FLIP, v -> alpha v + (1 - alpha) P v
-with P to the nodes and back, loses 1 - alpha^2 of the first sum and (1 - alpha)^2 of the second.
-AFLIP and its kin lose these sums with their moments, which follow the velocity.
+Nodes take the mean v_i and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is returned by the same
+weights. Back at the points, m sum_i N_ip |v_i - v_p|^2 / 2 minus the moment's energy is lost. FLIP,
+v -> alpha v + (1 - alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first and (1 -
+alpha)^2 of the second; AFLIP and related transfers with their moments.
 
-XPIC removes Q^m v from v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and the
-terms of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >=
-[m/2]) sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each term is local and >= 0.
+XPIC removes Q^m v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and the terms
+of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2])
+sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each term is local and >= 0.
 
-The change dv by forces is excluded: in musl, with strain from the re-mapped velocity, the part of
-dv that points do not take does not strain them either, and a hot point alone in its cells would
-heat itself. The rest is time integration, moments mapped differently after a move (not with
-splines), and usl's strain by dv.
+The change dv by forces is excluded: in musl, which strains by the re-mapped velocity, the part of
+dv that points do not take does not strain them, and a hot isolated point would heat itself.
 """
 
 from collections import namedtuple
@@ -61,7 +58,7 @@ class KeepLoss(NamedTuple):
             for k in range(kin.dimension):
                 v = nodes.sums[n, of_momentum(kin) + k] * factor
                 kinetic += real(0.5, mass) * v * v
-            # for rigid motion the difference is round-off of either sign
+            # in rigid motion the difference is round-off of either sign
             noise = real(8, mass) * round_off(mass) * kinetic
             lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
             lost[n, 2] = mass
@@ -100,7 +97,7 @@ def energy_of(mass, momentum):
 
 
 def warm(pt, v):
-    """Heat a point by the energy lost to the nodes and back; `v` is their velocity before."""
+    """Heat a point by the energy lost to the nodes and back; `v` is the velocity before."""
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
@@ -115,10 +112,10 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Return the retained part of the `moment` of a gas point: none if it is alone.
+    """Return the retained part of a gas point's `moment`: none if it is isolated.
 
-    Nodes seen by no other point return its moment: driven by its pressure, its volume would grow
-    without bound. The energy of the rest heats it.
+    Nodes seen by no other point return its moment, and its pressure would expand it without bound.
+    The energy of the rest becomes heat.
     """
     lost = field(pt.w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:

@@ -1,4 +1,4 @@
-"""Mass and momentum of nodes: m_i = sum_p N_ip m_p, (m v)_i = sum_p N_ip m_p v_p(X_i)."""
+"""Nodal mass and momentum: m_i = sum_p N_ip m_p, (m v)_i = sum_p N_ip m_p v_p(X_i)."""
 
 from karamelo_py.compiler.fields import SummedField, field, vector
 from karamelo_py.compiler.lanes import of_present
@@ -11,13 +11,13 @@ from karamelo_py.points.transfers import affine_velocity, nodal_momentum
 
 
 class Normal(SummedField):
-    """Sum of m grad N at a node, pointing out of a body (contact)."""
+    """Nodal sum of m grad N, which points out of a body."""
 
     shape = vector
 
 
 class Centre(SummedField):
-    """Sum of mass times position at a node, for gaps between solids."""
+    """Nodal sum of mass times position, for gaps."""
 
     shape = vector
 
@@ -38,7 +38,7 @@ def momentum(pt, node):
 
 
 def affine_momentum(pt, w):
-    """Return the momentum at the point and its gradient if affine, else ()."""
+    """Return the momentum and its gradient if affine, else ()."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())
@@ -47,7 +47,7 @@ def affine_momentum(pt, w):
 
 
 class MassMomentum(eq.NodalQuantity):
-    """Scatters mass and momentum, of rigid points to separate sums."""
+    """Scatters mass and momentum; rigid points have separate sums."""
 
     not_at_corners = ("moments", "loss")
     records = "sums"

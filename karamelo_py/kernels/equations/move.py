@@ -1,4 +1,4 @@
-"""Points take the nodal velocity, v_pic = sum_i N_i v*_i, and move with it."""
+"""Points move with the nodal velocity v_pic = sum_i N_i v*_i."""
 
 from math import inf, nan
 
@@ -19,7 +19,7 @@ from karamelo_py.points.kinematics import dot
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN if there is none, or after a reflection."""
+    """Velocity before the last step; NaN initially and after a reflection."""
 
     shape = vector
     start = nan
@@ -54,7 +54,7 @@ class Move(Task):
         y = x + step
         force = pt.load(Force, old)
         if len(force) and not laws.is_rigid(w.laws):
-            # mean nodal velocity of the step, after stress and constraints
+            # mean nodal velocity of the step, including stress and constraints
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
@@ -91,7 +91,6 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the location `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

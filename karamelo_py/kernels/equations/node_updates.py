@@ -1,4 +1,4 @@
-"""Tasks at nodes between two visits of the points."""
+"""Tasks at nodes between two passes over the points."""
 
 from typing import Any, NamedTuple
 
@@ -14,7 +14,6 @@ def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
 
 
 def node_task(tag: Any) -> Any:
-    """Register the function ``at_node`` of a task."""
     at_node.on(tag)(vars(tag)["at_node"])
     if "says" not in vars(tag):
         tag.says = ""
@@ -22,13 +21,12 @@ def node_task(tag: Any) -> Any:
 
 
 def per_mass(nodes: Nodes, n: Index, template: Number) -> Number:
-    """Return 1 / mass of a node, or 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, template) / mass if mass > 0 else real(0, template)
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of its velocity change that a node shows; < 1 if it is light."""
+    """Return the fraction of its velocity change that a node shows, < 1 if it is light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -41,7 +39,7 @@ class WorkAtNodes(Field):
 
 
 class SquaredMass(SummedField):
-    """Sum of N m^2 at a node; divided by the sum of N m, its points' mean mass (USL)."""
+    """Nodal sum of N m^2; over the sum of N m, the points' mean mass (USL)."""
 
     @staticmethod
     def needed(basis):
@@ -91,9 +89,9 @@ class SumsToVelocity(NamedTuple):
 class UpdateToVelocity(NamedTuple):
     """Limits the deforming velocity v* at light nodes (USL).
 
-    A point of mass m that gives a node the fraction N gets back the strain of f dt / (N m): an
-    oscillation that grows if (c dt / h)^2 > N, in d directions at once. The limit acts below
-    `light` = d (c dt / h)^2 times the points' mean mass, and vanishes with the step.
+    A point of mass m gets back the strain of f dt / (N m) from a node to which it gives the
+    fraction N. This oscillates and grows if (c dt / h)^2 > N, in d directions at once. The limit
+    acts below `light` = d (c dt / h)^2 times the points' mean mass, and vanishes with the step.
     """
 
     light: float
@@ -101,7 +99,7 @@ class UpdateToVelocity(NamedTuple):
     goes_through = ("sums", "update", "velocity")
 
     def at_node(task, kin, nodes, n, dt):
-        # only the gradient is limited; points take the whole change, which conserves momentum
+        # Points take the whole change, which conserves momentum; only the gradient is limited.
         one = real(1, dt)
         share = unlimited(
             field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light

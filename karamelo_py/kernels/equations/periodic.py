@@ -1,8 +1,8 @@
-"""Periodic directions: nodes a period apart are images of one node of the body.
+"""Periodic directions: nodes a period apart are images of one node.
 
-The grid has `GHOSTS` more cells at both ends of a periodic direction. Images of a node get the same
-total, summed in one order, so that the same bits follow. Points return to the cell every `EVERY`
-steps (`karamelo_py.run.periodic`).
+The grid has `GHOSTS` extra cells at both ends of a periodic direction. Images get the same total,
+summed in one order, hence the same bits. Points return to the cell every `EVERY` steps
+(`karamelo_py.run.periodic`).
 """
 
 from math import inf
@@ -31,18 +31,17 @@ class Axis(NamedTuple):
 
 class Seam(NamedTuple):
     axes: tuple  # of `Axis`
-    joined: tuple  # the axes whose images are at nodes
+    joined: tuple  # axes with images at nodes
     shear: tuple = ()  # or `sheared.Shear`
 
 
 def position_on(axis, n):
-    """Return the number of a node along an axis, ghosts included."""
+    """Return a node's index along an axis, ghosts included."""
     return (int(n) - axis.first) // axis.stride % axis.count
 
 
 @counts.on(Seam)
 def _counts_seam(ranks, n):
-    """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
         position = position_on(axis, n) - GHOSTS
@@ -52,7 +51,7 @@ def _counts_seam(ranks, n):
 
 @node_task
 class Join(NamedTuple):
-    """Sums over the images of a node, and gives all of them the total."""
+    """Gives all images of a node their sum."""
 
     axis: Axis
 
@@ -80,7 +79,6 @@ class JoinVelocity(NamedTuple):
 
 
 def _is_lowest(axis, nodes, n):
-    """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
     position = position_on(axis, n)

@@ -1,22 +1,20 @@
-"""Water in the pores: sums at nodes, drag between soil and water, and the flux back to points.
+"""Water in the pores: nodal sums, drag between soil and water, and the flux back to points.
 
-One layer of points moves with the soil; the nodes have a second velocity (Jassim, Stolle & Vermeer
-2013; Bandara & Soga 2015). Per node i: mass of the water m = sum N m_w, its momentum, the volume V
-and the pores, the force of the pressure P = sum p V g and the outward area B = sum V g. The water
+One layer of points moves with the soil; nodes have a second velocity (Jassim, Stolle & Vermeer
+2013; Bandara & Soga 2015). A node has the mass of water m = sum N m_w, its momentum, the volume V
+and the pore volume, the pressure force P = sum p V g and the outward area B = sum V g. The water
 takes the fraction n = pores / V of P - B p_b, the soil the rest. p_b is the prescribed pressure at
-open nodes, else the mean pressure; no flux crosses B at nodes that are not open.
+open nodes and the mean pressure elsewhere; no flux crosses B at nodes that are not open.
 
-The flux j = m / V (v_w - v_s) is made at the nodes. Rate and force use the same gradients: at the
-cell centre with a linear basis (one pressure rate per cell), else at the points.
+The flux is j = m / V (v_w - v_s) at nodes. Rate and force use the same gradients: at the cell
+centre with a linear basis (one pressure rate per cell), else at the points. With splines, pressure
+in the null space of the grid would grow, so p loses the fraction R = 1/20 of (1 - S)^2 p per step,
+S being the mean through the nodes and back; the pore volume follows, not the water.
 
-With splines, pressures in the null space of the grid would grow: in a step p loses the part R =
-1/20 of (1
-- S)^2 p, with S the mean through the nodes and back. The volume of pores follows, not the water.
-
-Drag D acts over the step as for a solid of constant acceleration: with b = dt D / m and f = (1 -
+Drag D is integrated over the step as for constant acceleration: with b = dt D / m and f = (1 -
 exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then behaves
-like one of mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixes see this, so a fix
-that holds it has the reaction of soil and water.
+like a mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixes see this, so a fix that
+holds the node gets the reaction of soil and water.
 """
 
 from math import exp, inf, nan, sqrt
@@ -55,10 +53,10 @@ from karamelo_py.points.laws.pore_water import (
 )
 from karamelo_py.points.transfers import nodal_momentum, updated_velocity
 
-RIM = 0.5  # of V / h: |B| above which a spline's node is at the surface
+RIM = 0.5  # |B| / (V / h) above which a spline's node is at the surface
 SMOOTHING = 0.05  # R
 WAYS = "xlo", "xhi", "ylo", "yhi", "zlo", "zhi", "surface", "volume"
-SMALL = 1e-4  # b below which (1 - exp(-b)) / b is a series
+SMALL = 1e-4  # below this b, (1 - exp(-b)) / b is a series
 
 
 # --- fields ---------------------------------------------------------------------------------------
@@ -80,25 +78,25 @@ class UnseenPressure(Field):
 
 
 class WaterSums(SummedField):
-    """Mass and momentum of the water at a node, and the force on it, as in `Nodes.sums`."""
+    """Water's nodal mass, momentum and force, as in `Nodes.sums`."""
 
     shape = eq.RigidSums.shape
 
 
 class PoreSums(SummedField):
-    """Volume, volume of pores, volume times pressure, its unseen part, drag."""
+    """Volume, pore volume, volume times pressure and times unseen pressure, drag."""
 
     shape = numbers(5)
 
 
 class PoreForce(SummedField):
-    """Force of the pressure (d,), and area (d,)."""
+    """Pressure force (d,) and area (d,)."""
 
     shape = numbers(0, 2)
 
 
 class WaterAgain(SummedField):
-    """Momentum of the water mapped again after the move."""
+    """Water's momentum mapped again after the move."""
 
     shape = vector
 
@@ -110,27 +108,27 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux per area (d,); two outflows; two pressures.
+    """Mass flux per area (d,), two outflows, and the node's mean and unseen pressure.
 
-    The outflow through a closed node, per volume, stays in the points; the outflow through an open
-    node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
+    The outflow through a closed node, per volume, stays in the points; that through an open node is
+    a mass per time.
     """
 
     shape = numbers(4, 1)
 
 
 class GivenPressure(StepField):
-    """Prescribed pressure at a node (NaN: none); 1 if water may only leave there."""
+    """Prescribed nodal pressure, NaN if none; 1 if water may only leave."""
 
     shape = pair
     start = float("nan")
 
 
 class GivenFlux(StepField):
-    """Mass of water given to a node per time, by `WAYS`.
+    """Water supplied to a node per time, by `WAYS`.
 
-    Per area of faces with an outward normal along a direction (lo, hi of each), per area of any
-    face, per volume. After the step, the mass per time that each of them gave.
+    Values are per area of faces with an outward normal along each direction (lo, hi), per area of
+    any face, and per volume; after the step, the mass per time that each supplied.
     """
 
     shape = numbers(2, 2)
@@ -150,7 +148,7 @@ def _is_wet(pt):
 
 
 def pore_N(node):
-    """Return the weight for volumes of water, at the cell centre with a linear basis."""
+    """Return the weight of water volumes, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.N
     return real(0.5**node.kin.dimension, node.N)
@@ -168,7 +166,7 @@ def pore_grad(node):
 
 @eq.reads("mass", "state", "material")
 def water(pt):
-    """Return the mass of a point's water, (m,); () if it is dry."""
+    """Return the mass of a point's water, (m,), or () if dry."""
     if not _is_wet(pt):
         return ()
     law, state = pt.law_and_state
@@ -183,7 +181,7 @@ def water_v(pt):
 
 @eq.reads("mass", "state", "material", "unseen pressure")
 def volumes(pt):
-    """Return volume, pores, volume times pressure and times unseen pressure, drag; or ()."""
+    """Return the quantities of `PoreSums`, or () if dry."""
     if not _is_wet(pt):
         return ()
     law, state = pt.law_and_state
@@ -195,7 +193,7 @@ def volumes(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient")
 def pores(pt):
-    """Return pressure, and volume as a stress; or ()."""
+    """Return pressure, and volume as a stress, or () if dry."""
     if not _is_wet(pt):
         return ()
     law, state, f = pt.law_state_F
@@ -280,7 +278,6 @@ class WaterMomentumAgain(eq.NodalQuantity):
 
 
 def _taken_up(b):
-    """Return exp(-b), and (1 - exp(-b)) / b."""
     e = exp(-b)
     return e, (1 - e) / b if b > SMALL else 1 - 0.5 * b * (1 - b / 3)
 
@@ -299,7 +296,7 @@ def _is_open(nodes, n):
 
 
 def _close_if_dry(nodes, kin, n):
-    """Close a node of a seepage face, unless its pressure or its flow is outward."""
+    """Close a node of a seepage face unless its pressure or flow is outward."""
     given, sums = field(nodes.fields, GivenPressure), field(nodes.fields, PoreSums)
     if given[n, 1] == 1 and sums[n, 2] <= given[n, 0] * sums[n, 0]:
         water, force = field(nodes.fields, WaterSums), field(nodes.fields, PoreForce)
@@ -317,7 +314,7 @@ def _is_closed(nodes, kin, n, rim):
 
 
 def _by_pressure(nodes, kin, n, rim):
-    """Return the fraction of pores, and the force of the pressure on the water (d,)."""
+    """Return the pressure force on the water (d,), and the boundary pressure."""
     sums, force = field(nodes.fields, PoreSums), field(nodes.fields, PoreForce)
     p, d = real(0, sums[n, 0]), kin.dimension
     if _is_open(nodes, n):
@@ -329,7 +326,7 @@ def _by_pressure(nodes, kin, n, rim):
 
 
 def _mass_given(nodes, kin, n, V):
-    """Return the mass of water that a node gets per time; store it by `WAYS`."""
+    """Return the mass of water supplied to a node per time; store it by `WAYS`."""
     given, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
     whole, squared = real(0, V), real(0, V)
     if given is None:
@@ -353,7 +350,7 @@ def _is_wet_node(nodes, n):
 
 @node_task
 class ShareForces(NamedTuple):
-    """Force on the water, and the node as fixes see it: with the water that drag accelerates."""
+    """Sets the force on the water, and the node as fixes see it, with dragged water."""
 
     rim: float  # |B| / V of closed nodes
     surface: float  # |B| / V of nodes at the surface
@@ -371,7 +368,7 @@ class ShareForces(NamedTuple):
         along = real(0, m)
         pushed, _ = _by_pressure(nodes, kin, n, task.rim)
         if _is_closed(nodes, kin, n, task.surface):
-            # A wall carries the weight of its water, which is not in the mean pressure.
+            # A wall carries the weight of its water, which the mean pressure omits.
             squared = real(0, m)
             for k in range(d):
                 along += water[n, arrays.of_force(kin) + k] * force[n, d + k]
@@ -452,15 +449,15 @@ class MakeFlux(NamedTuple):
         stays = across + supply if closed else supply
         flux[n, d] = real(0, dt) if drained else stays / V
         flux[n, d + 1] = across + supply if drained else real(0, dt)
-        # With the mean of old and new relative velocity, what is left of the momentum's work is
-        # the work of weight, less the work of drag; water that comes and goes has its pressure's.
+        # With the mean relative velocity over the step, the remaining work is the weight's less the
+        # drag's; water that enters or leaves adds the work of its pressure.
         water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
         pushed, p = _by_pressure(nodes, kin, n, task.rim)
         work = dt * (supply - flux[n, d + 1]) * p * field(nodes.fields, PoreSums)[n, 1] / m
         for k in range(d):
             of_momentum = arrays.of_momentum(kin) + k
             v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
-            # where a fix holds the soil, its velocity is prescribed all the time
+            # a fix that holds the soil prescribes its velocity throughout
             before = v if nodes.update[n, k] == v else nodes.update[n, k] - dv
             w = 0.5 * ((water[n, of_momentum] + again[n, k]) / m - before - v)
             dv += out[n, d + k]
@@ -495,7 +492,7 @@ class MoveWater(eq.Task):
         at_nodes, change = total
         law, state = pt.law_and_state
         new = updated_velocity(pt.w.transfer, pt.load(RelativeVelocity, pt.v), at_nodes, change)
-        # Drag of velocities in the null space of the grid, at constant momentum of the point.
+        # Drag on velocities in the grid's null space, at constant momentum of the point.
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
@@ -503,7 +500,7 @@ class MoveWater(eq.Task):
         unseen = (b / (1 + b)) * (new - at_nodes)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
         store(pt.w.points.v, pt.p, pt.v + (m / (1 + m)) * unseen)
-        # Work of this impulse; the nodes count the velocity after it as the end of their step.
+        # Work of this impulse: the nodes take the velocity after it as the end of their step.
         way = dot(unseen, change) - new.squared() + (new - unseen).squared()
         increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * (m / (1 + m)) * way,))
         return eq.Report(real(0, pt.dt), fastest)
@@ -539,7 +536,7 @@ class Seep(eq.Task):
         spread, gradient, kept, (mean, again) = total
         law, old, f = pt.law_state_F
         frame, kin = pt.w.frame, pt.kin
-        # per volume before deformation
+        # per initial volume
         leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
         lost = laws.jacobian(law, kin, old) * (leaving - kept)
         content = old.content - pt.dt * lost / law.rho

@@ -1,8 +1,8 @@
 """Sheared periodic cells (Lees & Edwards 1972): images across y move along x.
 
 The image of a point a length L above it is `shift` further along x and `speed` faster. Images of a
-node lie between nodes: the node gets fractions of their sums, and they get the same fractions of
-its velocity. One is the transpose of the other, which conserves momentum to round-off.
+node lie between nodes: it gets fractions of their sums, and they get the same fractions of its
+velocity. The two maps are transposes, which conserves momentum to round-off.
 """
 
 from math import floor
@@ -60,7 +60,7 @@ def _pair(images, n, side):
 
 
 def _fold(images, nodes, array, n, fast):
-    """Add to a node its parts of the images; column `fast` is the momentum along x."""
+    """Add the images' parts to a node; column `fast` is the momentum along x."""
     used, across = field(nodes.fields, InUse), images.across
     j = _place(across, n)
     for side in (-1, 1):
@@ -78,7 +78,7 @@ def _fold(images, nodes, array, n, fast):
 
 
 def _spread(images, nodes, array, n, first):
-    """Give an image its fraction of velocity times mass, in columns from the one along x on."""
+    """Set an image's velocity times mass, in columns from `first` (along x) on."""
     sums, j = nodes.sums, _place(images.across, n)
     side = 0
     if j >= images.across.period:

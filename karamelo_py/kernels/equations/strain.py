@@ -1,4 +1,4 @@
-"""The law's state follows from the velocity gradient sum_i v_i grad N_i."""
+"""Update of the law's state by the velocity gradient sum_i v_i grad N_i."""
 
 from math import inf, sqrt
 
@@ -34,7 +34,7 @@ class Strain(Task):
     def updated(task, pt, total, totals, fastest):
         """Report the domain's growth in cells, and the rate."""
         w, (gradient, ratio, mapped) = pt.w, total
-        if not len(gradient):  # gathered by `Move`
+        if not len(gradient):  # `Move` gathered it
             gradient = totals[0][2]
         dl = increment_at(w.kin, pt, gradient)
         if task.of_last_step:
@@ -62,7 +62,7 @@ class Strain(Task):
 
 
 class StrainOfLastStep(Strain):
-    """`Strain` with the velocity of the last step, at the new positions."""
+    """`Strain` by the last step's velocity at the new positions."""
 
     of_last_step = True
 
@@ -81,14 +81,14 @@ class StrainOfLoadStep(Strain):
 
 
 class StrainInMove(Strain):
-    """`Strain` after `Move` in the same visit, perhaps with its gradient."""
+    """`Strain` after `Move` in the same pass."""
 
     in_move = True
     records = ""
 
 
 class TrialStrain(Strain):
-    """Gathers the gradient, and stores only its volume ratio (F-bar)."""
+    """Gathers the gradient, stores only its volume ratio (F-bar)."""
 
     records = ""
     says = "trial volume"
@@ -115,14 +115,13 @@ class TrialStrainOfLastStep(TrialStrain):
 
 
 def _maps_again(task, w):
-    """Return True for forces on points that moved, whose velocity was mapped to the nodes again."""
     before = task.of_last_step or task.of_load_step or task.in_move
     return not before and field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
 
 
 @point_function(otherwise=True)
 def velocity_gradient(kin, node):
-    """Return the part of a node in the gradient."""
+    """Return a node's contribution to the gradient."""
     return outer(node.v, node.strain_N)
 
 
@@ -131,13 +130,13 @@ def add_gradient(node, grad_v):
 
 
 def increment(dt, grad_v):
-    """Return dl = dt grad v, rounded first: F + dl sums two numbers."""
+    """Return dl = dt grad v, rounded before F + dl."""
     return grad_v._make(dt * grad_v)
 
 
 @point_function(otherwise=True)
 def increment_at(kin, pt, grad_v):
-    """Return the increment of a point from the sum of `velocity_gradient`."""
+    """Return a point's increment from the sum of `velocity_gradient`."""
     return increment(pt.dt, grad_v)
 
 
@@ -151,19 +150,18 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Return the cells by which a point's domain reaches further."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 
 
 def _fastest_wave(pt, material, fastest):
-    """Return max(fastest, c + max |v_i - common_i|); find c only if its bound is larger."""
+    """Return max(fastest, c + max |v_i - common_i|); c is only computed if its bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter
     speed = (pt.v - w.common).largest()
     slack = fastest - speed
-    if all_lanes((slack >= 0) & (most <= slack * slack)):  # also for NaN
+    if all_lanes((slack >= 0) & (most <= slack * slack)):  # False for NaN
         return fastest
     rate = sqrt(laws.wave_speed_squared(law, w.kin, state) * shorter) + speed
     return where(fastest > rate, fastest, rate)

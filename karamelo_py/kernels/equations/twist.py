@@ -1,10 +1,9 @@
 """Rotation of axisymmetric bodies around their axis.
 
-Points store the velocity around the axis, nodes have an angular velocity w: its mass is the inertia
-sum N m r^2, its momentum the angular momentum sum N m r v, its force the torque -sum V r (s_31
-dN/dr + s_32 dN/dz). Mapping r^2 w from the nodes conserves angular momentum with any transfer, the
-torques have no sum, and a point that moves retains r v, which is Coriolis' force. A rigid rotation
-is exact, and w is regular at the axis. Points push outwards with m v^2 / r.
+Points store the velocity around the axis, nodes an angular velocity w with inertia sum N m r^2,
+angular momentum sum N m r v and torque -sum V r (s_31 dN/dr + s_32 dN/dz). Mapping r^2 w conserves
+angular momentum with any transfer, torques sum to 0, and a moving point retains r v (Coriolis).
+Rigid rotation is exact, and w is regular at the axis. Points push outwards with m v^2 / r.
 """
 
 from typing import NamedTuple
@@ -46,7 +45,7 @@ class VelocityAround(Field):
 
 
 class AngleAround(Field):
-    """Angle by which a point has rotated, in radians."""
+    """Angle of rotation in radians."""
 
     columns = ("twist",)
 
@@ -62,23 +61,23 @@ class RadiusAfterMove(StepField):
 
 
 class SumsAround(SummedField):
-    """Inertia, angular momentum and torque of a node, as `Nodes.sums` of a line."""
+    """Inertia, angular momentum and torque of a node, as `Nodes.sums` in 1D."""
 
     shape = triple
 
 
 class MomentumAround(SummedField):
-    """Sum of N m v around the axis at a node."""
+    """Nodal sum of N m v around the axis."""
 
 
 class UpdateAround(StepField):
-    """Angular velocity w* of a node after the update, and its change."""
+    """Updated angular velocity w* of a node, and its change."""
 
     shape = pair
 
 
 class AngularVelocity(SummedField):
-    """Angular velocity of a node that strains the points."""
+    """Nodal angular velocity that strains the points."""
 
 
 class MassTimesRadius(SummedField):
@@ -98,7 +97,7 @@ TORQUE = eq.NodeColumns(SumsAround, lambda kin: 2, lambda kin: 1, lambda kin: 3)
 def rotation(pt, r):
     """Return inertia, angular velocity and its moment (or ()) of a point at radius r.
 
-    Velocity and moment are in both components of a plane, as transfers map vectors.
+    Both components of a plane have the same values, as transfers map vectors.
     """
     omega = pt.of(VelocityAround)[0, pt.p] / r
     moment = pt.load(MomentAround, (r, r))
@@ -159,7 +158,7 @@ class RotationAgain(eq.NodalQuantity):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "radius after move")
 def torque(pt):
-    """Return minus V r times the components 31 and 32 of the frame's stress."""
+    """Return -V r times components 31 and 32 of the frame's stress."""
     stress, r = minus_V_stress(pt), pt.of(RadiusAfterMove)[0, pt.p]
     return r * stress.at()[2, 0], r * stress.at()[2, 1]
 
@@ -192,10 +191,7 @@ def _force_around_twisted(kin, pt):
 
 @node_task
 class PushOutwards(NamedTuple):
-    """Adds the change of the centrifugal force by the new w*, so that it does not lag a step.
-
-    Also sums the work of torques.
-    """
+    """Adds the change of centrifugal force by the new w*, and sums the work of torques."""
 
     says = "centrifugal force"
     goes_through = ("sums", "sums", "momentum around", "update around")

@@ -1,10 +1,10 @@
-"""Bases: the nodes in a point's stencil, with weights and gradients. One file each.
+"""Bases: the nodes in a point's stencil, with weights and gradients, one file each.
 
 A basis is a NamedTuple of parameters with `traits` and the point functions declared here. `grid` is
-the point's :class:`~karamelo_py.points.grid.Grid`, `location` a flat tuple of its position and the
-stored shape of its domain, `stencil` the result of `locate`. A product of one function per
-direction needs only `along` and :func:`karamelo_py.points.basis.product.register`; a basis with
-corners needs an `element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
+the point's :class:`~karamelo_py.points.grid.Grid`, `location` a flat tuple of position and stored
+domain shape, `stencil` the result of `locate`. A product of one function per direction needs only
+`along` and :func:`karamelo_py.points.basis.product.register`; a basis with corners needs an
+`element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
 from math import inf
@@ -15,35 +15,35 @@ from karamelo_py.points.noise import DriftLimits
 
 
 class BasisTraits(NamedTuple):
-    cells: int  # spanned by the nodes of all points in a cell
+    cells: int  # spanned by the nodes of points in one cell
     least_nodes: int  # per direction
-    steady_moment: bool  # D of the affine transfers never vanishes
-    # |grad N|^2 / N exceeds 2 / h^2 at vanishing weight: usl limits the strain by light nodes.
+    steady_moment: bool  # D of affine transfers never vanishes
+    # |grad N|^2 / N exceeds 2 / h^2 as the weight vanishes: usl limits the strain of light nodes.
     steep_edge: bool
-    nodes_per_cell: int = 1  # 2 with nodes between the corners of cells
-    # At cell faces: crossing points add energy, less with a smaller step.
+    nodes_per_cell: int = 1  # 2 with mid-nodes
+    # at cell faces; crossing points add energy, less with smaller steps
     gradient_jumps: bool = False
-    # Stable step over h/c with slow points: updated frame, updated frame with usf, total frame.
+    # Stable step / (h/c) at low speed: updated frame, with usf, total frame
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # h^2 / D, max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: the stiffness of a
-    # point alone at its nodes. The third value is from the eigenvalues of a step of usl with D.
+    # h^2 / D and max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: stiffness of an
+    # isolated point; then from the eigenvalues of a usl step with D.
     lone: tuple[float, float, float] | None = None
-    # D / h^2 where it is constant: mapping to the nodes and back damps waves by it.
+    # D / h^2 if constant: mapping to the nodes and back damps waves by it.
     spread: float | None = None
-    # Fraction of the stable step with corrected accelerations, in the updated frame.
+    # Fraction of the stable step with corrected accelerations (updated frame)
     corrected_share: float = 0.8
     bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
-    drift_limits: DriftLimits | None = None  # None: the limits of similar bases
-    # Data stored for a domain, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
-    # ``deformation`` (F in 2D or 3D), ``corners`` (of the basis's `element`).
+    drift_limits: DriftLimits | None = None  # None: as for similar bases
+    # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
+    # ``deformation`` (F in 2D or 3D), ``corners`` (of the `element`)
     shape: tuple[str, ...] = ()
 
 
 @point_function()
 def locate(basis, kin, grid, location):
-    """Return the stencil of a point, for all functions below."""
+    """Return the stencil of a point, for the functions below."""
 
 
 @point_function()
@@ -53,10 +53,10 @@ def support(basis, kin):
 
 @point_function()
 def entry(basis, kin, grid, stencil, k):
-    """Return (node number, weight N, gradient of N) of the k-th node of a stencil.
+    """Return (node number, weight N, gradient of N) of a stencil's k-th node.
 
-    Around an axis or centre N / r follows the gradient. Contributions of a repeated node are
-    summed.
+    Around an axis or centre the gradient is followed by N / r. Contributions of repeated nodes add
+    up.
     """
 
 
@@ -83,7 +83,7 @@ def mapped_again(basis, grid, moment):
 
 
 def without_moment(basis, grid, moment):
-    """Return no moment for MUSL's second mapping: B D^-1 is unbounded where D vanishes.
+    """Return no moment for MUSL's second mapping, as B D^-1 is unbounded where D vanishes.
 
     Points retain B, but their deformation omits it.
     """
@@ -92,12 +92,12 @@ def without_moment(basis, grid, moment):
 
 @point_function(otherwise=True)
 def first_node(basis, template):
-    """Return the offset of a position in cells whose integer part is the first node."""
+    """Return the offset that makes the integer part of a position in cells the first node."""
     return 0
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Return the number of components of a location after the position, in `d` dimensions."""
+    """Return the number of components that follow the position in a location."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}
@@ -116,7 +116,7 @@ def deformed(basis, kin, location, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, location):
-    """Return the cells that the domain's corners, or the nodes they scatter to, may reach."""
+    """Return the cells that the domain's corners, or their nodes, may reach."""
     return grid.h - grid.h
 
 
@@ -128,7 +128,7 @@ def carried(basis, kin):
 
 @point_function(otherwise=True)
 def placed(basis, kin):
-    """Return the number of corners stored by position after the point's."""
+    """Return the number of corners stored as positions."""
     return 0
 
 
@@ -140,5 +140,5 @@ def carrier(basis, kin, grid, stencil, corner):
 
 @point_function(otherwise=True)
 def carry(basis, kin, location, corner, displacement):
-    """Return `location` with one corner of the domain displaced."""
+    """Return `location` with one displaced corner."""
     return location

@@ -66,7 +66,7 @@ class CPGIMPDiagonal(_Following):
     """
 
     __slots__ = ()
-    # D of the affine transfers nearly vanishes with the box.
+    # D of affine transfers nearly vanishes with the box
     traits = _Box.traits._replace(steady_moment=False, shape=STRETCHED)
 
 
@@ -144,7 +144,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, location, direction, halves):
-    """Return an uncut box in one direction: centre and ends in cells; `halves` bound it."""
+    """Return an uncut box along one direction, centre and ends in cells; `halves` bound it."""
     a = in_cells(grid, direction, location[direction])
     half = location[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -202,17 +202,17 @@ def _along_cpgimp_corners(basis, kin, grid, location, direction):
 
 
 def _end(at, first, top):
-    """Return the cell of a box's end (`first` is 0, `top` the last), and the position in it."""
+    """Return the cell of a box's end, counted from `first` up to `top`, and the position in it."""
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i
 
 
-# As in the linear basis, the limit of a vanishing box.
+# as for the linear basis, the limit of a vanishing box
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
-# F in 2D suffices for axisymmetric points.
+# F in 2D suffices for axisymmetric points
 
 
 @bases.deformed.on(CPGIMPDet)
@@ -232,7 +232,7 @@ def _deformed_cpgimp_stretch(basis, kin, location, dl):
     return (*location[:d], *half, *start, *F)
 
 
-# Bit k of a corner's number is its side in direction k; of a node's number, its side of the cell.
+# Bit k of a corner's number is its side along axis k; of a node's number, its side of the cell.
 
 
 @bases.carried.on(CPGIMPCorners)

@@ -12,7 +12,7 @@ from karamelo_py.points.transfers import flip_coefficient
 
 STRETCH = 0.3  # strain at which points a cell apart separate
 SMALL = 0.3  # fraction of the stable step at which impacts conserve energy
-PER_CELL = 0.17  # P falls by about exp(-0.17 N) if stressed material crosses N cells
+PER_CELL = 0.17  # stress falls by about exp(-0.17 N) if stressed material crosses N cells
 TOLD = 0.03  # loss of stress that gives a warning
 
 

@@ -1,4 +1,4 @@
-"""Bases that are a product of one function per direction: hats, splines, uniform GIMP."""
+"""Bases that are products of one function per direction: hats, splines, uniform GIMP."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ class Along(NamedTuple):
     r: float  # distance from it, in cells
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
-    affine: tuple[float, ...]  # N D^-1 (X_I - x), with D = sum N (X_I - x)^2
+    affine: tuple[float, ...]  # N D^-1 (X_I - x), D = sum N (X_I - x)^2
     ends: tuple[tuple[int, float], ...] = ()  # of a box: cell from `first`, position in it
 
 
@@ -60,7 +60,7 @@ def inverse_spread(basis, grid):
 
 @point_function(otherwise=True)
 def retained(basis, stencil):
-    """Return the retained fraction of a stored velocity gradient, per direction, or ()."""
+    """Return the fraction of a stored velocity gradient to retain, per direction, or ()."""
     return ()
 
 
@@ -71,7 +71,7 @@ def evenly(basis, grid, stencil):
 
 
 def with_hoop(kin, weight, slopes, inv_r):
-    """Return a weight's gradient, then N / r (dN/dr at r = 0) for each hoop direction."""
+    """Return a weight's gradient, then N / r (dN/dr at r = 0) per hoop direction."""
     if kin.hoops:
         slopes = (*slopes, *[where(inv_r > 0, weight * inv_r, slopes[0])] * kin.hoops)
     return gradient(kin, slopes)

@@ -1,4 +1,4 @@
-"""B-splines, modified at walls: three or four nodes per direction.
+"""B-splines with three or four nodes per direction, modified at walls.
 
 Walls inside the grid have separate classes (:class:`AtWalls`).
 """
@@ -17,14 +17,14 @@ BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls at faces of a cell
 
 
 class AtWalls(NamedTuple):
-    faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN; 0 without a wall
+    faces: np.ndarray  # (cells of all grids, d) int8: BELOW, ABOVE, BETWEEN, or 0
 
     in_lanes = True
 
 
 @point_function(otherwise=True)
 def walls_of_cell(basis, kin, grid, location, direction):
-    """Return (whether the lower face of the point's cell is a wall, the upper face), or ()."""
+    """Return whether the lower and the upper face of the point's cell are walls, or ()."""
     return ()
 
 
@@ -117,10 +117,10 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 @product.retained.on(QuadraticSpline)
 def _retained_spline(basis, stencil):
-    """Drop velocity gradients towards a wall that is nearer than NARROW allows.
+    """Fade out velocity gradients towards a wall nearer than NARROW allows.
 
-    With the spread D -> 0 their node, of hardly any mass, is driven by the pressure of the point
-    with the frequency c / sqrt(D): a lone point at a wall would be unstable at any step.
+    With the spread D -> 0, the pressure of an isolated point drives its node of vanishing mass with
+    the frequency c / sqrt(D), which is unstable at any step.
     """
     kept = []
     for line in stencil.lines:
@@ -184,8 +184,8 @@ class CubicSpline(NamedTuple):
     # courant_total: the shortest waves nearly average out; a shaken block is stable up to 2.1 to
     # 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's ratio
     # 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to 2.7.
-    # courant_strained_first: with usf a ball of 3 cells radius gained 46 % in 200/c with the longer
-    # step, 1 % with 0.9 h/c, when strains lacked (dt grad v)^2. Not measured since.
+    # courant_strained_first: when strains lacked (dt grad v)^2, a ball of 3 cells radius gained 46
+    # % in 200/c with usf and the longer step, 1 % with 0.9 h/c. Not measured since.
     traits = BasisTraits(
         cells=3,
         least_nodes=4,
@@ -242,7 +242,7 @@ def _along_cubic_spline(basis, kin, grid, location, direction):
 
 
 def at_wall(grid, direction, a, cell, walls, *, inside):
-    """Return the line of a cell at a wall; without walls `inside`, one cell has two."""
+    """Return the line of a cell at a wall; without walls `inside`, a single cell has two."""
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
     between = hats(grid, a, cell, first, 4)  # between two walls
@@ -254,7 +254,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     n = where(below, n, (n[2], n[1], n[0]))
     g = where(below, g, (-g[2], -g[1], -g[0]))
     c = where(below, c, (-c[2], -c[1], -c[0]))
-    behind = where(below, cell, cell - 1) > first  # the last three nodes of the four
+    behind = where(below, cell, cell - 1) > first  # the last three of the four nodes
     n, g, c = [
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)

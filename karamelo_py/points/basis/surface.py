@@ -10,11 +10,11 @@ from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
 CELLS = 16  # samples along a line
-ENTRIES = 256  # entries of a table per cell
+ENTRIES = 256  # table entries per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions in cells from a node and the weights there, averaged over point domains."""
+    """Return positions in cells from a node, and the weights there averaged over point domains."""
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
         hats = np.maximum(1 - np.abs(x), 0)
@@ -33,16 +33,16 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(typed=True)
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Tabulate the distance of a plane surface from a node over the mean position of the points.
+    """Tabulate the distance of a plane surface from a node over the points' mean position.
 
-    Points of equal mass lie in layers below the surface, the first at half their size; distances
-    are in cells along the outward normal. Row k: a mean of k / ENTRIES - 3 (after Nairn 2013,
+    Points of equal mass lie in layers below the surface, the first at half their size. Distances
+    are in cells along the outward normal; row k is for a mean of k / ENTRIES - 3 (after Nairn 2013,
     "Modeling imperfect interfaces in the material point method using multimaterial methods", CMES
     92(3), section 4, who uses a power law).
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:
-        # Basis functions differ between nodes: the gap is unknown, so fields touch on contact.
+        # Functions differ between nodes, so the gap is unknown, and fields touch on contact.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)
@@ -52,6 +52,6 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     near = seen.sum(axis=1) > 0
     mean = (seen * positions).sum(axis=1)[near] / seen.sum(axis=1)[near]
     mean = np.maximum.accumulate(mean)
-    # The mean is constant once a body fills a node's support: take the first such surface.
+    # The mean is constant once a body fills a node's support: use the first such surface.
     mean, first = np.unique(np.round(mean, 9), return_index=True)
     return np.interp(means, mean, surfaces[near][first])

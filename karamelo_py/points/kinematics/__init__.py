@@ -1,4 +1,4 @@
-"""Kinematics: the components of vectors and tensors, and the algebra on them.
+"""Components of vectors and tensors in each kinematics, and the algebra on them.
 
 ================  ==============  =============================  =================================
 tag               vector          velocity gradient, F           symmetric tensor (stress, strain)
@@ -12,9 +12,9 @@ tag               vector          velocity gradient, F           symmetric tenso
 ``Space``         x y z           xx xy xz yx yy yz zx zy zz     xx yy zz xy xz yz
 ================  ==============  =============================  =================================
 
-The gradient of a basis function has N/r for each direction around an axis or centre (hoop strain
-and force) after the components of a vector. Kernels are compiled for each tag and traced, so loops,
-classes and operators here cost nothing at run time. a + dt * b of tensors rounds once (`fma`).
+Gradients of basis functions end with N/r for each direction around an axis or centre (hoop strain
+and force). Kernels are traced for each tag, so loops, classes and operators here cost nothing at
+run time. a + dt * b of tensors rounds once (`fma`).
 """
 
 from collections import namedtuple
@@ -31,7 +31,7 @@ COMPILED = not config.DISABLE_JIT  # interpreted code rounds `fma` twice
 class Line(NamedTuple):
     word = "1D"
     per = ""  # unit of forces, masses and energies
-    hoops = 0  # directions around an axis or centre; x is the distance from it
+    hoops = 0  # directions around an axis or centre, x being the distance
     dimension = 1
     tensor_size = 1
     tensor_names = ("11",)
@@ -126,14 +126,14 @@ def dot(*vectors):
 class Elements(tuple):
     """Components that exist in a kinematics.
 
-    `places`: (row, column) of each, from 0 (of vectors, the direction twice). `axes`: row indices.
-    Tensors have `acting`, `places` with the direction in which a row acts (radial for hoop
-    components), and `rows`, per direction the index and column of its components, the last first.
+    `places` are their (row, column) from 0, twice the direction for vectors; `axes` the row
+    indices. Tensors have `acting`, `places` with the direction that a row acts in (radial for hoop
+    components), and `rows`, the index and column of the components per direction, last first.
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # these classes handle products with NumPy numbers
-    origin = None  # of a product: the function that adds it with one rounding, and its factors
+    __array_ufunc__ = None  # leaves products with NumPy numbers to these classes
+    origin = None  # of a product: function to add it with one rounding, and factors
 
     def __add__(self, other):
         if type(other) is Isotropic:
@@ -280,7 +280,7 @@ class Tensor(Matrix):
         return self
 
     def strain_at_end(self):
-        """Return the strain for small increments: its stress is added to the rotated old stress."""
+        """Return the strain of a small increment, whose stress adds to the rotated old stress."""
         return sym(self)
 
     def after(self, dl):
@@ -309,7 +309,7 @@ def further_terms(squared):
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Steps to round-off for any ratio of principal stretches.
+# Iterations to round-off for any ratio of principal stretches
 ROOT_STEPS = 6
 
 
@@ -332,7 +332,7 @@ def squares(a, axes, i, j):
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a large rotation, whose strain and rotation are ln(I + dl)."""
+    """dl of a large rotation, with strain and rotation ln(I + dl)."""
 
     __slots__ = ()
 
@@ -356,8 +356,8 @@ algebra(LargeIncrement)
 def large(dl):
     """Return ln(I + dl) = 2 artanh(G / 2), with the midpoint gradient G = 2 dl (2 I + dl)^-1.
 
-    For a pure rotation odd powers of G are skew (Hughes & Winget 1980): no strain by truncation.
-    The error is G^7/448.
+    Odd powers of G are skew for a pure rotation (Hughes & Winget 1980), so truncation causes no
+    strain. The error is G^7/448.
     """
     G = dl @ inv(I + 0.5 * dl)
     squared = G @ G
@@ -380,8 +380,8 @@ class SymmetricTensor(Matrix):
         """Return R s R^T with the rotation R of the increment (Jaumann, objective).
 
         R rotates about w = axial(skew(dl)) by Cayley's formula with tan(|w|/2) ~ |w|/2 (1 +
-        |w|^2/12), orthogonal to round-off, with angle error |w|^5/120 (Hughes & Winget 1980 without
-        the second term: |w|^3/12). A `LargeIncrement` has two more terms.
+        |w|^2/12). It is orthogonal to round-off, with angle error |w|^5/120 (Hughes & Winget 1980,
+        without the second term: |w|^3/12). A `LargeIncrement` has two more terms.
         """
         if self.kin.dimension == 1:
             return self
@@ -398,7 +398,7 @@ class SymmetricTensor(Matrix):
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
         sine = (t + t) * scale
-        # The in-plane deviator rotates by twice the angle; adding the change makes no rotation
+        # The in-plane deviator rotates by twice the angle; adding the change makes zero rotation
         # exact.
         double_sine = 2 * sine * cosine
         double_versine = -2 * sine * sine
@@ -408,7 +408,7 @@ class SymmetricTensor(Matrix):
         return self._make([xx + change, yy - change, zz, xy + shear])
 
     def rotated_in_3d(self, dl):
-        # R = I + k (T + T T), where T is the cross product with the scaled w / 2
+        # R = I + k (T + T T), T being the cross product with the scaled w / 2
         turn, s, axes = dl.generator().at(), self.at(), range(3)
         w = [0.25 * (turn[(i + 2) % 3, (i + 1) % 3] - turn[(i + 1) % 3, (i + 2) % 3]) for i in axes]
         squared = total([x * x for x in w])
@@ -448,7 +448,7 @@ class SymmetricTensor(Matrix):
         return max(*[total([abs(a[pair]) for pair in row if pair in a]) for row in rows])
 
     def smallest_row_difference(self):
-        """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest (Gershgorin)."""
+        """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest one."""
         a = self.at()
         rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
@@ -559,10 +559,10 @@ def inv(f):
 def stretch(f):
     """Return U = sqrt(F^T F) for det F != 0.
 
-    2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|), from Cayley-Hamilton (Hoger & Carlson 1984, J.
-    Elasticity 14). 3D: U = (C + i2 I)^-1 (i1 C + i3 I) with the invariants of U, of which i1^2 = tr
-    C + 2 i2 and i2^2 = c2 + 2 i1 i3 (the same). Newton's method for i1 falls from the bound
-    sqrt(3 tr C), which strains change in the second order only.
+    2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|) (Hoger & Carlson 1984, J. Elasticity 14). 3D: U
+    = (C + i2 I)^-1 (i1 C + i3 I) with the invariants of U, i1^2 = tr C + 2 i2 and i2^2 = c2 + 2 i1
+    i3. Newton's method for i1 starts from the bound sqrt(3 tr C), which strains change in second
+    order only.
     """
     if f.kin.dimension == 3:
         return stretch_in_space(f)

@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Return the principal values (3,) of a symmetric tensor, unordered, and its directions."""
+    """Return the unordered principal values (3,) of a symmetric tensor, and its directions."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -21,7 +21,7 @@ def principal(s):
 def from_principal(s, values, directions, slopes=None):
     """Build a tensor of the class of `s` from principal values and directions.
 
-    `slopes` (3,) are derivatives of the values as functions of another tensor's, for equal values.
+    `slopes` (3,), for equal values, are derivatives by another tensor's principal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)
@@ -64,8 +64,8 @@ _SWEEPS = 8
 
 
 def principal_in_space(s):
-    # Jacobi rotations (Golub & Van Loan 2013, section 8.5), unlike closed forms, are accurate to
-    # round-off for equal values.
+    # Unlike closed forms, Jacobi rotations are accurate to round-off for equal values (Golub & Van
+    # Loan 2013, section 8.5).
     a, b, c, d, e, f = s
     u, v, w = Space.Vector(1, 0, 0), Space.Vector(0, 1, 0), Space.Vector(0, 0, 1)
     enough = 1e-3 * round_off(a)
@@ -88,7 +88,7 @@ def principal_in_space(s):
 
 
 def rotated(k, g, u, v):
-    return k * u - g * v, k * v - (-g) * u  # differences, because a sum would round once
+    return k * u - g * v, k * v - (-g) * u  # differences, as a sum would round once
 
 
 def real_principal(s):
@@ -108,21 +108,22 @@ def exponential_of(s):
     return from_principal(s, exponentials, directions, exponentials)
 
 
-# Jacobi rotations stop at a diagonal tensor, whose slopes may not be diagonal. With S' in the frame
-# of principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b) (n_a . S'
-# n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section 6.1).
+# Jacobi rotations stop at a diagonal tensor, whose derivative may not be diagonal. With S' in the
+# frame of principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b)
+# (n_a . S' n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section
+# 6.1).
 
 PAIRS = (0, 1), (0, 2), (1, 2)
 
 
 class TurningFrame(NamedTuple):
     directions: Any
-    shears: tuple  # n_a . S' n_b of each pair, for each slope
+    shears: tuple  # n_a . S' n_b of each pair, per slope
     apart: tuple  # s_a - s_b of each pair
 
 
 def in_frame(s, directions):
-    """Return components in a frame: (3,) diagonal, and off-diagonal ones of the pairs."""
+    """Return components in a frame: diagonal (3,), and off-diagonal ones of the pairs."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)
@@ -167,7 +168,7 @@ def _principal_slopes(s):
 
 
 class PairLimits(NamedTuple):
-    """Limits of (f_a - f_b) / (s_a - s_b) for pairs of equal principal values."""
+    """Limits of (f_a - f_b) / (s_a - s_b) for equal principal values."""
 
     first: Any
     second: Any

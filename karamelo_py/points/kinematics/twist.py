@@ -1,10 +1,9 @@
 """Axisymmetric bodies that twist: a velocity around the axis, and its shears.
 
-Axes 1 and 2 are radius and axis, 3 is around it. They rotate with each point by its angle around
-the axis, so that a rigid rotation of any size strains nothing. Tensors have the components of 3D in
-another order; 13 and 23 of velocity gradient and F are 0. With the angular velocity w and the
-rotation phi of a point, the gradient has r dw/dr in 31 and r dw/dz in 32, F has r dphi/dR and
-r dphi/dZ.
+Axes 1, 2, 3 are along the radius, along the axis, and around it. They rotate with each point around
+the axis, so rigid rotations strain nothing. Tensors have the components of 3D in another order; 13
+and 23 of velocity gradient and F are 0. With a point's angular velocity w and rotation phi, the
+gradient has r dw/dr in 31 and r dw/dz in 32, F has r dphi/dR and r dphi/dZ.
 """
 
 from karamelo_py.compiler import algebra, real
@@ -36,14 +35,14 @@ class TwistedStress(SymmetricTensor):
     def nominal(self, F):
         """Return P = s F^-T, but s_33 / F_33 in 33: what acts on the radius.
 
-        The radial displacement also stretches 31 and 32 of F, in proportion to r.
+        A radial displacement also stretches 31 and 32 of F, in proportion to r.
         """
         made = SymmetricTensor.nominal(self, F)
         hoop = self[2] / F[4]
         return made._make([*made[:4], hoop, *made[5:]])
 
 
-Twisted.Unknown = Space.Vector  # displacement, and angle of rotation
+Twisted.Unknown = Space.Vector  # displacement and rotation
 Twisted.Tensor = tensor_class(Tensor, Twisted, Twisted.tensor_names)
 Twisted.Symmetric = tensor_class(TwistedStress, Twisted, Twisted.symmetric_names)
 Twisted.Tensor.symmetric = Twisted.Symmetric
@@ -60,14 +59,14 @@ def twisted(in_plane, around):
 
 
 def gradient_around(v, omega, slopes):
-    """Return the gradient of a node's weight times its velocity, but dw/dr and dw/dz in 31, 32."""
+    """Return the gradient of a node's weight times its velocity, with dw/dr and dw/dz in 31, 32."""
     return twisted(outer(v, slopes), (omega * slopes[0], omega * slopes[1]))
 
 
 def times_radius(gradient, r, F):
-    """Make an increment of a `gradient_around`; F is () in the updated frame.
+    """Make an increment of a sum of `gradient_around`; F is () in the updated frame.
 
-    With the radius r at the end of the step, F follows from the positions.
+    The radius r at the end of the step makes F follow from the positions.
     """
     around = tuple([r * slope for slope in gradient[5:7]])
     if len(F):

@@ -1,10 +1,10 @@
-"""Transfers: mapping of velocity from points to nodes and back. One file per family.
+"""Transfers: mapping of velocity from points to nodes and back, one file per family.
 
-A transfer is a NamedTuple of parameters. It declares what a point stores with its velocity
+A transfer is a NamedTuple of parameters. It declares what a point stores besides its velocity
 (`point_fields`: nothing, or a tensor such as the affine moment B), and updates the velocity from
 v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get a view with N,
 grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin` (:mod:`karamelo_py.kernels.views`).
-The defaults are PIC.
+Defaults are PIC.
 """
 
 from typing import NamedTuple
@@ -16,14 +16,15 @@ from karamelo_py.points import noise
 
 
 class TransferTraits(NamedTuple):
-    inverts_spread: bool = False  # inverts D = sum_I N_I (X_I - x)(X_I - x)^T, 0 for some bases
-    retains: bool = False  # points retain a fraction `alpha` of their velocity
-    per_time: bool = False  # alpha refers to a stable step
+    inverts_spread: bool = False  # inverts D = sum_I N_I (X_I - x)(X_I - x)^T, which vanishes for
+    #      some bases
+    retains: bool = False  # points retain the fraction `alpha` of their velocity
+    per_time: bool = False  # alpha is per stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
-    series: bool = False  # the new velocity is a series, summed in further visits of the points
-    # Fraction of the stable step that remains with musl in the total frame.
+    series: bool = False  # the new velocity is a series, summed in further passes over the points
+    # fraction of the stable step that remains with musl in the total frame
     share_in_total: float = 1.0
-    restrictions: Restrictions | None = None  # what it does not support
+    restrictions: Restrictions | None = None
 
 
 class Moment(Field):
@@ -56,7 +57,7 @@ def in_step(transfer, kept):
 def lost_fractions(transfer, template):
     """Return the lost fractions (2,) of the energy removed by mapping to the nodes and back.
 
-    Stored data of points return the rest. If undefined, the loss is not recorded.
+    Stored moments return the rest. If undefined, the loss is not recorded.
     """
 
 
@@ -126,7 +127,7 @@ def terms(transfer):
 
 
 def _inside_out(moment, scene):
-    # strains computed from moments, as in MLS
+    # strains from moments, as in MLS
     by_moments = gradient_weight.defined(type(scene.transfer))
     growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing

@@ -17,7 +17,7 @@ from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity, warn_of_vibrations
 
 COMPRESSED = 1e-3  # volume fraction lost by a point that moves with the grid
-SEPARATE = 0.1  # separation tolerated by elastic bodies
+SEPARATE = 0.1  # tolerable separation of elastic bodies
 
 
 class APIC(NamedTuple):

@@ -11,7 +11,7 @@ from karamelo_py.points import noise
 from karamelo_py.points.transfers import TransferTraits, in_step, lost_fractions, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
-SWING = 0.05  # strain of vibrations that bodies do not tolerate for long
+SWING = 0.05  # strain of vibrations that break bodies in time
 LAG = 0.03  # fraction of a free body's angular velocity
 BRAKED = 0.05  # fraction of its rotational energy
 BARELY = 0.01  # revolutions without relevant energy
@@ -119,7 +119,7 @@ def _lost_fractions_flip(transfer, template):
 
 
 def warn_of_vibrations(transfer: type) -> None:
-    """Warn about large vibrations, which only usl damps."""
+    """Warn of large vibrations, which only usl damps."""
     known_failure(
         transfer,
         "large vibrations",
@@ -144,11 +144,11 @@ def _turns_away(transfer, scene):
 
 
 def warn_of_lost_angular_momentum(transfer: type) -> None:
-    """Warn about bodies that rotate freely many times.
+    """Warn of bodies that rotate freely many times.
 
-    Points move with the grid velocity u but store v: each step changes the angular momentum by the
-    sum of m u x v dt (2D disks, E 100 times the rotational energy, 4 and 8 cells across the radius;
-    R4, splines and linear basis).
+    Points move with the grid velocity u but store v, so each step changes the angular momentum by
+    the sum of m u x v dt (2D disks, E 100 times the rotational energy, 4 and 8 cells across the
+    radius; R4, splines and linear basis).
     """
     known_failure(
         transfer,
@@ -170,13 +170,13 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Return True for a lag of 3 % or more, over a radian or more."""
+    """Return True for a lag of 3 % or more over at least a radian."""
     lag = scene.lag
     return lag.fraction > LAG and 2 * pi * lag.turns > 1
 
 
 def _brakes(transfer, scene):
-    """Return the energy loss of a free rotation, twice (1 - alpha) of the lag per step."""
+    """Return the energy loss of a free rotation, 2 (1 - alpha) times the lag per step."""
     lag, simulation = scene.lag, scene.simulation
     if not lag.turns > BARELY:
         return None
@@ -186,9 +186,9 @@ def _brakes(transfer, scene):
 
 
 def warn_of_slow_rotation(transfer: type) -> None:
-    """Warn about free rotations in the total frame.
+    """Warn of free rotations in the total frame.
 
-    Points store another velocity than they move with: a square of n cells rotates too slowly by
+    Points move with another velocity than they store: a square of n cells rotates too slowly by
     2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(

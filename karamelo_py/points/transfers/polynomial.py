@@ -1,9 +1,9 @@
-"""PolyPIC: points store the velocity field of their cell, a polynomial with the basis's own modes.
+"""PolyPIC: points store the velocity field of their cell, a polynomial with the basis's modes.
 
-With hats the field in a cell is multilinear: v + L (X - x) + sum_m c_m prod_(i in m) (X - x)_i over
-the sets m of two or more directions. Its coefficients at a point are derivatives of the nodal
-velocities, so the transfer to the points and back loses no nodal velocity (Fu, Guo, Gast,
-Jiang & Teran 2017, "A polynomial particle-in-cell method", section 5.1).
+With hats it is v + L (X - x) + sum_m c_m prod_(i in m) (X - x)_i over sets m of two or more
+directions. Coefficients at a point are derivatives of the nodal velocities, so mapping to the
+points and back loses no nodal velocity (Fu, Guo, Gast, Jiang & Teran 2017, "A polynomial
+particle-in-cell method", section 5.1).
 """
 
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from karamelo_py.points.basis.product import item, places_of, weights_of
 from karamelo_py.points.kinematics import outer, planar, product, vector, zero
 from karamelo_py.points.transfers import Moment, TransferTraits
 
-# Sets of directions whose mixed derivatives a point stores, by dimension.
+# sets of directions with stored mixed derivatives, by dimension
 MIXED = (), (), ((0, 1),), ((0, 1), (0, 2), (1, 2), (0, 1, 2))
 
 
@@ -28,7 +28,7 @@ def of_modes(kin: Any) -> int:
 
 
 class Modes(Moment):
-    """Velocity gradient of a point, then its mixed derivatives, a vector for each."""
+    """Velocity gradient of a point, then its mixed derivatives, a vector each."""
 
     shape = of_modes
 
@@ -51,7 +51,7 @@ class PolyPIC(NamedTuple):
     point_fields = (Modes,)
     traits = TransferTraits(
         keeps_gradient=True,
-        share_in_total=0.75,  # a block that vibrates gains energy at 0.9 h/c, none at 0.7
+        share_in_total=0.75,  # a vibrating block gains energy at 0.9 h/c, none at 0.7
         restrictions=Restrictions(
             "transfer PolyPIC", "APIC",
             only={"method": ("tlmpm",), "basis": ("linear",)},

@@ -1,8 +1,8 @@
 """Taylor transfers: the point stores the velocity gradient L_p = sum_I v*_I (x) grad N_I.
 
 It gives a node m_p N_I (v_p + L_p (X_I - x_p)) without inverting D, so any basis will do. If D^-1
-N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC. Otherwise angular
-momentum is conserved as far as velocity is linear over the support.
+N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC; otherwise it conserves
+angular momentum where velocity is linear over the support.
 """
 
 from typing import Annotated, NamedTuple
@@ -106,7 +106,7 @@ def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
-# C is the velocity gradient (except for the hoop part): gathered once if both come from v*.
+# C is the velocity gradient (except for the hoop part), gathered once if both come from v*.
 
 
 @transfers.forces_by_arms.on(MLS)

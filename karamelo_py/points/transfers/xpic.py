@@ -14,7 +14,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC removes from a point, and velocity not yet in the series."""
+    """Energy per mass that XPIC removed from a point, and velocity not yet in the series."""
 
     shape = numbers(1, 1)
 
@@ -55,7 +55,7 @@ class XPIC(NamedTuple):
     in_lanes = True
 
 
-# kernels.table.sum_series has replaced dv by the sum of the series plus the change.
+# kernels.table.sum_series has replaced dv by the series plus the change.
 
 
 @updated_velocity.on(XPIC)

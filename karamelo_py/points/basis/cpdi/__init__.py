@@ -1,13 +1,13 @@
 """Convected particle domain interpolation: the nodes around the corners x_c of a point's domain.
 
-Each basis function is replaced over the domain by a simple interpolation between the corners
-(Sadeghirad, Brannon & Burghardt 2011; Sadeghirad, Brannon & Guilkey 2013):
+Each basis function is interpolated between the corners (Sadeghirad, Brannon & Burghardt 2011;
+Sadeghirad, Brannon & Guilkey 2013):
 
      N_I = sum_c w_c N_I^lin(x_c),    grad N_I = sum_c g_c N_I^lin(x_c)
 
 w_c and g_c are domain means of corner c's function and gradient. Domains tile the body at any
-stretch, so nothing fractures numerically. A family derives from `ConvectedDomain` and defines
-:func:`domain`; if the grid moves its corners, from `CarriedDomain`, and defines `upright` too.
+stretch, without numerical fracture. A family derives from `ConvectedDomain` and defines
+:func:`domain`, or, if the grid moves its corners, from `CarriedDomain` and defines `upright` too.
 """
 
 from math import inf
@@ -29,17 +29,17 @@ class Element(NamedTuple):
     kind: str
     corners: int
     edges: tuple[tuple[int, int], ...]  # pairs of corners with positive determinant
-    mirrored: tuple[int, ...]  # order of corners if the determinant is negative
-    box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if it is one
+    mirrored: tuple[int, ...]  # corners if the determinant is negative
+    box: tuple[tuple[int, ...], ...] = ()  # corners of the box of side 2 around 0, if a box
 
 
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Affine transfers measure arms from the centre x = sum_I N_I X_I, not the point, if corners are
-    beyond the grid or the domain is no parallelogram or parallelepiped. Angular momentum is then
-    exact about the centres, and about the points varies by 0.1 % of its variation with FLIP (a
-    spinning square, Q4).
+    Affine transfers measure arms from the centre sum_I N_I X_I, which differs from the point if
+    corners lie beyond the grid or the domain is no parallelogram or parallelepiped. Angular
+    momentum is exact about the centres; about the points it varies by 0.1 % of its variation with
+    FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -49,7 +49,7 @@ class ConvectedDomain(NamedTuple):
 
 
 class CarriedDomain(ConvectedDomain):
-    """Base of domains whose corners move with the grid; subclasses add `element`."""
+    """Base of domains with corners moved by the grid; subclasses add `element`."""
 
     __slots__ = ()
     traits = ConvectedDomain.traits._replace(shape=("corners",))
@@ -76,9 +76,9 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# Least extent of a domain in cells by dimension; in 2D points scatter to all adjacent nodes.
+# Least extent of a domain in cells, by dimension
 LEAST = (0.0, 0.0, 0.5, 0.0)
-# In mesh order: around the square; around the cube's lower face, then its upper.
+# in mesh order: around the square; around the lower, then the upper face of the cube
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
@@ -90,7 +90,7 @@ def domain(basis, kin, location):
 
 @point_function()
 def upright(basis, kin, location):
-    """Return True if the Jacobian is positive at every corner: the domain is not folded."""
+    """Return True if the Jacobian is positive at every corner, so the domain is not folded."""
 
 
 class Corner(NamedTuple):
@@ -101,7 +101,7 @@ class Corner(NamedTuple):
 
 class CornerStencil(NamedTuple):
     corners: tuple[Corner, ...]
-    weights: tuple[float, ...]  # of the corners
+    weights: tuple[float, ...]  # of corners
     gradients: tuple[Any, ...]
     point: tuple[float, ...]  # in cells
     centre: Any  # sum_I N_I X_I in cells, a vector
@@ -110,16 +110,16 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """Treats corners as nodes, for code that uses a node's weight or gradient once, as a factor.
+    """Treats corners as nodes, where a node's weight or gradient is used once, as a factor.
 
-    A node number is then a `Weighted`.
+    Node numbers are then `Weighted`.
     """
 
     basis: NamedTuple
 
 
 def along_cell(grid, direction, x):
-    """Return a corner's cell in one direction, its position there (0 to 1), and their sum.
+    """Return a corner's cell along an axis, the position in it (0 to 1), and their sum.
 
     Corners beyond the grid move to its face, so that weights sum to one.
     """

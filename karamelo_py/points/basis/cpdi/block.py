@@ -1,4 +1,4 @@
-"""The nodes around a 2D domain, each once: three by three, summed over the corners.
+"""The 3 x 3 nodes around a 2D domain, each once, summed over the corners.
 
 In 3D (27 nodes, eight corners) this costs more than it saves.
 """
@@ -20,8 +20,8 @@ WIDTH = 3  # nodes per direction
 class NodeBlock(NamedTuple):
     first: tuple[int, ...]  # node number per direction
     weights: tuple[float, ...]
-    gradients: tuple[Any, ...]  # of the corners, without N / r
-    holds: bool  # all corners are inside and no node is missing at a wall
+    gradients: tuple[Any, ...]  # of corners, without N / r
+    holds: bool  # all corners are inside and walls remove no node
     seen: CornerStencil
 
 
