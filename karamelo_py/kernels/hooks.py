@@ -289,8 +289,8 @@ def vector_hook(
 ) -> CompiledHook:
     """Make a hook that sees vectors, declared fields and the law's state of points.
 
-    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes. With `shares`, 1 / number
-    of members with mass follows the values.
+    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes. With `shares`, 1 /
+    number of members with mass follows the values.
 
     Parameters
     ----------
