@@ -1,15 +1,16 @@
 """Studies on other machines: Dask, MPI; workers that are lost; what travels with a case."""
 
+import json
 import os
 import shutil
-import signal
 import socket
 import subprocess
 import sys
+import sysconfig
 import threading
 import time
 from argparse import Namespace
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, closing
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from test_sampling import SCRIPT
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import elsewhere, variables
 from karamelo_py.app.studies.case import CaseOutcome, Launch
+from karamelo_py.compiler import files as cache
 from karamelo_py.script.errors import ScriptError
 
 TIMES = ["seconds", "cpu_seconds", "seconds_spread", "particle_steps_per_s", "peak_memory_mib"]
@@ -40,48 +42,64 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def scheduler(tmp_path_factory):
-    """Two workers with folders of their own."""
-    folder = tmp_path_factory.mktemp("dask")
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(folder)
-    ) as cluster:
-        yield cluster
+    """Address of a scheduler with two workers; each has folders and a cache of its own."""
+    dask = str(Path(sysconfig.get_path("scripts")) / "dask")
+    folder = tmp_path_factory.mktemp("machines")
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    words = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    started = [subprocess.Popen([dask, "scheduler", *words], **quiet)]
+    words = [dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    for place in (folder / "one", folder / "two"):
+        place.mkdir()
+        own = {"KARAMELO_PY_CACHE": str(place / "cache"), "TMPDIR": str(place)}
+        started.append(subprocess.Popen(words, cwd=place, env=os.environ | own, **quiet))
+    yield Namespace(address=address, workers=started[1:], folder=folder)
+    for process in started:
+        process.kill()
+        process.wait()
 
 
 def numbers(path):
-    table = pandas.read_csv(path)
-    return table.drop(columns=[name for name in OF_MACHINES if name in table])
+    """The bytes of a table without times and machines."""
+    table = pandas.read_csv(path, dtype=str)
+    return table.drop(columns=OF_MACHINES).to_csv()
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
-def test_a_killed_worker_changes_nothing(folder, scheduler, capsys):
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_killed_worker_changes_nothing(folder, scheduler, monkeypatch, capsys, shared):
     """SIGKILL midway; the table is that of one machine, and what -keep names comes back."""
     text = SCRIPT.replace("run(1)", "dump(d, all, particle, 1, d.*.txt, x)\nrun(1)")
     (folder / "in.lin").write_text(text, encoding="utf-8")
-    (folder / "other").mkdir()
+    if not shared:  # as if the machines had no folder in common
+        monkeypatch.setattr(Path, "touch", lambda path: None)
 
     def kill():
         while not list(folder.glob("far/*/run.json")):
             time.sleep(0.02)
-        os.kill(next(iter(scheduler.workers.values())).pid, signal.SIGKILL)
+        scheduler.workers[0].kill()
 
-    address = scheduler.scheduler_address
-    options, package = Namespace(on=address, jobs=None), package_of(folder / "in.lin")
-    for timed, size in ((True, 1), (False, 2)):
-        with closing(elsewhere.opened(options, package, 1, timed=timed)) as place:
-            assert place.size == size
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
-    assert main(["sweep", "in.lin", *WORDS, "-on", address, "-keep", "d.1*", "-o", "far.csv"]) == 0
+    words = [*WORDS, "-on", scheduler.address, "-keep", "d.1*", "-o", "far.csv"]
+    assert main(["sweep", "in.lin", *words]) == 0
     killer.join(10)
     assert not killer.is_alive()
     assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
-    assert numbers("far.csv").equals(numbers("here.csv"))
+    assert numbers("far.csv") == numbers("here.csv")
     assert (pandas.read_csv("far.csv").machine == os.uname().nodename).all()
+    made = json.loads((folder / "far.json").read_text("utf-8"))
+    assert made["machines"][os.uname().nodename]["versions"]["numba"]
     kept = folder / "far" / "a=2"
     assert {path.name for path in kept.iterdir()} == {*elsewhere.RETURNED, "d.1.txt"}
+    assert sorted(path.name for path in (folder / "far").iterdir()) == ["a=1", "a=1.5", "a=2"]
+    sent = [*scheduler.folder.rglob("in.lin")]
+    assert not sent if shared else 1 <= len(sent) <= 2
     capsys.readouterr()
-    assert main(["sweep", "in.lin", *WORDS, "-on", address, "-keep", "d.1*", "-o", "far.csv"]) == 0
+    assert main(["sweep", "in.lin", *words]) == 0
     assert "; 3 were known" in capsys.readouterr().out
 
 
@@ -98,12 +116,18 @@ def test_a_pool_of_mpi(folder):
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
     assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
-    assert numbers("sweep.csv").equals(numbers("here.csv"))
+    assert numbers("sweep.csv") == numbers("here.csv")
 
 
-def package_of(path, **values):
+def parcel_of(path, **values):
     script = variables.ScriptFiles(path)
-    return elsewhere.packed(script, Launch(path, texts=script.texts()), values, ())
+    launch = Launch(path, texts=script.texts())
+    return elsewhere.packed(script, launch, values, (), path.parent)
+
+
+def place_of(folder, pool, size=1, workers=dict):
+    parcel = parcel_of(folder / "in.lin")
+    return elsewhere.Elsewhere(parcel, dict, pool, size, ExitStack(), workers)
 
 
 def test_the_files_of_a_script_travel_with_it(folder):
@@ -113,26 +137,50 @@ def test_the_files_of_a_script_travel_with_it(folder):
     (folder / "parts" / "loads.csv").write_text("x,y\n0,1\n", "utf-8")
     (folder / "store.msh").write_text("mesh", "utf-8")
     (folder / "body.msh").symlink_to(folder / "store.msh")
-    (folder / "mydrag.py").write_text("class Drag: pass", "utf-8")
+    (folder / "mydrag.py").write_text("import numpy, helper\nclass Drag: pass", "utf-8")
+    (folder / "helper.py").write_text("from mydrag import Drag", "utf-8")
     (folder / "secret.txt").write_text("not named", "utf-8")
     text = 'mesh = "none"\ninclude(parts/more.txt)\nfix(air, mydrag.Drag, all)\n' + SCRIPT
     (folder / "in.lin").write_text(
         text + "dump(d, all, particle, 1, parts/loads.csv, x)\n", "utf-8"
     )
-    package = package_of(folder / "in.lin", mesh=["body.msh"])
-    names = {name for name, _ in package.files}
-    assert names == {"in.lin", "mydrag.py", "parts/more.txt", "parts/loads.csv", "body.msh"}
+    parcel = parcel_of(folder / "in.lin", mesh=["body.msh"])
+    names = {name for name, _ in parcel.files}
+    assert names == {
+        "in.lin",
+        "mydrag.py",
+        "helper.py",
+        "parts/more.txt",
+        "parts/loads.csv",
+        "body.msh",
+    }
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_machine_with_other_versions_refuses_the_case(folder):
-    package = package_of(folder / "in.lin")
-    others = dict(package.versions) | {"numba": "0.1"}
-    result = elsewhere.run_sent(package._replace(versions=tuple(others.items())), {"a": "1"})
+    parcel = parcel_of(folder / "in.lin")
+    others = dict(parcel.versions) | {"numba": "0.1", "my_plugin": "12345678"}
+    other = parcel._replace(versions=tuple(others.items()), mark="other")
+    result = elsewhere.run_sent(other, {"a": "1"}, "1")
     assert result.outcome.status == "failed" and not result.files
-    assert "for 0.1" in result.outcome.reason and "numba" in result.outcome.reason
-    result = elsewhere.run_sent(package, {"a": "1"})
+    assert "for 0.1, my_plugin none for 12345678" in result.outcome.reason
+    assert "numba" in result.outcome.reason
+    assert elsewhere.run_sent(parcel, {"a": "1"}, "1").asks
+    result = elsewhere.run_sent(parcel, {"a": "1"}, "1", {"in.lin": SCRIPT.encode()})
     assert result.outcome.status == "done" and set(result.files) == set(elsewhere.RETURNED)
+
+
+def test_a_plugin_of_other_content_is_another_version(folder, monkeypatch):
+    """Of installed modules that a script names, and of packages that offer styles."""
+    monkeypatch.syspath_prepend(folder / "site")
+    (folder / "site").mkdir()
+    text = SCRIPT.replace("set_dt", "fix(air, elsewhere_drag.Drag, all)\nset_dt")
+    (folder / "in.lin").write_text(text, encoding="utf-8")
+    found = []
+    for content in ("class Drag: pass", "class Drag: area = 2"):
+        (folder / "site" / "elsewhere_drag.py").write_text(content, encoding="utf-8")
+        found.append(dict(parcel_of(folder / "in.lin").versions)["elsewhere_drag"])
+    assert found[0] != found[1] and len(found[0]) == 8
 
 
 class Losing(ThreadPoolExecutor):
@@ -153,7 +201,7 @@ class Losing(ThreadPoolExecutor):
 @pytest.mark.parametrize(("lost", "status"), [(2, "done"), (3, "killed")])
 def test_a_lost_case_is_tried_twice_more(folder, lost, status):
     with Losing(lost) as pool:
-        place = elsewhere.Elsewhere(lambda: package_of(folder / "in.lin"), pool, 1, ExitStack())
+        place = place_of(folder, pool)
         outcome = place.submit({"a": "1"}, folder / "case").result(60)
     assert outcome.status == status
     assert status == "done" or outcome.reason == "lost 3 times: MemoryError: worker is gone"
@@ -161,9 +209,8 @@ def test_a_lost_case_is_tried_twice_more(folder, lost, status):
 
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_scheduler_that_has_gone_ends_the_case(folder):
-    packages = iter([package_of(folder / "in.lin")])
     with Losing(1) as pool:
-        place = elsewhere.Elsewhere(lambda: next(packages), pool, 1, ExitStack())
+        place = place_of(folder, pool, workers=lambda: next(iter(())))
         outcome = place.submit({"a": "1"}, folder / "case").result(60)
         assert place.submit({"a": "2"}, folder / "2").result(1).status == "killed"
     assert outcome.status == "killed"
@@ -177,7 +224,7 @@ class Answering(ThreadPoolExecutor):
         super().__init__(1)
         self.answer = answer
 
-    def submit(self, function, package, case, workers=(), **_):
+    def submit(self, function, parcel, case, name, workers=(), **_):
         return super().submit(self.answer, workers)
 
 
@@ -186,13 +233,13 @@ def test_only_a_full_disk_here_ends_the_study(folder, monkeypatch):
         raise ScriptError("cannot write case.json: No space left on device")
 
     with Answering(full) as pool:
-        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        place = place_of(folder, pool)
         outcome = place.submit({}, folder / "case").result(10)
     assert outcome.status == "killed" and "lost 3 times: ScriptError: cannot" in outcome.reason
-    done = elsewhere.Returned(CaseOutcome("done"), {"log.mpm": b""}, "far")
+    done = elsewhere.Returned(CaseOutcome("done"), {"log.mpm": b""}, {})
     monkeypatch.setattr(Path, "write_bytes", lambda *_: (_ for _ in ()).throw(OSError("full")))
     with Answering(lambda _: done) as pool, pytest.raises(ScriptError, match="full"):
-        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        place = place_of(folder, pool)
         place.submit({}, folder / "case").result(10)
 
 
@@ -200,12 +247,12 @@ def test_only_a_full_disk_here_ends_the_study(folder, monkeypatch):
 def test_a_worker_with_other_versions_is_avoided(folder, willing, status):
     def answer(workers):
         if not workers:
-            return elsewhere.Returned(CaseOutcome("failed", "far has 2"), {}, "far", "a")
-        return elsewhere.Returned(CaseOutcome("done"), {}, workers[0])
+            return elsewhere.Returned(CaseOutcome("failed", "far has 2"), {}, {}, "a")
+        return elsewhere.Returned(CaseOutcome("done"), {}, {})
 
     workers = dict.fromkeys(["a", *willing], 1)
     with Answering(answer) as pool:
-        place = elsewhere.Elsewhere(tuple, pool, 2, ExitStack(), lambda: workers)
+        place = place_of(folder, pool, 2, lambda: workers)
         assert place.submit({}, folder / "case").result(10).status == status
     assert place.refusing == {"a"} and place.size == (1 if willing else 2)
 
@@ -213,12 +260,40 @@ def test_a_worker_with_other_versions_is_avoided(folder, willing, status):
 def test_leaving_does_not_wait_for_a_case(folder):
     free = threading.Event()
     with Answering(lambda _: free.wait(20) and 1 / 0) as pool:
-        place = elsewhere.Elsewhere(tuple, pool, 1, ExitStack())
+        place = place_of(folder, pool)
         outcome = place.submit({}, folder / "case")
         place.close()
         assert not outcome.done()
         free.set()
     assert outcome.cancelled()
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_kernels_of_one_machine_reach_another_once(folder, monkeypatch):
+    """A machine that lacks kernels asks for them, and finds them in its cache afterwards."""
+    caches = iter(["one", "two", "two"])
+    sent = []
+
+    class Machines(ThreadPoolExecutor):
+        def submit(self, function, parcel, case, name, *contents):
+            if not contents:
+                monkeypatch.setenv("KARAMELO_PY_CACHE", str(folder / next(caches)))
+                elsewhere.SITES.clear()
+            sent.append((case["a"], sorted({**contents[0]} if contents else ())))
+            result = function(parcel, case, name, *contents)
+            kernel = cache.folder() / "f.0123.kernel"
+            if not kernel.exists():
+                cache.write(kernel, b"machine code")
+            future = Future()
+            future.set_result(result._replace(kernels={"f.0123.kernel": cache.read(kernel)}))
+            return future
+
+    monkeypatch.setattr(Path, "touch", lambda path: None)
+    with Machines(1) as pool, closing(place_of(folder, pool)) as place:
+        for a in "123":
+            assert place.submit({"a": a}, folder / a).result(60).status == "done"
+    both = ["f.0123.kernel", "in.lin"]
+    assert sent == [("1", []), ("1", ["in.lin"]), ("2", []), ("2", both), ("3", []), ("3", both)]
 
 
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n", b""])

@@ -10,7 +10,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -508,15 +508,15 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     address = page.server.address
     row = {"N": "10", "Ek": 0.5, "seconds": float("nan"), "status": "done", "reason": ""}
     row["folder"] = folder.name
-    page.follow([], [({"N": "20"}, folder)], [({"N": "10"}, tmp_path, 1.0)], of=2, left=None)
-    page.follow([row], [], [({"N": "20"}, folder, 0.5)], of=2, left=3.0)
+    page.follow([], [({"N": "20"}, folder)], [({"N": "10"}, tmp_path, 1.0, "")], of=2, left=None)
+    page.follow([row], [], [({"N": "20"}, folder, 0.5, "far")], of=2, left=3.0)
     events = Events(address)
     told = events.next()
     assert told["about"]["names"] == ["N"] and told["left"] == 3.0
-    assert told["running"] == [["N = 20", 0.5]]
+    assert told["running"] == [["N = 20", 0.5, "far"]]
     assert told["rows"][0]["seconds"] is None  # which JSON has not
     assert told["cases"] == {"N = 20": {"N": "20"}, "N = 10": {"N": "10"}}
-    page.follow([row], [({"N": "30"}, folder)], [({"N": "20"}, folder, 0.7)], of=3, left=3.0)
+    page.follow([row], [({"N": "30"}, folder)], [({"N": "20"}, folder, 0.7, "")], of=3, left=3.0)
     told = events.until(lambda told: told["cases"])  # only what has come since
     assert told["cases"] == {"N = 30": {"N": "30"}} and not told["rows"]
     known = json.loads(get(address, "run", title="N%20=%2010"))  # of an earlier study
@@ -545,8 +545,9 @@ def test_who_stops_a_study_on_its_page_interrupts_it(tmp_path, monkeypatch, caps
 
     monkeypatch.setattr(StudyPage, "follow", stopping)
     words = ["sweep", "in.bar", "-var", "n=2,3,4", "-record", "Ek", "-jobs", "1", "--live"]
-    with pytest.raises(KeyboardInterrupt):
-        studies.run(parsed(words))
+    options = parsed(words)
+    with pytest.raises(KeyboardInterrupt), ExitStack() as options.ends:
+        studies.run(options)
     said = capsys.readouterr()
     assert "live: http://127.0.0.1" in said.out
     assert "1 of 3 runs are in sweep.csv; the same command continues" in said.err
@@ -600,7 +601,7 @@ def test_pages_in_a_browser(simulation, browser):
     assert shown.evaluate("document.getElementById('chart').data[0].name") == "growing"
     shown.get_by_label("N = 20: waiting").click()
     shown.get_by_text("last line of the log: Step 6,").wait_for()
-    going = [({"N": "30"}, simulation.hub.folder, 1.0)]
+    going = [({"N": "30"}, simulation.hub.folder, 1.0, "far")]
     study.follow([row, {**row, "N": "20", "status": "done"}], [], going, of=3)
     shown.get_by_label("N = 20: done").wait_for()
     shown.get_by_role("button", name="Stop the study").click()

@@ -189,6 +189,12 @@ def foreign() -> list[tuple[str, str]]:
     return [key for key, style in _loaded.items() if not style.__module__.startswith(PREFIX)]
 
 
+def plugins() -> set[str]:
+    """Return the modules of other packages that offer styles."""
+    entries = (e for family in _families().values() for one in family.values() for e in one)
+    return {e.module.partition(".")[0] for e in entries if not e.value.startswith(PREFIX)}
+
+
 def forget() -> None:
     _families.cache_clear()
     _loaded.clear()

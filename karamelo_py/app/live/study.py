@@ -38,7 +38,7 @@ class StudyPage:
             "facts": [name for name in COLUMNS if name != "seconds_spread"], "axes": [*axes],
         }  # fmt: skip
         self._rows: list[Row] = []
-        self._running: list[tuple[str, float]] = []
+        self._running: list[tuple[str, float, str]] = []
         self._progress: dict[str, Any] = {}
         self._folders: dict[str, Path] = {}
         self._cases: dict[str, dict[str, str]] = {}
@@ -63,7 +63,7 @@ class StudyPage:
         self,
         rows: Sequence[Row],
         waiting: Sequence[tuple[Mapping[str, str], Path]],
-        running: Sequence[tuple[Mapping[str, str], Path, float]],
+        running: Sequence[tuple[Mapping[str, str], Path, float, str]],
         **progress: Any,
     ) -> None:
         for row in rows[len(self._rows) :]:
@@ -71,10 +71,10 @@ class StudyPage:
             self._rows.append({**self._judged(row), "title": worded(case)})
             self._cases[worded(case)] = case
             self._folders[worded(case)] = self._base / row["folder"]
-        for case, folder in (*waiting, *((case, folder) for case, folder, _ in running)):
+        for case, folder in (*waiting, *((case, folder) for case, folder, *_ in running)):
             self._folders[worded(case)] = folder
             self._cases[worded(case)] = dict(case)
-        self._running = [(worded(case), since) for case, _, since in running]
+        self._running = [(worded(case), since, at) for case, _, since, at in running]
         self._progress = progress
         self.server.changed()
 

@@ -6,6 +6,7 @@ import os
 import re
 import shlex
 import signal
+import socket
 import statistics
 import subprocess
 import sys
@@ -46,6 +47,7 @@ class CaseOutcome:
     facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
     code: str = ""  # the cause in the error that ended it
+    machine: str = ""
 
     @property
     def complaint(self) -> str:
@@ -123,7 +125,8 @@ class Launch:
         if stored["status"] == "too long" and (self.limit or 1e300) > stored["facts"]["wall_s"]:
             return None
         status, reason, facts = (stored[name] for name in ("status", "reason", "facts"))
-        return CaseOutcome(status, reason, facts, folder, stored.get("code", ""))
+        ends = stored.get("code", ""), stored.get("machine", "")
+        return CaseOutcome(status, reason, facts, folder, *ends)
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         with reported(folder):
@@ -135,6 +138,7 @@ class Launch:
             if outcomes[-1].status != "done":
                 break
         outcome = outcomes[-1]
+        outcome.machine = socket.gethostname()
         facts = outcome.facts
         for name in ("cpu_seconds", "seconds"):
             seconds = [o.facts[name] for o in outcomes if name in o.facts]
@@ -143,7 +147,8 @@ class Launch:
                 facts["seconds_spread"] = max(seconds) - min(seconds)
         if "particle_steps" in facts and facts["seconds"] > 0:
             facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
-        end = {"status": outcome.status, "reason": outcome.reason, "code": outcome.code}
+        names = ("status", "reason", "code", "machine")
+        end = {name: getattr(outcome, name) for name in names}
         record = {"key": self.key(case), "variables": dict(case), **end, "facts": facts}
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome

@@ -1,28 +1,37 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
-A case travels as data: the script, its files and the variables. Its log, its record and the files
-named by `-keep` come back: no disk is shared.
+A case travels as data: its variables, and names and hashes of the script and its files. A machine
+that does not find them where they lie here asks once for their contents, and for kernels that
+others have compiled. The log, the record and the files named by `-keep` come back; if the machine
+sees the folder of the study, it moves them there.
 """
 
+import hashlib
+import logging
+import os
 import re
 import shutil
+import signal
 import socket
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from functools import lru_cache
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from os.path import abspath, commonpath
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from threading import Thread
+from threading import Event, Lock, Thread
 from typing import Any, NamedTuple
+from uuid import uuid4
 
 from karamelo_py.app.studies.case import KEPT, CaseOutcome, Launch
 from karamelo_py.app.studies.variables import QUEUES, WHERE, ScriptFiles
+from karamelo_py.compiler import files as cache
+from karamelo_py.language import registry
 from karamelo_py.output.files import reported
 from karamelo_py.output.record import NAME, surroundings
 from karamelo_py.script.errors import ScriptError
@@ -32,38 +41,60 @@ PATIENCE = 10  # seconds for a scheduler to answer
 TO_CLOSE = 3  # seconds for connections to close
 TRIES = 3
 CLASS = re.compile(r"(\w+)\.\w+")  # of a module next to the script
+IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w, ]+)", re.MULTILINE)
 QUOTED = re.compile(r'"([^"\n]*)"')
 RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
-class Package(NamedTuple):
-    script: str  # path below a common folder
-    files: tuple[tuple[str, bytes], ...]  # paths below it, and contents
+class Parcel(NamedTuple):
+    """What goes with each case; contents of files only go to a machine that asks for them."""
+
+    study: str  # folder of the runs, if the machine has the same disk
+    mark: str  # file in it, by which a machine finds that out
+    root: str  # folder of all files
+    script: str  # path below it
+    files: tuple[tuple[str, str], ...]  # paths below it, and hashes of contents
     launch: tuple[int, int, float | None]  # threads, repetitions, limit (s)
     texts: tuple[str, ...]
     keep: tuple[str, ...]  # patterns of further files to return
     versions: tuple[tuple[str, str], ...]
+    kernels: tuple[str, ...] = ()  # names of those that machines have compiled
 
 
 class Returned(NamedTuple):
     outcome: CaseOutcome
-    files: dict[str, bytes]
-    machine: str
+    files: dict[str, bytes]  # empty if the machine has put them into their folder
+    kernels: dict[str, bytes]
     refused_by: str | None = None  # worker with other versions; "" without an address
+    asks: bool = False  # for the contents of files
 
 
-def versions() -> tuple[tuple[str, str], ...]:
-    packages = surroundings()["versions"]
-    packages["python"] = ".".join(packages["python"].split(".")[:2])
-    return tuple(packages.items())
+def versions(plugins: Iterable[str]) -> dict[str, str]:
+    """Versions of the program and what it needs; hashes of the sources of plug-ins."""
+    found = dict(surroundings()["versions"])
+    found["python"] = ".".join(found["python"].split(".")[:2])
+    for module in plugins:
+        spec = PathFinder.find_spec(module)
+        paths = [Path(spec.origin)] if spec and spec.origin else []
+        for folder in (spec and spec.submodule_search_locations) or ():
+            paths += sorted(Path(folder).rglob("*.py"))
+        content = b"".join(path.read_bytes() for path in paths)
+        found[module] = _hash(content)[:8] if paths else "none"
+    return found
+
+
+def _hash(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def packed(
-    script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str]
-) -> Package:
-    """Collect the script, its includes, and the files that arguments or variables name."""
+    script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str],
+    study: Path,
+) -> Parcel:  # fmt: skip
+    """List the script, its includes, and the files that arguments or variables name."""
     paths = {Path(abspath(path)) for path in script.statements}
     words = {(script.path, word) for words in values.values() for word in words}
+    plugins = set(registry.plugins())
     for path, statements in script.statements.items():
         for one in statements:
             words |= {(path, quoted) for quoted in QUOTED.findall(one.raw.code)}
@@ -73,95 +104,210 @@ def packed(
         plain = word and "\n" not in word and len(word) < 1000 and not Path(word).is_absolute()
         if plain and (path.parent / word).is_file():
             paths.add(Path(abspath(path.parent / word)))
-        module = CLASS.fullmatch(word)
-        if module and (source := path.parent / f"{module[1]}.py").is_file():
-            paths.add(Path(abspath(source)))
+        if module := CLASS.fullmatch(word):
+            beside = _modules(path.parent, module[1])
+            paths |= beside
+            spec = None if beside else PathFinder.find_spec(module[1])
+            if spec and spec.has_location and module[1] not in sys.stdlib_module_names:
+                plugins.add(module[1])
     root = Path(commonpath([path.parent for path in paths]))
-    files = tuple((path.relative_to(root).as_posix(), path.read_bytes()) for path in sorted(paths))
+    files = tuple((p.relative_to(root).as_posix(), _hash(p.read_bytes())) for p in sorted(paths))
     name = Path(abspath(script.path)).relative_to(root).as_posix()
     settings = launch.threads, launch.repeat, launch.limit
-    return Package(name, files, settings, launch.texts, tuple(keep), versions())
+    return Parcel(
+        abspath(study), f".{uuid4().hex}", str(root), name, files, settings, launch.texts,
+        tuple(keep), tuple(versions(sorted(plugins)).items()),
+    )  # fmt: skip
 
 
-@lru_cache(maxsize=2)
-def _unpacked(package: Package) -> tuple[Launch, TemporaryDirectory]:
-    folder = TemporaryDirectory(prefix="karamelo-py-")
-    for name, content in package.files:
-        path = Path(folder.name) / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    return Launch(Path(folder.name) / package.script, *package.launch, package.texts), folder
+def _modules(folder: Path, name: str, found: frozenset[Path] = frozenset()) -> set[Path]:
+    """List the sources next to a script of a module and all that it imports."""
+    path = Path(abspath(folder / f"{name}.py"))
+    if path in found or not path.is_file():
+        return set()
+    known = {path, *found}
+    for words in IMPORTED.findall(path.read_text(encoding="utf-8", errors="replace")):
+        for other in words.split(","):
+            known |= _modules(folder, [*other.split(), ""][0], frozenset(known))
+    return known
 
 
-def _address() -> str:
-    if "distributed" not in sys.modules:
-        return ""
-    from distributed import get_worker
+class Site:
+    """What a machine has of a study."""
 
-    with suppress(ValueError):  # no worker of Dask
-        return get_worker().address
-    return ""
+    def __init__(self, parcel: Parcel):
+        study, root = Path(parcel.study), Path(parcel.root)
+        here = versions(n for n, _ in parcel.versions if n not in surroundings()["versions"])
+        self.differ = ", ".join(
+            f"{name} {here.get(name, 'none')} for {there}"
+            for name, there in parcel.versions if here.get(name) != there
+        )  # fmt: skip
+        self.shared = study if (study / parcel.mark).is_file() else None
+        self.parcel, self.stop, self.lock, self.listed = parcel, Event(), Lock(), -1
+        self.has_kernels: tuple[str, ...] = ()
+        self.launch: Launch | None = None
+        with suppress(OSError):
+            same = all(_hash((root / name).read_bytes()) == of for name, of in parcel.files)
+            if self.shared and same:
+                self.launch = self._launch(root)
+
+    def _launch(self, root: Path) -> Launch:
+        parcel = self.parcel
+        return Launch(root / parcel.script, *parcel.launch, parcel.texts, self.stop)
+
+    def has(self, kernels: tuple[str, ...]) -> bool:
+        if kernels != self.has_kernels and all((cache.folder() / one).is_file() for one in kernels):
+            self.has_kernels = kernels
+        return self.launch is not None and self.has_kernels == kernels
+
+    def receive(self, contents: Mapping[str, bytes], kernels: tuple[str, ...]) -> None:
+        """Write files of the study into a temporary folder, and kernels into the cache."""
+        with self.lock:
+            if self.launch is None:
+                self.folder = TemporaryDirectory(prefix="karamelo-py-", dir=_scratch())
+                for name, _ in self.parcel.files:
+                    path = Path(self.folder.name) / name
+                    path.parent.mkdir(parents=True, exist_ok=True)
+                    path.write_bytes(contents[name])
+                self.launch = self._launch(Path(self.folder.name))
+            with suppress(OSError):  # a cache that nobody can write to
+                for name in kernels:
+                    if not (cache.folder() / name).is_file():
+                        cache.write(cache.folder() / name, contents[name])
+            self.has_kernels = kernels
+
+    def compiled(self, since: float) -> dict[str, bytes]:
+        """Kernels that runs have compiled or read since a time."""
+        with suppress(OSError):
+            listed = cache.folder().stat().st_mtime_ns
+            if listed != self.listed:
+                self.listed = listed
+                names = [
+                    one.name for one in os.scandir(cache.folder())
+                    if one.name.endswith((".kernel", ".code")) and one.stat().st_mtime >= since
+                ]  # fmt: skip
+                return {
+                    name: cache.read(cache.folder() / name)
+                    for name in names if name not in self.has_kernels
+                }  # fmt: skip
+        return {}
 
 
-def run_sent(package: Package, case: Mapping[str, str]) -> Returned:
-    machine = socket.gethostname()
-    differ = [
-        f"{name} {local} for {remote}"
-        for (name, remote), (_, local) in zip(package.versions, versions(), strict=True)
-        if local != remote
-    ]
-    if differ:
-        outcome = CaseOutcome("failed", f"{machine} has {', '.join(differ)}", {}, code="busy")
-        return Returned(outcome, {}, machine, _address())
-    launch, _ = _unpacked(package)
-    with TemporaryDirectory(prefix="karamelo-py-case-") as name:
-        folder = Path(name)
-        outcome = launch.run(case, folder)
-        paths = {folder / one for one in RETURNED}
-        paths |= {path for pattern in package.keep for path in folder.glob(pattern)}
-        files = {
-            path.relative_to(folder).as_posix(): path.read_bytes()
-            for path in sorted(paths) if path.is_file()
-        }  # fmt: skip
-    return Returned(outcome, files, machine)
+SITES: dict[str, Site] = {}  # of this process, by mark
+
+
+def _site(parcel: Parcel) -> Site:
+    if parcel.mark not in SITES:
+        SITES[parcel.mark] = Site(parcel)
+        for old in [*SITES][:-2]:
+            del SITES[old]
+    return SITES[parcel.mark]
+
+
+def end_study(mark: str) -> None:
+    if mark in SITES:
+        SITES[mark].stop.set()
+
+
+def ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _worker() -> Any:
+    if "distributed" in sys.modules:
+        from distributed import get_worker
+
+        with suppress(ValueError):  # no worker of Dask
+            return get_worker()
+    return None
+
+
+def _scratch() -> str | None:
+    """Folder that Dask removes after the end of a worker."""
+    return worker.local_directory if (worker := _worker()) else None
+
+
+def run_sent(
+    parcel: Parcel, case: Mapping[str, str], name: str, contents: Mapping[str, bytes] | None = None
+) -> Returned:
+    """Run a case on this machine; `name` is that of its folder."""
+    machine, worker, site = socket.gethostname(), _worker(), _site(parcel)
+    if site.differ:
+        outcome = CaseOutcome("failed", f"{machine} has {site.differ}", code="busy")
+        return Returned(outcome, {}, {}, worker.address if worker else "")
+    if contents is not None:
+        site.receive(contents, parcel.kernels)
+    elif not site.has(parcel.kernels):
+        return Returned(CaseOutcome("asks"), {}, {}, asks=True)
+    if worker:
+        worker.log_event(parcel.mark, (name, machine))
+    begun = time.time()
+    where = site.shared or _scratch()
+    with TemporaryDirectory(prefix=".case-", dir=where, ignore_cleanup_errors=True) as temporary:
+        folder = Path(temporary)
+        outcome = site.launch.run(case, folder)
+        wanted = {folder / one for one in RETURNED}
+        wanted |= {path for pattern in parcel.keep for path in folder.glob(pattern)}
+        paths = {p.relative_to(folder).as_posix(): p for p in sorted(wanted) if p.is_file()}
+        if site.shared:
+            _put(site.shared / name, paths, os.replace)
+            return Returned(outcome, {}, site.compiled(begun))
+        returned = {path: at.read_bytes() for path, at in paths.items()}
+    return Returned(outcome, returned, site.compiled(begun))
+
+
+def _put(folder: Path, paths: Mapping[str, Any], put: Callable[[Any, Path], Any]) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    for name, content in paths.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        put(content, folder / name)
 
 
 class Elsewhere:
     def __init__(
-        self, send: Callable[[], Any], executor: Executor, size: int, ends: ExitStack,
-        workers: Callable[[], Mapping[str, int]] = dict,
+        self, parcel: Parcel, send: Callable[[Mapping[str, bytes]], Any], executor: Executor,
+        size: int, ends: ExitStack, workers: Callable[[], Mapping[str, int]] = dict,
     ):  # fmt: skip
-        """`send` makes the package known to the machines; its result goes with each case.
+        """`send` makes contents known to the machines; its result goes to one that asks for them.
 
         `workers` returns the threads of each worker by address; it is empty if a case cannot be
         sent to chosen workers.
         """
-        self.send, self.executor, self.size, self.ends = send, executor, size, ends
-        self.workers = workers
+        self.parcel, self.send, self.executor, self.size = parcel, send, executor, size
+        self.ends, self.workers = ends, workers
         self.refusing: set[str] = set()  # addresses
-        self.package = send()
+        self.kernels: dict[str, bytes] = {}
+        self.sent: Any = None
+        self.places: dict[str, str] = {}  # machines by names of folders
         # Callbacks run in the thread that talks to the machines, which must not wait.
         self.retries = ThreadPoolExecutor(1)
         self.closing = False
         self.gone = False  # Dask accepts cases then, and never ends them
-        self.machines: dict[Path, str] = {}  # machine by folder
+        self.mark = Path(parcel.study) / parcel.mark
+        with reported(self.mark):
+            self.mark.touch()
+
+    def machine(self, folder: Path) -> str:
+        return self.places.get(folder.name, "")
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
-        """Return a future of the outcome; the files of the case come into `folder`."""
         outer: Future = Future()
         self._try(case, folder, outer, 1)
         return outer
 
-    def _try(self, case: Mapping[str, str], folder: Path, outer: Future, tries: int) -> None:
+    def _try(
+        self, case: Mapping[str, str], folder: Path, outer: Future, tries: int, *contents: Any
+    ) -> None:
         def finished(inner: Future) -> None:
             try:
                 result = inner.result()
-            except Exception as error:  # the machine, its disk, or its copy of the package
+            except Exception as error:  # the machine, its disk, or its copy of the files
                 words = f"{type(error).__name__}: {error}".splitlines()[0]
-                self._retry(case, folder, outer, tries, words)
+                self._again(case, folder, outer, tries, words)
                 return
-            if result.refused_by is not None:
-                self._retry(case, folder, outer, tries, result.outcome.reason, result)
+            if result.asks or result.refused_by is not None:
+                self._again(case, folder, outer, tries, result.outcome.reason, result)
                 return
             try:
                 outer.set_result(self._received(result, folder))
@@ -176,7 +322,9 @@ class Elsewhere:
             chosen: dict[str, Any] = {}
             if self.refusing:  # a preference: Dask would wait for ever for a worker that has gone
                 chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
-            future = self.executor.submit(run_sent, self.package, dict(case), **chosen)
+            future = self.executor.submit(
+                run_sent, self.parcel, dict(case), folder.name, *contents, **chosen
+            )
             future.add_done_callback(finished)
         except Exception as error:  # the executor has gone
             outer.set_result(CaseOutcome("killed", f"not started: {error}", {}, folder))
@@ -184,15 +332,25 @@ class Elsewhere:
     def _willing(self) -> dict[str, int]:
         return {name: n for name, n in self.workers().items() if name not in self.refusing}
 
-    def _retry(
+    def _contents(self) -> Any:
+        if self.sent is None:
+            root = Path(self.parcel.root)
+            contents = {name: (root / name).read_bytes() for name, _ in self.parcel.files}
+            self.sent = self.send({**contents, **self.kernels})
+        return self.sent
+
+    def _again(
         self, case: Mapping[str, str], folder: Path, outer: Future, tries: int, reason: str,
-        refusal: Returned | None = None,
+        answer: Returned | None = None,
     ) -> None:  # fmt: skip
         def again() -> None:
             try:
                 count = tries + 1
-                if refusal and refusal.refused_by:
-                    self.refusing.add(refusal.refused_by)
+                if answer and answer.asks:
+                    self._try(case, folder, outer, tries, self._contents())
+                    return
+                if answer and answer.refused_by:
+                    self.refusing.add(answer.refused_by)
                     if willing := self._willing():
                         self.size = min(self.size, sum(willing.values()))
                         count = tries
@@ -200,10 +358,11 @@ class Elsewhere:
                     else:
                         count = TRIES + 1
                 if count <= TRIES:
-                    self.package = self.send()
+                    self.sent = None  # it may be lost, too
+                    self.workers()  # an error if the scheduler has gone
                     self._try(case, folder, outer, count)
-                elif refusal:
-                    outer.set_result(self._received(refusal, folder))
+                elif answer:
+                    outer.set_result(self._received(answer, folder))
                 else:
                     lost = f"lost {TRIES} times: {reason}"
                     outer.set_result(CaseOutcome("killed", lost, {}, folder))
@@ -221,13 +380,13 @@ class Elsewhere:
             outer.cancel()
 
     def _received(self, result: Returned, folder: Path) -> CaseOutcome:
-        with reported(folder):
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir(parents=True)
-            for name, content in result.files.items():
-                (folder / name).parent.mkdir(parents=True, exist_ok=True)
-                (folder / name).write_bytes(content)
-        self.machines[folder] = result.machine
+        if result.files:
+            with reported(folder):
+                _put(folder, result.files, lambda content, path: path.write_bytes(content))
+        if result.kernels:
+            self.kernels |= result.kernels
+            self.parcel, self.sent = self.parcel._replace(kernels=tuple(self.kernels)), None
+        self.places.pop(folder.name, None)
         result.outcome.folder = folder
         return result.outcome
 
@@ -236,6 +395,9 @@ class Elsewhere:
         self.closing = True
         self.retries.shutdown(wait=False, cancel_futures=True)
         self.ends.close()
+        self.mark.unlink(missing_ok=True)
+        for left in self.mark.parent.glob(".case-*"):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
@@ -248,7 +410,7 @@ def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
     ends.callback(closing)
 
 
-def _in_time(connect: Callable[[], Any]) -> Any:
+def _in_time(connect: Callable[[], Any], patience: float = 0.0) -> Any:
     """Return the result of `connect`; TimeoutError if it never ends."""
     result: Future = Future()
 
@@ -259,13 +421,13 @@ def _in_time(connect: Callable[[], Any]) -> Any:
             result.set_exception(error)
 
     Thread(target=connecting, daemon=True).start()
-    return result.result(PATIENCE + 1)
+    return result.result(patience or PATIENCE + 1)
 
 
-def opened(options: Namespace, package: Package, jobs: int, *, timed: bool = False) -> Elsewhere:
+def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False) -> Elsewhere:
     ends = ExitStack()
     if options.on == "mpi":
-        return _mpi(package, ends, timed=timed)
+        return _mpi(parcel, ends, timed=timed)
     kinds = ("local", *QUEUES)
     if options.on not in kinds and "://" not in options.on:
         raise ScriptError(f"-on {options.on}", expected=WHERE)
@@ -279,14 +441,17 @@ def opened(options: Namespace, package: Package, jobs: int, *, timed: bool = Fal
     try:
         if options.on == "local":
             cluster: Any = LocalCluster(
-                n_workers=jobs, threads_per_worker=1, dashboard_address=":0"
+                n_workers=jobs,
+                threads_per_worker=1,
+                dashboard_address=":0",
+                silence_logs=logging.CRITICAL,
             )
-            _closed(ends, cluster.close, timeout=TO_CLOSE)
+            _closed(ends, cluster.close, timeout=PATIENCE)
         elif options.on in QUEUES:
             import dask_jobqueue
 
             cluster = getattr(dask_jobqueue, QUEUES[options.on])()
-            _closed(ends, cluster.close, timeout=TO_CLOSE)
+            _closed(ends, cluster.close, timeout=PATIENCE)
             cluster.scale(jobs=jobs)
         else:
             cluster = options.on
@@ -307,13 +472,18 @@ def opened(options: Namespace, package: Package, jobs: int, *, timed: bool = Fal
     executor = client.get_executor(retries=0)
     _closed(ends, executor.shutdown, wait=False)
 
-    def send() -> Any:
-        return client.scatter(package, broadcast=True, hash=False)
+    def send(contents: Mapping[str, bytes]) -> Any:
+        return client.scatter(contents, hash=False)
 
-    return Elsewhere(send, executor, jobs, ends, client.nthreads)
+    place = Elsewhere(parcel, send, executor, jobs, ends, client.nthreads)
+    client.subscribe_topic(parcel.mark, lambda event: place.places.update([event[1]]))
+    if options.on == "local":  # they are of the terminal's group
+        client.run(ignore_interrupts)
+    _closed(ends, _in_time, connect=lambda: client.run(end_study, parcel.mark), patience=TO_CLOSE)
+    return place
 
 
-def _mpi(package: Package, ends: ExitStack, *, timed: bool) -> Elsewhere:
+def _mpi(parcel: Parcel, ends: ExitStack, *, timed: bool) -> Elsewhere:
     if find_spec("mpi4py") is None:
         hint = "pip install '.[mpi]' in the folder of karamelo-py"
         raise ScriptError("-on mpi needs mpi4py", hint=hint)
@@ -328,4 +498,4 @@ def _mpi(package: Package, ends: ExitStack, *, timed: bool) -> Elsewhere:
         )
     executor = MPIPoolExecutor()
     _closed(ends, executor.shutdown, wait=False, cancel_futures=True)
-    return Elsewhere(lambda: package, executor, 1 if timed else size, ends)
+    return Elsewhere(parcel, lambda contents: contents, executor, 1 if timed else size, ends)

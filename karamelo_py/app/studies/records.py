@@ -173,6 +173,7 @@ def row(
         "status": outcome.status,
         "reason": next(filter(None, reasons), ""),
         "folder": os.path.relpath(outcome.folder, folder).replace(os.sep, "/"),
+        "machine": outcome.machine,
     }
 
 

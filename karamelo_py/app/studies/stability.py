@@ -128,7 +128,7 @@ def run(options: Namespace) -> int:
         study.page.judge(chart.judged, COLOURS)
     apart = [name in worded for name in axes] + [False] * (2 - len(axes))
     try:
-        width = study.elsewhere.size if study.elsewhere else study.jobs
+        width = study.place.size
         _, chart.inferred = explore(chart.shape, chart.classify, options.stride, apart, width)
     finally:
         if chart.results:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
+import socket
 import sys
 import time
 from argparse import Namespace
@@ -12,12 +14,20 @@ from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from karamelo_py.app.studies import variables
-from karamelo_py.app.studies.case import CaseOutcome, Launch, Refused, Row, folder_name, kind_of
+from karamelo_py.app.studies.case import (
+    CaseOutcome,
+    Launch,
+    Refused,
+    Row,
+    folder_name,
+    kind_of,
+    record_of,
+)
 from karamelo_py.app.studies.records import Recorded, row, write
 from karamelo_py.output.console import duration
 from karamelo_py.output.files import Claim, claim, reported, write_whole
@@ -30,10 +40,24 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from karamelo_py.app.live.study import StudyPage
-    from karamelo_py.app.studies.elsewhere import Elsewhere
 
 _FACTS = ("seconds", "points", "steps")
+HERE = socket.gethostname()
+OF_MACHINE = ("processor", "cores", "system", "versions")
 _STATUS = 24  # least width of the status while facts are shown
+
+
+class Place(Protocol):
+    size: int  # runs at once
+
+    def submit(self, case: Mapping[str, str], folder: Path) -> Future:
+        """Return a future of the outcome; the files of the case come into `folder`."""
+
+    def machine(self, folder: Path) -> str:
+        """Return the machine on which the case of a folder runs, if it is known."""
+
+    def close(self) -> None:
+        """End cases that run."""
 
 
 class Here:
@@ -43,7 +67,11 @@ class Here:
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
         return self.pool.submit(self.launch.run, case, folder)
 
+    def machine(self, folder: Path) -> str:
+        return HERE
+
     def close(self) -> None:
+        self.launch.stop.set()
         self.pool.shutdown(wait=True, cancel_futures=True)
 
 
@@ -53,15 +81,17 @@ class Study:
     out: Path  # table or picture, next to the folder of the runs
     names: list[str]
     items: Sequence[Recorded]
-    jobs: int  # runs at once
+    place: Place
     again: bool = False
     title: str = ""
     strict: bool = False  # a refused variant ends the study
     most: int = 0  # 0: `run` gets all cases
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # with --live
-    elsewhere: Elsewhere | None = None  # with -on
+    facts: dict[str, Any] = field(default_factory=dict)  # for the file next to the table
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
+    order: dict[tuple[str, ...], None] = field(default_factory=dict)  # of the rows in the table
+    machines: dict[str, Any] = field(default_factory=dict)  # processor and versions of each
     claim: Claim | None = None  # lock of the folder
     ran: int = 0
     next_write: float = 0.0  # when the table is due
@@ -74,11 +104,10 @@ class Study:
         kept = not self.again and self.launch.kept(case, self.folder / folder_name(case))
         return tuple(case.values()) in self.rows or bool(kept)
 
-    def describe(self, **facts: Any) -> None:
-        how = {"threads": self.launch.threads, "jobs": self.jobs, **surroundings()}
-        text = json.dumps({"script": str(self.launch.script), **facts, **how}, indent=1) + "\n"
-        self.claim_folder()
-        write_whole(self.out.with_suffix(".json"), text)
+    def describe(self) -> None:
+        how = {"threads": self.launch.threads, "jobs": self.place.size, **surroundings()}
+        made = {"script": str(self.launch.script), **self.facts, **how, "machines": self.machines}
+        write_whole(self.out.with_suffix(".json"), json.dumps(made, indent=1) + "\n")
 
     def claim_folder(self) -> None:
         if self.folder.exists() and not self.folder.is_dir():
@@ -97,12 +126,13 @@ class Study:
     def write(self) -> None:
         if self.writes and self.rows:
             begun = time.perf_counter()
-            write(self.out, list(self.rows.values()))
+            write(self.out, [self.rows[key] for key in self.order if key in self.rows])
             self.next_write = time.perf_counter() + 20 * (time.perf_counter() - begun)
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
         """Run cases; an interrupt ends runs in progress, and finished ones are stored."""
         waiting = []
+        self.order.update(dict.fromkeys(tuple(case.values()) for case in cases))
         for case in cases:
             if tuple(case.values()) in self.rows:
                 continue
@@ -129,7 +159,6 @@ class Study:
         return [self.rows[tuple(case.values())] for case in cases]
 
     def _run(self, queue: list[tuple[Mapping[str, str], Path]], display: _Display) -> None:
-        pool: Any = self.elsewhere or Here(self.launch, self.jobs)
         running: dict[Future, Mapping[str, str]] = {}
         started: set[tuple] = set()
         compiled = {kind_of(key) for key in self.rows}
@@ -141,11 +170,11 @@ class Study:
 
         try:
             while queue or running:
-                while len(running) < pool.size and (item := ready()):
+                while len(running) < self.place.size and (item := ready()):
                     queue.remove(item)
                     case, folder = item
                     started.add(kind_of(case.values()))
-                    running[pool.submit(case, folder)] = case
+                    running[self.place.submit(case, folder)] = case
                     display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -159,19 +188,18 @@ class Study:
                 display.tick([case for case, _ in queue], list(running.values()))
                 if self.page:
                     self._show(queue, list(running.values()), display)
-        except BaseException:
-            self.launch.stop.set()
-            raise
         finally:
             self.write()
-            if self.elsewhere is None:
-                pool.close()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
         """Show the state; KeyboardInterrupt if the study was stopped on the page."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left([case for case, _ in queue], running)
-        places = [(case, self.folder / folder_name(case), display.since(case)) for case in running]
+        folders = [self.folder / folder_name(case) for case in running]
+        places = [
+            (case, folder, display.since(case), self.place.machine(folder))
+            for case, folder in zip(running, folders, strict=True)
+        ]
         rows = list(self.rows.values())
         self.page.follow(rows, queue, places, of=of, most=bool(self.most), left=left)
         if self.page.stopped.is_set():
@@ -180,10 +208,11 @@ class Study:
     def _put(self, case: Mapping[str, str], outcome: CaseOutcome) -> None:
         if self.strict and outcome.status == "refused":
             raise Refused(case, outcome)
-        made = row(case, outcome, self.items, self.folder.parent)
-        if self.elsewhere:
-            made = {**made, "machine": self.elsewhere.machines.get(outcome.folder, "")}
-        self.rows[tuple(case.values())] = made
+        self.rows[tuple(case.values())] = row(case, outcome, self.items, self.folder.parent)
+        if outcome.machine and outcome.machine not in self.machines:
+            made = record_of(outcome.folder)
+            self.machines[outcome.machine] = {name: made.get(name) for name in OF_MACHINE}
+            self.describe()
 
 
 class _Display:
@@ -235,7 +264,7 @@ class _Display:
         predict = guessed_time(cases, [result["wall_s"] for result in done])
         rest = sum(predict(case) for case in queue)
         rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
-        return rest / min(self.study.jobs, max(len(queue) + len(running), 1))
+        return rest / min(self.study.place.size, max(len(queue) + len(running), 1))
 
 
 def _said(case: Mapping[str, str]) -> str:
@@ -332,19 +361,23 @@ def open_study(
 
     `settings` are further fields of `Study`.
     """
+    gc.enable()  # off for single runs
     names, again = list(plan.values), options.again
-    study = Study(plan.launch, out, names, items, plan.jobs, again=again, **settings)
+    place: Place = Here(plan.launch, plan.jobs)
+    study = Study(plan.launch, out, names, items, place, again=again, **settings)
+    study.facts = {"variables": plan.values, **facts}
+    study.claim_folder()
     if options.live:
         from karamelo_py.app.live.study import StudyPage
 
         words = [item.word for item in items]
         study.page = StudyPage(options.script, names, words, axes=axes, base=study.folder.parent)
         print(f"live: {study.page.server.address}", flush=True)
-    study.describe(variables=plan.values, **facts)
     if options.on:
         from karamelo_py.app.studies.elsewhere import opened, packed
 
-        package = packed(plan.script, plan.launch, plan.values, options.keep)
-        place = opened(options, package, plan.jobs, timed=plan.timed)
-        study.elsewhere = options.ends.enter_context(closing(place))
+        parcel = packed(plan.script, plan.launch, plan.values, options.keep, study.folder)
+        study.place = opened(options, parcel, plan.jobs, timed=plan.timed)
+    options.ends.enter_context(closing(study.place))
+    study.describe()
     return study
