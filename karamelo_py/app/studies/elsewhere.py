@@ -47,7 +47,7 @@ RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
 class Parcel(NamedTuple):
-    """What goes with each case; contents of files only go to a machine that asks for them."""
+    """The data of a study that go with each case."""
 
     study: str  # folder of the runs, if the machine has the same disk
     mark: str  # file in it, by which a machine finds that out
@@ -133,7 +133,7 @@ def _modules(folder: Path, name: str, found: frozenset[Path] = frozenset()) -> s
 
 
 class Site:
-    """What a machine has of a study."""
+    """A study on one machine: its files, its kernels, and its end."""
 
     def __init__(self, parcel: Parcel):
         study, root = Path(parcel.study), Path(parcel.root)
@@ -170,7 +170,7 @@ class Site:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(contents[name])
                 self.launch = self._launch(Path(self.folder.name))
-            with suppress(OSError):  # a cache that nobody can write to
+            with suppress(OSError):  # a read-only cache
                 for name in kernels:
                     if not (cache.folder() / name).is_file():
                         cache.write(cache.folder() / name, contents[name])
@@ -230,7 +230,7 @@ def _scratch() -> str | None:
 def run_sent(
     parcel: Parcel, case: Mapping[str, str], name: str, contents: Mapping[str, bytes] | None = None
 ) -> Returned:
-    """Run a case on this machine; `name` is that of its folder."""
+    """Run a case on this machine; `name` is the name of its folder."""
     machine, worker, site = socket.gethostname(), _worker(), _site(parcel)
     if site.differ:
         outcome = CaseOutcome("failed", f"{machine} has {site.differ}", code="busy")

@@ -47,7 +47,7 @@ OF_MACHINE = ("processor", "cores", "system", "versions")
 _STATUS = 24  # least width of the status while facts are shown
 
 
-class Place(Protocol):
+class Pool(Protocol):
     size: int  # runs at once
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
@@ -81,7 +81,7 @@ class Study:
     out: Path  # table or picture, next to the folder of the runs
     names: list[str]
     items: Sequence[Recorded]
-    place: Place
+    place: Pool
     again: bool = False
     title: str = ""
     strict: bool = False  # a refused variant ends the study
@@ -363,7 +363,7 @@ def open_study(
     """
     gc.enable()  # off for single runs
     names, again = list(plan.values), options.again
-    place: Place = Here(plan.launch, plan.jobs)
+    place: Pool = Here(plan.launch, plan.jobs)
     study = Study(plan.launch, out, names, items, place, again=again, **settings)
     study.facts = {"variables": plan.values, **facts}
     study.claim_folder()
