@@ -21,45 +21,46 @@ def _radius(nodes, n, m):
     return sqrt((inertia[n, 0] + inertia[m, 0]) / mass)
 
 
-def _yielding(held, nodes, n, r):
-    return 0.0 if held.prescribed[n, AROUND] != 0 else r * r / field(nodes.fields, SumsAround)[n, 0]
+def _yielding(fields, nodes, n, r):
+    inertia = field(nodes.fields, SumsAround)[n, 0]
+    return 0.0 if fields.prescribed[n, AROUND] != 0 else r * r / inertia
 
 
 @contact.around_of.on(Twisted)
-def _around_of_twisted(kin, held, nodes, pair, again):
+def _around_of_twisted(kin, fields, nodes, pair, again):
     n, m = pair.n, pair.m
     sums, r = field(nodes.fields, SumsAround), _radius(nodes, pair.n, pair.m)
     omega = field(nodes.fields, AngularVelocity if again else UpdateAround)
     before = r * (sums[n, 1] / sums[n, 0] - sums[m, 1] / sums[m, 0])
-    yields = _yielding(held, nodes, n, r) + _yielding(held, nodes, m, r)
+    yields = _yielding(fields, nodes, n, r) + _yielding(fields, nodes, m, r)
     return r * (omega[n, 0] - omega[m, 0]), yields, before
 
 
 @contact.take_around.on(Twisted)
 def _take_around_twisted(kin, bodies, control, sides, impulse):
-    held, _, nodes = bodies
+    fields, _, nodes = bodies
     first, second = sides
     r = _radius(nodes, first.n, second.n)
     for side, sign in ((first, -1.0), (second, 1.0)):
-        slot = held.prescribed[side.n, AROUND]
+        slot = fields.prescribed[side.n, AROUND]
         _change(bodies, side.n, side.i, sign * impulse, r)
         if counts(control.ranks, side.n):
             torque = sign * r * impulse / control.step[0].kick
-            add_to(control.totals, held.torque[side.field] + 1, torque)
+            add_to(control.totals, fields.torque[side.field] + 1, torque)
             if slot:
                 add_to(control.totals, slot - 1, -torque)
 
 
 def _change(bodies, n, i, impulse, r):
-    held, _, nodes = bodies
-    if held.prescribed[n, AROUND] == 0:
-        held.change[i, AROUND] += impulse * r / field(nodes.fields, SumsAround)[n, 0]
+    fields, _, nodes = bodies
+    if fields.prescribed[n, AROUND] == 0:
+        fields.change[i, AROUND] += impulse * r / field(nodes.fields, SumsAround)[n, 0]
 
 
 @contact.stay_around.on(Twisted)
 def _stay_around_twisted(kin, bodies, pair, sides, share):
-    held, _, nodes = bodies
-    speed, yields, _ = contact.around_of(kin, held, nodes, pair, True)
+    fields, _, nodes = bodies
+    speed, yields, _ = contact.around_of(kin, fields, nodes, pair, True)
     if yields > 0:
         r = _radius(nodes, pair.n, pair.m)
         _change(bodies, pair.n, sides[0], -share * speed / yields, r)

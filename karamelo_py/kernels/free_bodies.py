@@ -44,8 +44,8 @@ class TouchingSurface(NamedTuple):
 
 def _stencil_of(s, points, p):
     grid, now = record(s.grids, points.grid[p]), s.control.motion[0].now
-    place = location_at(s.basis, s.kin, points.x[now] if s.frame.moves else points.home, p)
-    return grid, locate(s.basis, s.kin, grid, place)
+    location = location_at(s.basis, s.kin, points.x[now] if s.frame.moves else points.home, p)
+    return grid, locate(s.basis, s.kin, grid, location)
 
 
 @point_function(otherwise=True)
@@ -174,10 +174,10 @@ def _give_to_points(body, s, block, number, measures):
         for node in range(support(s.basis, kin)):
             n, weight, _ = entry(s.basis, kin, grid, stencil, node)
             for c in range(d):
-                impulse, held = weight * contact.impulse[c], s.bodies.held[n, c]
-                if held and measures:
-                    _hold(s, held - 1, node_position(grid, n), c, -impulse / kick)
-                elif nodes.sums[n, arrays.MASS] > 0 and not held:
+                impulse, reaction = weight * contact.impulse[c], s.bodies.held[n, c]
+                if reaction and measures:
+                    _hold(s, reaction - 1, node_position(grid, n), c, -impulse / kick)
+                elif nodes.sums[n, arrays.MASS] > 0 and not reaction:
                     change = arrays.of_change(kin) + c
                     if measures:
                         # mean velocity over the step, as for loads
@@ -253,13 +253,13 @@ def _reaction(body, s):
 
 @noinline
 def _add_links(body, s):
-    given, centre, values = body.solution.given, body.state[0].x, s.control.values
+    impulses, centre, values = body.solution.given, body.state[0].x, s.control.values
     kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        about = centre[i] * given[j] - centre[j] * given[i]
-        values[force[body.field] + k] += given[k] / kick
-        values[torque[body.field] + k] += (given[3 + k] + about) / kick
+        about = centre[i] * impulses[j] - centre[j] * impulses[i]
+        values[force[body.field] + k] += impulses[k] / kick
+        values[torque[body.field] + k] += (impulses[3 + k] + about) / kick
 
 
 @noinline

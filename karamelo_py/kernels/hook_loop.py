@@ -246,9 +246,9 @@ def _torque_of(hooks, slot):
 
 @noinline
 def _add_torque(call, q, c, slot, force):
-    place, row = call.hooks.scratch, _torque_of(call.hooks, slot)
+    positions, row = call.hooks.scratch, _torque_of(call.hooks, slot)
     if row > 0 and force != 0:
-        x = (place[0, q], place[1, q], place[2, q])
+        x = (positions[0, q], positions[1, q], positions[2, q])
         totals.add_torque(call.control.totals, row, x, c, force)
 
 
@@ -504,8 +504,8 @@ def _work_at_nodes(members, call, count):
                 # Fixes that hold nodes prescribe v before the step too. In free fall v is v*.
                 v, mass, force = velocity[n, c], sums[n, arrays.MASS], arrays.of_force(members.kin)
                 before, pushed = sums[n, momentum + c] / mass, dt * sums[n, force + c] / mass
-                held = v == update[n, c] and abs(v - before - pushed) > FREE * abs(pushed)
-                moved = v + (v if held else before)
+                fixed = v == update[n, c] and abs(v - before - pushed) > FREE * abs(pushed)
+                moved = v + (v if fixed else before)
             terms[q] = 0.5 * dt * load * moved if counts else 0.0
         totals.add_many(control.totals, totals.WORK, terms, count)
 

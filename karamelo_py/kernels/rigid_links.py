@@ -173,8 +173,8 @@ def _closest_outside(shape, kin, x, reach):
 def _closest_of_parts(shape, kin, x, reach):
     sign = 1.0 if isinstance(shape, Joined) else -1.0
     within, out = closest(shape.parts[0], kin, x, reach)
-    for part in shape.parts[1:]:
-        other, way = closest(part, kin, x, reach)
+    for member in shape.parts[1:]:
+        other, way = closest(member, kin, x, reach)
         if sign * (other - within) > 0:
             within, out = other, way
     return within, out
@@ -259,10 +259,10 @@ def _solve_dense(J, m):
             for b in range(k, m + 1):
                 J[k, b], J[best, b] = J[best, b], J[k, b]
         for a in range(k + 1, m):
-            part = J[a, k] / J[k, k]
-            if part != 0:
+            factor = J[a, k] / J[k, k]
+            if factor != 0:
                 for b in range(k, m + 1):
-                    J[a, b] -= part * J[k, b]
+                    J[a, b] -= factor * J[k, b]
     for back in range(m):
         k = m - 1 - back
         for b in range(k + 1, m):
@@ -329,8 +329,8 @@ def _list_touch(links, touch, kin, dt):
         if away[0] ** 2 + away[1] ** 2 + away[2] ** 2 > far * far:
             continue
         local = motion.to_start(links.states[b], (away[0], away[1], away[2]))
-        place = kin.Vector._make([local[c] + origin[c] for c in range(d)])
-        within, out = closest(touch.second.shape, kin, place, reach + radius)
+        position = kin.Vector._make([local[c] + origin[c] for c in range(d)])
+        within, out = closest(touch.second.shape, kin, position, reach + radius)
         gap = -within - radius
         if gap >= reach or out.squared() == 0 or links.count[0] == links.rows.size:
             continue
@@ -389,7 +389,7 @@ def _list_joint(links, joint, dt, kick):
             way = [error[c] for c in range(3)]
         _set_levers(links, link)
         _set_weight(links, link)
-        held = False
+        some = False
         for k in range(3):
             along, gap = _along(links, link.ways[k], link.ways[k]), 0.0
             for c in range(3):
@@ -397,8 +397,8 @@ def _list_joint(links, joint, dt, kick):
             holding = holds[k if kind == HOLD else 3 + k] and along > 0
             link.stiff[k] = 1 / (SOFT * along) if holding else 0.0
             link.bias[k] = gap / dt
-            held = held or link.stiff[k] > 0
-        links.count[0] += 1 if held else 0
+            some = some or link.stiff[k] > 0
+        links.count[0] += 1 if some else 0
 
 
 @noinline
@@ -413,10 +413,10 @@ def _rotation_between(links, joint):
         axis = (joint.axes[k, 0], joint.axes[k, 1], joint.axes[k, 2])
         a = motion.from_start(links.states[joint.first], axis)
         b = motion.from_start(links.states[joint.second], axis)
-        part = (1.0 if k == 0 else 0.0) if alone else 0.5
+        weight = (1.0 if k == 0 else 0.0) if alone else 0.5
         for c in range(3):
             i, j = (c + 1) % 3, (c + 2) % 3
-            total[c] += part * (b[i] * a[j] - b[j] * a[i])
+            total[c] += weight * (b[i] * a[j] - b[j] * a[i])
     return total[0], total[1], total[2]
 
 
@@ -479,12 +479,12 @@ def _slope_of(link, k, j, bounded):
         return 0.0
     normal = link.ways[0]
     along = normal[k] * normal[j]
-    part = link.stiff[0] * along + link.rub * ((1.0 if k == j else 0.0) - along)
+    slope = link.stiff[0] * along + link.rub * ((1.0 if k == j else 0.0) - along)
     if 0.0 < link.rub < link.stiff[1]:
         way = link.slip[k] / link.speed
-        part -= link.rub * way * link.slip[j] / link.speed
-        part -= 0.0 if bounded else link.mu * link.stiff[0] * way * normal[j]
-    return part
+        slope -= link.rub * way * link.slip[j] / link.speed
+        slope -= 0.0 if bounded else link.mu * link.stiff[0] * way * normal[j]
+    return slope
 
 
 @noinline
@@ -492,14 +492,14 @@ def _add_slope(links, link, bounded):
     _set_levers(links, link)
     for k in range(3):
         for j in range(3):
-            part = _slope_of(link, k, j, bounded)
-            if part == 0:
+            slope = _slope_of(link, k, j, bounded)
+            if slope == 0:
                 continue
             for side in range(2):
                 row = links.free[link.first if side == 0 else link.second]
                 for other in range(2):
                     column = links.free[link.first if other == 0 else link.second]
-                    sign = part if side == other else -part
+                    sign = slope if side == other else -slope
                     for a in range(6):
                         if row[a] < 0 or links.levers[side, k, a] == 0:
                             continue
@@ -547,13 +547,13 @@ def _add_body(links, body, n, bounded):
 
 
 @noinline
-def _try(links, bodies, part, bounded):
+def _try(links, bodies, fraction, bounded):
     m = links.slope.shape[0]
     for n in range(links.free.shape[0]):
         for a in range(6):
             links.trial[n, a] = links.u[n, a]
             if links.free[n, a] >= 0:
-                links.trial[n, a] -= part * links.slope[links.free[n, a], m]
+                links.trial[n, a] -= fraction * links.slope[links.free[n, a], m]
     return _residual(links, bodies, links.trial, links.trial_rest, bounded)
 
 
@@ -577,17 +577,17 @@ def _descend(links, bodies):
     begin = _fall(links, links.rest)
     if not begin > 0:
         return 0.0
-    low, high, part, now = 0.0, np.inf, 1.0, 0.0
+    low, high, fraction, now = 0.0, np.inf, 1.0, 0.0
     for _ in range(SEARCHES):
-        now = _try(links, bodies, part, True)
+        now = _try(links, bodies, fraction, True)
         fall = _fall(links, links.trial_rest)
         if abs(fall) <= NEAR_MINIMUM * begin:
             break
         if fall > 0:
-            low = part
+            low = fraction
         else:
-            high = part
-        part = 0.5 * (low + high) if high < np.inf else 2 * part
+            high = fraction
+        fraction = 0.5 * (low + high) if high < np.inf else 2 * fraction
     return now
 
 
@@ -612,13 +612,13 @@ def _iterate(links, bodies, bounded):
         if bounded:
             now = _descend(links, bodies)
             better = now > 0
-        part = 1.0
+        fraction = 1.0
         for _ in range(0 if bounded else motion.HALVINGS):
-            now = _try(links, bodies, part, bounded)
+            now = _try(links, bodies, fraction, bounded)
             if now < size:
                 better = True
                 break
-            part *= 0.5
+            fraction *= 0.5
         if not better:
             _residual(links, bodies, links.u, links.rest, bounded)
             return size <= GOOD_ENOUGH * energy

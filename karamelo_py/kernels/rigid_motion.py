@@ -313,14 +313,14 @@ def add_slope(body, i, bounded):
     for k in range(3):
         for j in range(3):
             along = c.normal[k] * c.normal[j]
-            part = stiff * along + c.rub * ((1.0 if k == j else 0.0) - along)
+            slope = stiff * along + c.rub * ((1.0 if k == j else 0.0) - along)
             if slips:
                 way = c.slip[k] / c.speed
-                part -= c.rub * way * c.slip[j] / c.speed
-                part += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
+                slope -= c.rub * way * c.slip[j] / c.speed
+                slope += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
             for a in range(6):
                 for b in range(6):
-                    J[a, b] += part * A[k, a] * A[j, b]
+                    J[a, b] += slope * A[k, a] * A[j, b]
 
 
 @noinline
@@ -334,9 +334,9 @@ def solve_system(J):
         for b in range(7):
             J[k, b], J[best, b] = J[best, b], J[k, b]
         for a in range(k + 1, 6):
-            part = J[a, k] / J[k, k]
+            factor = J[a, k] / J[k, k]
             for b in range(k, 7):
-                J[a, b] -= part * J[k, b]
+                J[a, b] -= factor * J[k, b]
     for back in range(6):
         k = 5 - back
         for b in range(k + 1, 6):
@@ -366,15 +366,15 @@ def _iterate(body, dt, bounded):
                     J[a, b] = J[b, a] = 0.0
                 J[a, a], J[a, 6] = 1.0, 0.0
         solve_system(J)
-        part, better, now = 1.0, False, size
+        fraction, better, now = 1.0, False, size
         for _ in range(HALVINGS):
             for a in range(6):
-                work.trial[a] = work.u[a] - part * J[a, 6]
+                work.trial[a] = work.u[a] - fraction * J[a, 6]
             now = residual(body, dt, work.trial, work.trial_residual, bounded)
             if now < size:
                 better = True
                 break
-            part *= 0.5
+            fraction *= 0.5
         if not better:
             residual(body, dt, work.u, work.residual, bounded)
             return size <= GOOD_ENOUGH * scale
@@ -488,10 +488,10 @@ def finish_step(body, control, dimension):
         _set_spin(body)
     for a in range(3):
         for b in range(3):
-            part = 0.0
+            rotation = 0.0
             for c in range(3):
-                part += state.R[a, c] * old[b, c]
-            state.spread[a, b] = (part - (1.0 if a == b else 0.0)) / dt
+                rotation += state.R[a, c] * old[b, c]
+            state.spread[a, b] = (rotation - (1.0 if a == b else 0.0)) / dt
         work.before[a] = state.x[a]
         state.x[a] += dt * u[a]
     _set_angle(state, dt, dimension)

@@ -134,8 +134,8 @@ def push(terms, memory, p, near):
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + mass * rate * slid, normal)
     stop = along(mass / contact_kick * slip, normal)
-    rubbed, held = rub(mu, load, FrictionMemory(hold, mean, unused), stop)
-    store(grip, p, (*held.hold, held.mean, held.unused, *x))
+    rubbed, after = rub(mu, load, FrictionMemory(hold, mean, unused), stop)
+    store(grip, p, (*after.hold, after.mean, after.unused, *x))
     increase(losses, p, (lost + kick * dot(rubbed, slip),))
     return load * normal + rubbed
 
@@ -191,8 +191,8 @@ def touch_kind(lever: type, grip: type | None) -> type[Touch]:
         @memory_of.on(kind)
         def _memory_of(tag, members):
             fields = members.points.fields
-            held = field(fields, grip) if grip else None
-            return field(fields, lever), held, field(fields, ContactLoss)
+            memory = field(fields, grip) if grip else None
+            return field(fields, lever), memory, field(fields, ContactLoss)
 
         return kind
 

@@ -26,7 +26,7 @@ def rub(members, call, q, mu):
     kin, nodes, hooks, control, dt = members.kin, members.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], members.kept
     d, holders, n = kin.dimension, hooks.holders, hooks.chosen[q]
-    torque, place = hooks.torques[slot], hooks.scratch
+    torque, positions = hooks.torques[slot], hooks.scratch
     mass = nodes.sums[n, MASS]
     across = 0.0
     along = 0.0
@@ -57,7 +57,7 @@ def rub(members, call, q, mu):
             if counts(control.ranks, n):
                 add_to(control.totals, slot + c, -mass * taken / dt)
                 if torque > 0:
-                    x = (place[0, q], place[1, q], place[2, q])
+                    x = (positions[0, q], positions[1, q], positions[2, q])
                     add_torque(control.totals, torque, x, c, -mass * taken / dt)
     # walls take no heat
     warm_node(field(nodes.fields, FrictionalHeat), n, work)

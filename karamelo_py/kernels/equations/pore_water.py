@@ -297,8 +297,8 @@ def _is_open(nodes, n):
 
 def _close_if_dry(nodes, kin, n):
     """Close a node of a seepage face unless its pressure or flow is outward."""
-    given, sums = field(nodes.fields, GivenPressure), field(nodes.fields, PoreSums)
-    if given[n, 1] == 1 and sums[n, 2] <= given[n, 0] * sums[n, 0]:
+    prescribed, sums = field(nodes.fields, GivenPressure), field(nodes.fields, PoreSums)
+    if prescribed[n, 1] == 1 and sums[n, 2] <= prescribed[n, 0] * sums[n, 0]:
         water, force = field(nodes.fields, WaterSums), field(nodes.fields, PoreForce)
         m, m_s, across = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], real(0, sums[n, 0])
         for k in range(kin.dimension):
@@ -306,7 +306,7 @@ def _close_if_dry(nodes, kin, n):
             w = water[n, of_momentum] / m - nodes.sums[n, of_momentum] / m_s
             across += w * force[n, kin.dimension + k]
         if across <= 0:
-            given[n, 0] = nan
+            prescribed[n, 0] = nan
 
 
 def _is_closed(nodes, kin, n, rim):
@@ -327,19 +327,19 @@ def _by_pressure(nodes, kin, n, rim):
 
 def _mass_given(nodes, kin, n, V):
     """Return the mass of water supplied to a node per time; store it by `WAYS`."""
-    given, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
+    supply, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
     whole, squared = real(0, V), real(0, V)
-    if given is None:
+    if supply is None:
         return whole
     for k in range(d):
         area = force[n, d + k]
         squared += area * area
-        given[n, 2 * k] *= max(-area, real(0, V))
-        given[n, 2 * k + 1] *= max(area, real(0, V))
-    given[n, 2 * d] *= sqrt(squared)
-    given[n, 2 * d + 1] *= V
+        supply[n, 2 * k] *= max(-area, real(0, V))
+        supply[n, 2 * k + 1] *= max(area, real(0, V))
+    supply[n, 2 * d] *= sqrt(squared)
+    supply[n, 2 * d + 1] *= V
     for k in range(2 * d + 2):
-        whole += given[n, k]
+        whole += supply[n, k]
     return whole
 
 

@@ -67,14 +67,14 @@ def _fold(images, nodes, array, n, fast):
         row = j + side * across.period
         if (row >= -GHOSTS) & (row <= across.period + GHOSTS):
             a, b, second = _pair(images, n, side)
-            for m, part in ((a, 1 - second), (b, second)):
+            for m, weight in ((a, 1 - second), (b, second)):
                 if used[m, 0] > 0:
-                    part = real(part, array[n, 0])
+                    weight = real(weight, array[n, 0])
                     for c in range(int(array.shape[1])):
-                        array[n, c] += part * array[m, c]
+                        array[n, c] += weight * array[m, c]
                     if fast >= 0:
                         speed = real(side * images.speed, array[n, 0])
-                        array[n, fast] -= part * speed * nodes.sums[m, MASS]
+                        array[n, fast] -= weight * speed * nodes.sums[m, MASS]
 
 
 def _spread(images, nodes, array, n, first):
