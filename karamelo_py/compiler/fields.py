@@ -61,7 +61,7 @@ def vector(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """Count the components of a tensor, hoop component included."""
+    """The hoop component counts."""
     return kin.tensor_size
 
 
@@ -70,7 +70,6 @@ def planar(kin: Any) -> int:
 
 
 def numbers(count: int, per_direction: int = 0) -> Any:
-    """Make the shape of ``count + per_direction * d`` numbers."""
     return staticmethod(lambda kin: count + per_direction * kin.dimension)
 
 
@@ -108,7 +107,6 @@ class SummedField(StepField):
 
 
 def name_of(kind: type) -> str:
-    """Return a field's class name in lower-case words."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
@@ -138,7 +136,6 @@ def fields_of(owner: Any, attribute: str) -> tuple[type, ...]:
 
 
 def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
-    """List fields in ``point_fields`` or ``node_fields`` of `owners`, each once."""
     return tuple(dict.fromkeys(kind for owner in owners for kind in fields_of(owner, attribute)))
 
 
@@ -204,7 +201,7 @@ def _start(kind: type, kin: Any, real: type) -> np.ndarray:
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
-    """Return zeros (count, width): unused pages take no memory, records cross no cache lines."""
+    """Return zeros (count, width); unused pages take no memory, records cross no cache lines."""
     room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
     first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
@@ -242,7 +239,6 @@ def store(array, p, values):
 
 
 def store_from(array, p, first, values):
-    """Set components of point `p` from `first` on."""
     if array is not None:
         values = flat(values)
         for k in range(first, len(values)):

@@ -168,7 +168,7 @@ def shuffle(builder: ir.IRBuilder, a: ir.Value, b: ir.Value, order: list[int]) -
 
 
 def overloaded(kind: ir.Type) -> str:
-    """Return a type's name in LLVM functions: f64, v4f64."""
+    """Return f64, v4f64, ..."""
     if isinstance(kind, ir.VectorType):
         return f"v{kind.count}{kind.element.intrinsic_name}"
     return kind.intrinsic_name

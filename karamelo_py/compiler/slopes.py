@@ -180,7 +180,6 @@ def elementary(function: Callable, slope: Callable, *others: Callable) -> Callab
 
 
 def _inverse(x):
-    """Return 1/x, or 0 for 0."""
     return where(x > 0, 1 / where(x > 0, x, 1), 0)
 
 

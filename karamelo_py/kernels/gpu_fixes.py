@@ -217,7 +217,6 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks; `which` is (begin, end, always), else only in the last step."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):

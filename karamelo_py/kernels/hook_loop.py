@@ -543,12 +543,12 @@ def _act_on_whole_nodes(members, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points, for each of which loops would be recompiled."""
+    """Omit functions of whole points, which would recompile loops."""
     return arrays.with_items(hooks, whole=())
 
 
 def known_to_hooks(nodes):
-    """Return the fields that the loop uses; others would cause recompilation."""
+    """Omit other fields, which would recompile the loop."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 
@@ -565,7 +565,6 @@ def whole_nodes(s, tag, stage, target):
 
 
 def node_hooks(stage, members, hooks, s, dt):
-    """Call the node functions of `stage`; for loads, sum the work."""
     tags = [tag for tag in hooks.whole if tag.of_nodes]
     whole = tuple([whole_nodes(s, tag, stage, members.target) for tag in tags])
     _node_hooks(stage, members, whole, Call(without_whole(hooks), s.control, float(dt), NONE, 1.0))

@@ -44,7 +44,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Double the lanes of an update in stretches, whose dependent operations wait."""
+    """Double the lanes, as operations of an update wait for each other."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

@@ -306,7 +306,6 @@ def _speed(links, body):
 
 @noinline
 def _apart(links, a, b):
-    """Return the gap between bounding spheres."""
     x, y, square = links.states[a].x, links.states[b].x, 0.0
     for c in range(3):
         square += (x[c] - y[c]) ** 2

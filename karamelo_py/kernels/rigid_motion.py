@@ -254,7 +254,6 @@ def set_lever(body, x):
 
 @noinline
 def velocity_there(body, u, k):
-    """Return component `k` of A U."""
     v = 0.0
     for a in range(6):
         v += body.solution.lever[k, a] * u[a]
@@ -526,6 +525,5 @@ def _set_angle(state, dt, dimension):
 
 @noinline
 def _about_origin(body, k):
-    """Return the contact torque about the origin, for the position before this step."""
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

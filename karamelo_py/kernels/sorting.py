@@ -49,7 +49,7 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Return the cell of a point at `at` cells, clamped, as a hook may have moved it anywhere."""
+    """Return a clamped cell, as a hook may have moved the point anywhere."""
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 

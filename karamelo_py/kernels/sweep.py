@@ -161,7 +161,6 @@ def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
 
 
 def _without_gather(tile, p, moved):
-    """Return the move of a point that only scatters; infinite outside the grid."""
     s, w = tile.s, tile.w
     if not s.frame.moves:
         return moved
@@ -169,7 +168,7 @@ def _without_gather(tile, p, moved):
 
 
 def is_good(stride, moved, rate):
-    """Return False if a point failed, also for NaN."""
+    """False also for NaN."""
     return (moved <= stride) & (rate < 1e300)
 
 

@@ -219,7 +219,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows one by one, as parts of the fused step's passes where possible."""
+    """List the rows one by one, as parts of the fused step's passes if possible."""
     rows = list(rows)
     return one_by_one(rows, _FusedStep(rows).visits)
 
@@ -267,7 +267,7 @@ def _described_scene(row, setup):
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row with the parts that join it in a scene; None if it does nothing there."""
+    """Describe a row with the parts that join it in a scene; None if it does nothing."""
     return _described.find((type(row),))(row, setup)
 
     # Kinds of rows that are replaced before a step

@@ -163,7 +163,6 @@ def add_rows(totals, rows, terms):
 
 
 def add_torque(totals, row, x, c, force):
-    """Add the torque about the origin of component `c` of a force at `x`."""
     add_to(totals, row + (c + 1) % 3, x[(c + 2) % 3] * force)
     add_to(totals, row + (c + 2) % 3, -x[(c + 1) % 3] * force)
 

@@ -44,7 +44,6 @@ class Touch(NamedTuple):
 
 
 def direction_of(falls, step):
-    """Return the unit direction of depth differences, 0 if level."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
@@ -86,7 +85,7 @@ class NearPoint(NamedTuple):
 
 
 def reach_of(lever, p, whole, d):
-    """Return the radius along the normal, and the depth due to `follow_strain`."""
+    """Return the radius, and the depth due to `follow_strain`."""
     if lever[d + 1, p] > 0:
         return float(lever[d, p]), float(lever[d + 4, p])
     return whole, 0.0

@@ -104,7 +104,6 @@ def _companies_rotating(tag):
 
 
 def rotating(kin: Any, transfer: Any) -> tuple[Rotating, ...]:
-    """Return the rotation fields of a scene with twist, else ()."""
     if not isinstance(kin, Twisted):
         return ()
     return (RotatingByMoments() if stores_moment(transfer) else Rotating(),)

@@ -93,7 +93,6 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return vector_at(kin, records, self.i, 0, self.grad_N[: kin.dimension])
 
     def of(self, kind):
-        """Return the array of a field of nodes, or None."""
         return field(self.w.nodes.fields, kind)
 
 
@@ -110,7 +109,6 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
 
     @property
     def law_state_F(self):
-        """Law, state, and F as `deformation_of`."""
         w, material = self.w, self.law_and_state
         return *material, deformation_of(w.frame, w.kin, w.points, material, self.p)
 
@@ -120,7 +118,6 @@ class PointView(namedtuple("PointView", "w stencil p dt")):
         return tuple([node_of(w, self.stencil, k) for k in range(support(w.basis, w.kin))])
 
     def of(self, kind):
-        """Return the array of a field of points, or None."""
         return field(self.w.points.fields, kind)
 
     def load(self, kind, template):

@@ -281,12 +281,11 @@ def growth(first, later, unit):
 
 
 def keeps(first, later, unit, within=WITHIN):
-    """Return True if growth is within a fraction of the unit, False for NaN."""
+    """False for NaN."""
     return later - first <= within * unit
 
 
 def unit_of(energy):
-    """Return the largest energy, with limited drift."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 

@@ -91,14 +91,12 @@ def _reflected_reflecting_grid(grid, kin, y, v, moment):
 
 
 def beyond(grid, direction, y):
-    """Return -1 below the lower edge, 1 above the upper edge, else 0."""
     a = in_cells(grid, direction, y)
     end = pick(direction, grid.lx, grid.ly, grid.lz)
     return where(a < 0, real(-1, y), where(a > end, real(1, y), real(0, y)))
 
 
 def turn(grid, direction, y, v):
-    """Return -1 if a point outside the edge moves further out, else 1."""
     return where(beyond(grid, direction, y) * v > 0, real(-1, y), real(1, y))
 
 
@@ -111,7 +109,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """Return the mirrored tensor R L R, R = diag(signs), or ()."""
+    """Return R L R with R = diag(signs), or ()."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

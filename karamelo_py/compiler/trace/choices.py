@@ -29,7 +29,6 @@ _noted: contextvars.ContextVar[tuple[set[str], ...]] = contextvars.ContextVar("n
 
 @functools.cache
 def is_elsewhere(module: str) -> bool:
-    """Return True if a module is neither of a library nor in `ROOMS`."""
     top, _, rest = module.partition(".")
     return top not in LIBRARIES and not (top == _PACKAGE and rest.partition(".")[0] in ROOMS)
 

@@ -206,7 +206,7 @@ class Kernel:
         return read(result)
 
     def compile(self, *arguments: Any) -> None:
-        """Compile it and prepare a call with these arguments."""
+        """Prepare a call with these arguments."""
         self._planned(ArgumentBuffer(arguments), arguments)
 
     def _planned(self, written: ArgumentBuffer, arguments: tuple) -> tuple:

@@ -220,7 +220,6 @@ class AstCompiler:
         return [self.edge()] if self.goes else []
 
     def leave(self, edges: list[Edge]) -> None:
-        """End this branch; it continues where `edges` merge."""
         edges.append(self.edge())
         self.goes = False
 

@@ -143,7 +143,6 @@ def builtin(function: Callable) -> Callable[[Callable], Callable]:
 
 
 def in_kernels(made: Callable) -> Callable:
-    """Decorate a function that exists in kernels only."""
     return builtin(made)(made)
 
 

@@ -172,7 +172,6 @@ def _register(kind: Any) -> None:
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:
-    """Return a node array by name or field class, or None."""
     return getattr(nodes, array) if isinstance(array, str) else field(nodes.fields, array)
 
 
@@ -213,7 +212,7 @@ def is_apart(w):
 
 @reads("mass")
 def mass(pt):
-    """Return the mass for the common sums: 0 for rigid points with separate sums."""
+    """0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 
@@ -225,7 +224,6 @@ def v(pt):
 
 @reads("moment")
 def moment(pt):
-    """Return the tensor stored with the velocity, or ()."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
 
 

@@ -69,7 +69,6 @@ class FBarOfSoil(FBar):
 
 @eq.reads("mass", "state", "material", "volume ratio")
 def volumes(pt):
-    """Return the volume after and before the trial increment."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     return volume * pt.of(VolumeRatio)[0, pt.p], volume
@@ -82,7 +81,6 @@ class Volumes(eq.NodalQuantity):
 
 
 def mean_stress(pt):
-    """Return volume times mean Kirchhoff stress, and present volume."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()

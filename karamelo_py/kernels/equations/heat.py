@@ -56,7 +56,7 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # in the order
 
 
 def at_least_round_off(weight):
-    """Return `weight`, or round-off for 0: nodes with only a gradient need a temperature."""
+    """Avoid 0, as nodes with only a gradient need a temperature."""
     return max(weight, round_off(weight))
 
 

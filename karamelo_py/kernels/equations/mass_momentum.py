@@ -29,7 +29,6 @@ def rigid_mass(pt):
 
 @eq.reads()
 def position(pt):
-    """Return the position (d,) after the move if centres are needed, else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
 

@@ -36,7 +36,7 @@ class Seam(NamedTuple):
 
 
 def position_on(axis, n):
-    """Return a node's index along an axis, ghosts included."""
+    """Return a node's index along an axis, with ghosts."""
     return (int(n) - axis.first) // axis.stride % axis.count
 
 

@@ -148,7 +148,6 @@ def _is_wet(pt):
 
 
 def pore_N(node):
-    """Return the weight of water volumes, at the cell centre with a linear basis."""
     if not isinstance(node.w.basis, Linear):
         return node.N
     return real(0.5**node.kin.dimension, node.N)

@@ -97,7 +97,6 @@ def first_node(basis, template):
 
 
 def shape_size(basis: type, d: int) -> int:
-    """Return the number of components that follow the position in a location."""
     shape = basis.traits.shape
     corners = basis.element.corners if "corners" in shape else 0
     sizes = {"half_size": d, "half_edges": d * d, "deformation": d * d, "corners": corners * d}

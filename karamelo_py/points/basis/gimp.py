@@ -202,7 +202,6 @@ def _along_cpgimp_corners(basis, kin, grid, location, direction):
 
 
 def _end(at, first, top):
-    """Return the cell of a box's end, counted from `first` up to `top`, and the position in it."""
     b = at - first
     i = min(max(int(b), 0), min(top, 2))
     return i, b - i

@@ -78,7 +78,6 @@ def with_hoop(kin, weight, slopes, inv_r):
 
 
 def inverse_radius(r):
-    """Return 1 / r, or 0 where it would overflow."""
     return where(r > 1e-30, 1 / max(r, 1e-30), 0)
 
 
@@ -119,7 +118,6 @@ def item(values, k):
 
 
 def with_each_replaced(weights, others):
-    """Return products of the weights with one factor replaced by `others`, per direction."""
     pairs = enumerate(others)
     return [product([*weights[:i], other, *weights[i + 1 :]]) for i, other in pairs]
 

@@ -53,7 +53,6 @@ for _one in (Twisted.Tensor, Twisted.Symmetric):
 
 
 def twisted(in_plane, around):
-    """Return the tensor of the components in the half plane, and 31 and 32."""
     zero = real(0, around[0])
     return Twisted.Tensor._make((*in_plane, *around, zero, zero))
 

@@ -139,7 +139,6 @@ def warn_of_vibrations(transfer: type) -> None:
 
 
 def _turns_away(transfer, scene):
-    """Return True if the loss per revolution accumulates over several."""
     return scene.moves and transfer.alpha > 0.9 and not scene.moments and scene.free_turns > TURNS
 
 
@@ -170,7 +169,6 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
 
 def _lags(transfer, scene):
-    """Return True for a lag of 3 % or more over at least a radian."""
     lag = scene.lag
     return lag.fraction > LAG and 2 * pi * lag.turns > 1
 

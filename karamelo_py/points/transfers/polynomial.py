@@ -79,7 +79,6 @@ def _add_moment_polypic(transfer, node, v, moment):
 
 
 def mixed_rates(node):
-    """Return the mixed derivatives of a node's weight."""
     d, at, lines = node.kin.dimension, places_of(node.stencil, node.k), node.stencil.lines
     weights = weights_of(node.stencil, at)
     slopes = [item(line.gradients, n) for line, n in zip(lines, at, strict=True)]
