@@ -27,7 +27,7 @@ from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.code.exceptions import failure_at, note
 from karamelo_py.compiler.llvm import I32, I64
 from karamelo_py.compiler.trace.choices import INTERPRETED
-from karamelo_py.compiler.trace.functions import traced
+from karamelo_py.compiler.trace.functions import chosen
 from karamelo_py.compiler.trace.held import HeldTuple, held_as, held_type
 from karamelo_py.compiler.trace.kernels import kernel, noinline
 from karamelo_py.compiler.trace.primitives import implements, shared
@@ -190,7 +190,8 @@ class _Task(NamedTuple):
     def __call__(self, address: Value, number: Value) -> None:
         lowering = now()
         pointer = lowering.builder.inttoptr(address._value, self.kind.register_type())
-        lowering.seen(self.function)(*HeldValue(self.kind, pointer), number)
+        run = chosen(self.function, (*self.kind, types.intp))
+        run(*HeldValue(self.kind, pointer), number)
 
 
 def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
@@ -204,11 +205,11 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     """Store items; return addresses of a function of these and an index, and of the items."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
-    chosen = traced(function.seen, (*kind, types.intp))
     stored = held_as(lowering, items, kind)
     if lowering.builder is None:
+        chosen(function.seen, (*kind, types.intp)).traced()
         return Value(types.intp, None), Value(types.intp, None)
-    task = _address(lowering, chosen.name, _Task(function.seen, kind), 2)
+    task = _address(lowering, function.seen.__qualname__, _Task(function.seen, kind), 2)
     return task, Value(types.intp, lowering.builder.ptrtoint(stored._value, I64))
 
 
@@ -238,10 +239,10 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    chosen = traced(_do_part, (types.intp,) * 4)
     if lowering.builder:
         builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
-        run_range = _address(lowering, chosen.name, chosen.run, 4)
+        run = chosen(_do_part, (types.intp,) * 4)
+        run_range = _address(lowering, _do_part.__name__, run, 4)
         arguments_of_call = (count, run_range, task, arguments, threads)
         numbers = [lowering.lowered(number, types.intp) for number in arguments_of_call]
         function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)

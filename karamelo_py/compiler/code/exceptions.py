@@ -96,6 +96,16 @@ def passed_to(builder: ir.IRBuilder, called: Any) -> list:
     return [failure_at(builder)] if hasattr(called, "passes_failure") else []
 
 
+def returning(function: ir.Function, kind: ir.Type) -> None:
+    """Set the result type of a function whose code so far returns after exceptions only."""
+    function.ftype = ir.FunctionType(kind, function.ftype.args)
+    function.type, function.return_value.type = function.ftype.as_pointer(), kind
+    for block in function.blocks:
+        if isinstance(block.terminator, ir.instructions.Ret):
+            block.terminator.opname = "ret"
+            block.terminator.operands = [ir.Constant(kind, None)]
+
+
 def _return(builder: ir.IRBuilder) -> None:
     gives = builder.function.function_type.return_type
     if isinstance(gives, ir.VoidType):

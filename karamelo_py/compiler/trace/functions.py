@@ -161,11 +161,48 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
 
 
 class TracedFunction(NamedTuple):
-    run: Callable
     result: types.Type
     modules: frozenset[str]  # outside `choices.ROOMS`
     plain: bool  # the result's type determines it
-    name: str
+
+
+class Chosen(NamedTuple):
+    """The function selected for argument types; a call compiles its text."""
+
+    key: tuple
+    function: Callable
+    kinds: tuple
+
+    def __call__(self, *arguments: Any) -> Any:
+        function, lowering = self.function, values.now()
+        if values.is_begun(self.key):
+            raise CannotCompile("it calls itself", self.key[0])
+        before, lowering.operations = lowering.operations, 0
+        lowering.begun.add(self.key)
+        try:
+            note(modules_of(function))
+            run = _seen(function) if isinstance(function, values.Intrinsic) else _copied(function)
+            return run(*arguments)
+        except (CannotCompile, Undefined):
+            raise
+        except (Exception, values.Untraceable) as why:
+            raise CannotCompile(_reason(why), function) from why
+        finally:
+            lowering.begun.discard(self.key)
+            lowering.operations = before
+
+    def traced(self) -> TracedFunction:
+        """Return the result type, by compiling without code."""
+        cached = session.functions
+        with one_at_a_time:
+            if self.key not in cached:
+                lowering = Lowering(_seen)
+                with values.writing(lowering), modules_noted() as modules:
+                    made = self(*(lowering.wrapped(kind, None) for kind in self.kinds))
+                    result = types.unliteral(lowering.kind_of(made))
+                cached[self.key] = TracedFunction(result, frozenset(modules), _is_plain(made))
+            note(cached[self.key].modules)
+            return cached[self.key]
 
 
 MOST_FUNCTIONS = 4000  # cached: about 12 kB each, 800 for a scene with contact
@@ -178,50 +215,26 @@ def _is_plain(thing: Any) -> bool:
     return thing is None or isinstance(thing, values.Value | values.HeldValue)
 
 
-def _trace(key: tuple, dispatch: Callable, kinds: tuple) -> TracedFunction | None:
-    """Return a function's result type by tracing without code."""
-    chosen = dispatch
-    try:
-        lowering = Lowering(_seen)
-        lowering.key = key
-        with values.writing(lowering), modules_noted() as modules:
-            chosen = _chosen(dispatch, kinds)
-            if chosen is None:
-                return None
-            run = _seen(chosen) if isinstance(chosen, values.Intrinsic) else _copied(chosen)
-            note(modules_of(chosen))
-            made = run(*(lowering.wrapped(kind, None) for kind in kinds))
-            result = types.unliteral(lowering.kind_of(made))
-        name = dispatch.__qualname__
-        return TracedFunction(run, result, frozenset(modules), _is_plain(made), name)
-    except (CannotCompile, Undefined):
-        raise
-    except (Exception, values.Untraceable) as why:
-        raise CannotCompile(_reason(why), chosen or dispatch) from why
-
-
-def traced(dispatch: Callable, kinds: tuple) -> TracedFunction | None:
+def chosen(dispatch: Callable, kinds: tuple) -> Chosen | None:
     """Return the function for argument types, or None."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
-        cached = session.functions
+        cached = session.chosen
         if not values.at_work() and (session.outdated or len(cached) > MOST_FUNCTIONS):
             session.outdated = False
-            for one in (cached, session.seen, session.walked):
+            for one in (cached, session.functions, session.seen, session.walked):
                 one.clear()
         if key not in cached:
-            if values.is_begun(key):
-                raise CannotCompile("it calls itself", dispatch)
-            cached[key] = _trace(key, dispatch, kinds)
-        if (function := cached[key]) is not None:
-            note(function.modules)
-        return function
+            function = _chosen(dispatch, kinds)
+            cached[key] = function and Chosen(key, function, kinds)
+        return cached[key]
 
 
 def forget() -> None:
     """Drop cached selections after a new implementation."""
     if values.at_work():
         session.functions.clear()
+        session.chosen.clear()
     else:  # another Python thread may be compiling
         session.outdated = True
 
@@ -314,15 +327,24 @@ def _call(function: Callable, arguments: tuple) -> Any:
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
     if function in not_inlined:  # one serves all numbers
-        kinds = tuple(map(types.unliteral, kinds))
-    chosen = traced(function, kinds)
-    if chosen is None:
+        return call_own(lowering, function, tuple(map(types.unliteral, kinds)), arguments)
+    run = chosen(function, kinds)
+    if run is None:
         return NotImplemented
-    if function in not_inlined:
-        return lowering.call_own(chosen, kinds, arguments)
-    if lowering.builder is None and chosen.plain:
-        return lowering.wrapped(chosen.result, None)
-    return chosen.run(*arguments)
+    if lowering.builder is None and (made := run.traced()).plain:
+        return lowering.wrapped(made.result, None)
+    return run(*arguments)
+
+
+def call_own(lowering: Lowering, function: Callable, kinds: tuple, arguments: Iterable) -> Any:
+    """Call a separate function of the module."""
+    run = chosen(function, kinds)
+    if run is None:
+        return NotImplemented
+    if lowering.builder is None:
+        return lowering.wrapped(run.traced().result, None)
+    called = lowering.function(function.__qualname__, run, kinds)
+    return lowering.call_function(called, kinds, called.gives, arguments)
 
 
 Lowering.dispatch = staticmethod(_call)

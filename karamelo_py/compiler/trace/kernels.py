@@ -21,14 +21,13 @@ from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.code.arguments import Address, ArgumentBuffer, plan_for, reader
 from karamelo_py.compiler.code.exceptions import Failure, failure_at, noting
 from karamelo_py.compiler.disk import cache, lock
-from karamelo_py.compiler.trace import choices, functions
-from karamelo_py.compiler.trace.functions import not_inlined, traced, write_into
+from karamelo_py.compiler.trace import choices
+from karamelo_py.compiler.trace.functions import call_own, chosen, not_inlined, write_into
 from karamelo_py.compiler.trace.held import HeldTuple, hold, item_of
 from karamelo_py.compiler.trace.lowering import function_type, new_function
 from karamelo_py.compiler.trace.primitives import shared
 from karamelo_py.compiler.trace.session import one_at_a_time, session
 from karamelo_py.compiler.trace.values import (
-    Untraceable,
     builtin,
     called_in_one,
     in_kernels,
@@ -117,18 +116,14 @@ def written(
     another entry than Python's.
     """
     with one_at_a_time:
-        chosen = traced(function, kinds)
-        result = chosen.result if result is None else result
+        run = chosen(function, kinds)
         module = ir.Module(NAME)
         module.needs = {}
         main = new_function(module, kinds, result, NAME)
         main.attributes.add("noinline")
         main.attributes.add("nounwind")
         lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
-        try:
-            lowering.give_back(chosen.run, kinds, main.args, result)
-        except Untraceable as why:
-            raise functions.CannotCompile(str(why), function) from why
+        result = lowering.give_back(run, kinds, main.args, result)
         (entry or _write_entry)(module, main, kinds, result)
         module.raises = hasattr(main, "raises")
         return module, result
@@ -223,7 +218,7 @@ class Kernel:
         values = [lowering.call(hold, (argument,)) for argument in arguments]
         kinds = tuple(types.unliteral(lowering.kind_of(one)) for one in values)
         if in_one_module():
-            return lowering.call_own(traced(self.function, kinds), kinds, values)
+            return call_own(lowering, self.function, kinds, values)
         unit = self.unit(kinds)
         choices.note(unit.modules)
         if lowering.builder is None:

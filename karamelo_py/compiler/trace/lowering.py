@@ -1,7 +1,9 @@
 """Code for operations on values."""
 
+import copy
 import functools
 import operator
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -42,11 +44,11 @@ class Lowering:
     """Writes code with a builder, or only determines types; ``seen(thing)`` replaces globals."""
 
     dispatch: Callable  # calls functions selected by type
-    key: tuple | None = None  # of the function whose result type is sought
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
         self.seen, self.builder = seen, builder
-        self.operations = 0
+        self.operations = 0  # of the function that is being traced
+        self.begun: set[tuple] = set()  # functions that are being traced
         self.regardless = False  # continues when a called function raises
         self.read: dict[tuple, Any] = {}  # items read from held tuples in this branch
 
@@ -124,7 +126,7 @@ class Lowering:
         if value is not NotImplemented:
             return value
         self.operations += 1
-        if self.operations > MOST_OPERATIONS and self.builder is None:
+        if self.operations > MOST_OPERATIONS:
             raise traced.Untraceable(f"it has more than {MOST_OPERATIONS} operations: use a loop")
         if function in _OF_ITEMS:
             return self.of_item(*arguments)
@@ -183,8 +185,10 @@ class Lowering:
             self.read[key] = self.wrapped(parent._kind[k], value), parent  # preserves its id
         return self.read[key][0]
 
-    def function(self, name: str, run: Callable, kinds: tuple, result: types.Type) -> ir.Function:
-        """Return the module's separate function for `run`."""
+    def function(
+        self, name: str, run: Callable, kinds: tuple, result: types.Type | None = None
+    ) -> ir.Function:
+        """Return the module's separate function for `run`; `gives` is its result type."""
         module = self.builder.module
         functions = vars(module).setdefault("own", {})
         if (run, kinds) not in functions:
@@ -192,27 +196,46 @@ class Lowering:
             made.linkage = "internal"
             made.attributes.add("nounwind")
             functions[run, kinds] = made
-            Lowering(self.seen, ir.IRBuilder(made.append_basic_block("entry"))).give_back(
-                run, kinds, made.args, result
-            )
+            inner = Lowering(self.seen, ir.IRBuilder(made.append_basic_block("entry")))
+            made.gives = inner.give_back(run, kinds, made.args, result)
         return functions[run, kinds]
 
-    def give_back(self, run: Callable, kinds: tuple, values: Any, result: types.Type) -> None:
+    def give_back(
+        self, run: Callable, kinds: tuple, values: Any, result: types.Type | None
+    ) -> types.Type:
+        """Write a function; return its result type, which the code determines if it is None."""
         passed = iter(values)
         with traced.writing(self):
             value = run(
                 *(self.wrapped(k, None if llvm.is_empty(k) else next(passed)) for k in kinds)
             )
+            if result is None:
+                result = types.unliteral(self.kind_of(value))
+                if not llvm.is_empty(result):
+                    exceptions.returning(self.builder.function, llvm.register_type(result))
             if llvm.is_empty(result):
                 self.builder.ret_void()
             else:
                 self.builder.ret(self.lowered(value, result))
+            return result
 
-    def call_own(self, traced: Any, kinds: tuple, arguments: tuple) -> Any:
-        if self.builder is None:
-            return self.wrapped(traced.result, None)
-        function = self.function(traced.name, traced.run, kinds, traced.result)
-        return self.call_function(function, kinds, traced.result, arguments)
+    def removal(self) -> Callable[[], None]:
+        """Return a function that removes the code written from now on."""
+        builder = self.builder
+        function, block = builder.function, builder.block
+        ends = [(b, [*b.instructions], b.terminator) for b in (function.blocks[0], block)]
+        parts = function, function.scope, function.module, function.module.scope
+        kept = [(vars(part), _copied(vars(part))) for part in parts]
+
+        def remove() -> None:
+            for one, instructions, terminator in ends:
+                one.instructions, one.terminator = [*instructions], terminator
+            for names, before in kept:
+                names.clear()
+                names.update(_copied(before))
+            builder.position_at_end(block)
+
+        return remove
 
     def call_function(
         self, function: Any, kinds: tuple, result: types.Type, arguments: tuple
@@ -224,6 +247,13 @@ class Lowering:
         return self.wrapped(result, None if llvm.is_empty(result) else made)
 
 
+def _copied(names: dict[str, Any]) -> dict[str, Any]:
+    return {n: copy.copy(x) if type(x) in _CONTAINERS else x for n, x in names.items()}
+
+
+_CONTAINERS = list, dict, set, OrderedDict, defaultdict
+
+
 def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
     """Return a function's LLVM type; empty arguments are not passed."""
     gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
@@ -231,8 +261,11 @@ def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.Functi
     return ir.FunctionType(gives, [*arguments, *more])
 
 
-def new_function(module: ir.Module, kinds: tuple, result: types.Type, name: str) -> ir.Function:
+def new_function(
+    module: ir.Module, kinds: tuple, result: types.Type | None, name: str
+) -> ir.Function:
     """Start an LLVM function, with a `Failure` except on GPUs."""
+    result = types.none if result is None else result
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
     return exceptions.passing(ir.Function(module, function_type(kinds, result, llvm.I64), name))

@@ -649,27 +649,26 @@ class AstCompiler:
     ) -> None:
         """Compile a loop that ends at run time; `item` maps the count to the loop variable.
 
-        Types come first: initial literals become numbers of these types.
+        If the type of an initial literal has to change, the loop is compiled again.
         """
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
-        if self.flow.builder and key not in loops:
-            self.without_code(lambda: self.roll(node, bounds, item))
         grown = loops.get(key) or {}
         go_back = self.state()
-        self.depth += 1
-        try:
-            while True:
-                try:
-                    self.rolled(node, bounds, item, grown)
-                    loops[key] = grown
-                    return
-                except Grows as number:
-                    if self.flow.builder:
-                        raise
-                    grown = grown | number.grown
-                    go_back()
-        finally:
-            self.depth -= 1
+        remove = self.flow.builder and key not in loops and self.flow.lowering.removal()
+        while True:
+            self.depth += 1
+            try:
+                self.rolled(node, bounds, item, grown)
+                loops[key] = grown
+                self.depth -= 1
+                return
+            except Grows as number:
+                if self.flow.builder and not remove:
+                    raise
+                grown = grown | number.grown
+                go_back()
+                if remove:
+                    remove()
 
     def rolled(
         self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None, grown: dict

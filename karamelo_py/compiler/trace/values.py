@@ -71,7 +71,7 @@ def at_work() -> bool:
 
 
 def is_begun(key: tuple) -> bool:
-    return any(lowering.key == key for lowering in _lowerings.get())
+    return any(key in lowering.begun for lowering in _lowerings.get())
 
 
 def _real_kind(thing: Any) -> Any:
