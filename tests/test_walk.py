@@ -8,7 +8,6 @@ from listening import listening
 from numba import config
 
 from karamelo_py.compiler import CannotCompile, hold, kernel, noinline, shared
-from karamelo_py.compiler.trace import statements
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="nothing is compiled")
 
@@ -425,16 +424,6 @@ def test_loops_keep_the_types_of_what_functions_close_over(last, kinds):
     numbers = [kind(0.1) for kind in kinds]
     assert kernel(caller)(*numbers, 3) == tuple(numbers)
 
-
-def test_a_loop_of_other_types_than_were_found_is_refused(monkeypatch):
-    """With an error that says so, whatever was forgotten in what loops are kept by."""
-    monkeypatch.setattr(statements, "_shape", lambda thing: 0)
-
-    def caller(a, b, n):
-        return by_lambda(a, n), by_lambda(b, n)
-
-    with pytest.raises(CannotCompile, match="becomes one of another type"):
-        kernel(caller)(np.float32(0.1), 0.1, 3)
 
 
 def last_pair(pair, n):

@@ -206,9 +206,6 @@ def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
     """Store items; return addresses of a function of these and an index, and of the items."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     stored = held_as(lowering, items, kind)
-    if lowering.builder is None:
-        chosen(function.seen, (*kind, types.intp)).traced()
-        return Value(types.intp, None), Value(types.intp, None)
     task = _address(lowering, function.seen.__qualname__, _Task(function.seen, kind), 2)
     return task, Value(types.intp, lowering.builder.ptrtoint(stored._value, I64))
 
@@ -239,14 +236,13 @@ def _do_part(task, arguments, begin, end):
 
 @in_kernels
 def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threads: Any) -> None:
-    if lowering.builder:
-        builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
-        run = chosen(_do_part, (types.intp,) * 4)
-        run_range = _address(lowering, _do_part.__name__, run, 4)
-        arguments_of_call = (count, run_range, task, arguments, threads)
-        numbers = [lowering.lowered(number, types.intp) for number in arguments_of_call]
-        function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
-        builder.call(function, [*numbers, failure_at(builder)])
+    builder, kinds = lowering.builder, [I64] * len(_SHARE_OUT)
+    run = chosen(_do_part, (types.intp,) * 4)
+    run_range = _address(lowering, _do_part.__name__, run, 4)
+    arguments_of_call = (count, run_range, task, arguments, threads)
+    numbers = [lowering.lowered(number, types.intp) for number in arguments_of_call]
+    function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
+    builder.call(function, [*numbers, failure_at(builder)])
 
 
 # --- teams ------------------------------------------------------------------------------------

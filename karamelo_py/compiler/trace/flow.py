@@ -97,27 +97,25 @@ def _counter(kinds: tuple) -> types.Integer:
 
 
 class Flow:
-    """Writes the control flow of a call; without a builder, only types."""
+    """Writes the control flow of a call."""
 
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
 
     def _block(self) -> Any:
-        return self.builder and self.builder.append_basic_block("way")
+        return self.builder.append_basic_block("way")
 
     def edge(self, names: dict[str, Any]) -> Edge:
-        return Edge(self.builder and self.builder.block, names, self.lowering.read)
+        return Edge(self.builder.block, names, self.lowering.read)
 
     def split(self, condition: Value) -> tuple[Edge, Edge]:
         truth = emit(bool, condition)
         blocks = self._block(), self._block()
-        if self.builder:
-            self.builder.cbranch(truth._value, *blocks)
+        self.builder.cbranch(truth._value, *blocks)
         return tuple(Edge(block, {}, dict(self.lowering.read)) for block in blocks)
 
     def start(self, edge: Edge) -> None:
-        if self.builder:
-            self.builder.position_at_end(edge.block)
+        self.builder.position_at_end(edge.block)
         self.lowering.read = edge.read
 
     def meet(self, edges: list[Edge]) -> dict[str, Any]:
@@ -146,8 +144,6 @@ class Flow:
         return names
 
     def _enter(self, block: Any, phis: list[Phi], values: list) -> None:
-        if not self.builder:
-            return
         lowered = [
             self.lowering.lowered(v, phi.made._kind) for v, phi in zip(values, phis, strict=True)
         ]
@@ -191,8 +187,7 @@ class Flow:
         return made
 
     def fail(self, kind: type, arguments: tuple) -> None:
-        if self.builder:
-            exceptions.fail(self.builder, kind, arguments)
+        exceptions.fail(self.builder, kind, arguments)
 
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
@@ -264,19 +259,19 @@ class Flow:
         if fixed == 0:
             raise ValueError("the step of a range is 0")
         start, stop, step = (
-            Value(kind, builder and lowering.lowered(bound, kind)) for bound in (start, stop, step)
+            Value(kind, lowering.lowered(bound, kind)) for bound in (start, stop, step)
         )
 
         def goes_on(counter: Value) -> Value:
             if fixed is None:
                 up = emit(operator.and_, step > 0, counter < stop)
                 return emit(operator.or_, up, emit(operator.and_, step < 0, counter > stop))
-            compare = builder and (builder.icmp_signed if kind.signed else builder.icmp_unsigned)
+            compare = builder.icmp_signed if kind.signed else builder.icmp_unsigned
             sign = "<" if fixed > 0 else ">"
-            return Value(types.boolean, builder and compare(sign, counter._value, stop._value))
+            return Value(types.boolean, compare(sign, counter._value, stop._value))
 
         def after(counter: Value) -> Value:
-            return Value(kind, builder and builder.add(counter._value, step._value, flags=("nsw",)))
+            return Value(kind, builder.add(counter._value, step._value, flags=("nsw",)))
 
         return Counter(start, goes_on, after)
 

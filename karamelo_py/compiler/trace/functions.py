@@ -19,7 +19,6 @@ from karamelo_py.compiler.code.arithmetic import OPERATIONS
 from karamelo_py.compiler.trace import choices, values
 from karamelo_py.compiler.trace.choices import (
     INTERPRETED,
-    modules_noted,
     modules_of,
     note,
     tag_class,
@@ -160,13 +159,7 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
     return _seen(dispatch)(*arguments)
 
 
-class TracedFunction(NamedTuple):
-    result: types.Type
-    modules: frozenset[str]  # outside `choices.ROOMS`
-    plain: bool  # the result's type determines it
-
-
-class Chosen(NamedTuple):
+class Selected(NamedTuple):
     """The function selected for argument types; a call compiles its text."""
 
     key: tuple
@@ -191,42 +184,23 @@ class Chosen(NamedTuple):
             lowering.begun.discard(self.key)
             lowering.operations = before
 
-    def traced(self) -> TracedFunction:
-        """Return the result type, by compiling without code."""
-        cached = session.functions
-        with one_at_a_time:
-            if self.key not in cached:
-                lowering = Lowering(_seen)
-                with values.writing(lowering), modules_noted() as modules:
-                    made = self(*(lowering.wrapped(kind, None) for kind in self.kinds))
-                    result = types.unliteral(lowering.kind_of(made))
-                cached[self.key] = TracedFunction(result, frozenset(modules), _is_plain(made))
-            note(cached[self.key].modules)
-            return cached[self.key]
-
 
 MOST_FUNCTIONS = 4000  # cached: about 12 kB each, 800 for a scene with contact
 not_inlined: set[Callable] = set()
 
 
-def _is_plain(thing: Any) -> bool:
-    if isinstance(thing, tuple):
-        return all(map(_is_plain, thing))
-    return thing is None or isinstance(thing, values.Value | values.HeldValue)
-
-
-def chosen(dispatch: Callable, kinds: tuple) -> Chosen | None:
+def chosen(dispatch: Callable, kinds: tuple) -> Selected | None:
     """Return the function for argument types, or None."""
     key = dispatch, numbers_of(kinds), values.all_called_in_one()
     with one_at_a_time:
-        cached = session.chosen
+        cached = session.functions
         if not values.at_work() and (session.outdated or len(cached) > MOST_FUNCTIONS):
             session.outdated = False
-            for one in (cached, session.functions, session.seen, session.walked):
+            for one in (cached, session.seen, session.walked):
                 one.clear()
         if key not in cached:
             function = _chosen(dispatch, kinds)
-            cached[key] = function and Chosen(key, function, kinds)
+            cached[key] = function and Selected(key, function, kinds)
         return cached[key]
 
 
@@ -234,7 +208,6 @@ def forget() -> None:
     """Drop cached selections after a new implementation."""
     if values.at_work():
         session.functions.clear()
-        session.chosen.clear()
     else:  # another Python thread may be compiling
         session.outdated = True
 
@@ -329,11 +302,7 @@ def _call(function: Callable, arguments: tuple) -> Any:
     if function in not_inlined:  # one serves all numbers
         return call_own(lowering, function, tuple(map(types.unliteral, kinds)), arguments)
     run = chosen(function, kinds)
-    if run is None:
-        return NotImplemented
-    if lowering.builder is None and (made := run.traced()).plain:
-        return lowering.wrapped(made.result, None)
-    return run(*arguments)
+    return NotImplemented if run is None else run(*arguments)
 
 
 def call_own(lowering: Lowering, function: Callable, kinds: tuple, arguments: Iterable) -> Any:
@@ -341,8 +310,6 @@ def call_own(lowering: Lowering, function: Callable, kinds: tuple, arguments: It
     run = chosen(function, kinds)
     if run is None:
         return NotImplemented
-    if lowering.builder is None:
-        return lowering.wrapped(run.traced().result, None)
     called = lowering.function(function.__qualname__, run, kinds)
     return lowering.call_function(called, kinds, called.gives, arguments)
 

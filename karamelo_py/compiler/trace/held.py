@@ -88,10 +88,9 @@ def _hold(lowering: Any, thing: Any) -> Any:
 def held_as(lowering: Any, things: Iterable, kind_of_tuple: HeldTuple) -> HeldValue:
     builder = lowering.builder
     items = [_hold(lowering, thing) for thing in things]
-    room = builder and llvm.room(builder, kind_of_tuple.register_type().pointee)
-    if builder:
-        for k, (kind, item) in enumerate(zip(kind_of_tuple, items, strict=True)):
-            llvm.put(builder, kind, lowering.lowered(item, kind), llvm.at(builder, room, 0, k))
+    room = llvm.room(builder, kind_of_tuple.register_type().pointee)
+    for k, (kind, item) in enumerate(zip(kind_of_tuple, items, strict=True)):
+        llvm.put(builder, kind, lowering.lowered(item, kind), llvm.at(builder, room, 0, k))
     return HeldValue(kind_of_tuple, room)
 
 
@@ -108,7 +107,7 @@ def at_hand(value: Any) -> Any:
 
 @builtin(at_hand)
 def _at_hand(lowering: Any, value: Any) -> Any:
-    if not isinstance(value, HeldValue) or lowering.builder is None:
+    if not isinstance(value, HeldValue):
         return value
     return HeldValue(value._kind, _copy(lowering.builder, value._kind, value._value))
 

@@ -68,11 +68,7 @@ def get(lowering: Any, array: Value, index: Any) -> Any:
     kind, builder = array._kind, lowering.builder
     if is_part(kind, index):
         made = part_type(kind, index)
-        return Value(made, builder and _part(lowering, array, index, made))
-    if builder is None:
-        for one in _indices(index):
-            _index_type(lowering, one)
-        return lowering.wrapped(kind.dtype, None)
+        return Value(made, _part(lowering, array, index, made))
     at = item_address(lowering, array, index)
     if isinstance(kind.dtype, types.Record):
         return Value(kind.dtype, builder.bitcast(at, llvm.NOTHING))
@@ -86,8 +82,6 @@ def put(lowering: Any, array: Value, index: Any, value: Any) -> None:
         raise Untraceable(f"{kind_of_value} cannot be put into an array")
     if not kind.mutable:
         raise Untraceable("an array that must not be changed")
-    if builder is None:
-        return
     if not is_part(kind, index):
         number = lowering.lowered(value, kind.dtype)
         llvm.put(builder, kind.dtype, number, item_address(lowering, array, index), _align(kind))
@@ -168,8 +162,7 @@ def _of_array(lowering: Any, thing: Value, name: str) -> Any:
     kind, builder = thing._kind, lowering.builder
     parts = llvm.ArrayParts(builder, kind, thing._value)
     if name in ("shape", "strides"):
-        sizes = getattr(parts, name) if builder else [None] * kind.ndim
-        return tuple(Value(types.intp, one) for one in sizes)
+        return tuple(Value(types.intp, one) for one in getattr(parts, name))
     if name == "size":
         sizes = _of_array(lowering, thing, "shape")
         return math.prod(sizes[1:], start=sizes[0]) if sizes else 1
@@ -185,11 +178,9 @@ def _of_record(lowering: Any, thing: Value, name: str) -> Any:
     if name not in kind.fields:
         raise AttributeError(f"a record has no field '{name}'")
     field = kind.typeof(name)
-    at = builder and builder.gep(thing._value, [llvm.I64(kind.offset(name))])
+    at = builder.gep(thing._value, [llvm.I64(kind.offset(name))])
     if isinstance(field, types.NestedArray):
         made = types.Array(field.dtype, field.ndim, "C", aligned=False)
-        if builder is None:
-            return Value(made, None)
         size = llvm.memory_type(field.dtype)
         strides = [
             math.prod(field.shape[k + 1 :]) * field.dtype.bitwidth // 8 for k in range(field.ndim)
@@ -198,8 +189,6 @@ def _of_record(lowering: Any, thing: Value, name: str) -> Any:
             builder, made, builder.bitcast(at, size.as_pointer()),
             list(map(llvm.I64, field.shape)), list(map(llvm.I64, strides)),
         ))  # fmt: skip
-    if builder is None:
-        return lowering.wrapped(field, None)
     at = builder.bitcast(at, llvm.memory_type(field).as_pointer())
     return lowering.wrapped(field, llvm.get(builder, field, at, 1))
 
@@ -209,18 +198,17 @@ def set_attribute(lowering: Any, thing: Value, name: str, value: Any) -> None:
     if not isinstance(kind, types.Record) or name not in kind.fields:
         raise AttributeError(f"{kind} has no attribute '{name}' that can be set")
     field = kind.typeof(name)
-    if builder is not None:
-        at = builder.gep(thing._value, [llvm.I64(kind.offset(name))])
-        at = builder.bitcast(at, llvm.memory_type(field).as_pointer())
-        llvm.put(builder, field, lowering.lowered(value, field), at, 1)
+    at = builder.gep(thing._value, [llvm.I64(kind.offset(name))])
+    at = builder.bitcast(at, llvm.memory_type(field).as_pointer())
+    llvm.put(builder, field, lowering.lowered(value, field), at, 1)
 
 
 def _seen_as(lowering: Any, thing: Value, number: Any) -> Value:
     wanted = OPERATIONS[number.seen if isinstance(number, Emitted) else number](types.int64).result
     if wanted.bitwidth != thing._kind.bitwidth:
         raise Untraceable("numbers of other widths have other bits")
-    builder = lowering.builder
-    return Value(wanted, builder and builder.bitcast(thing._value, llvm.register_type(wanted)))
+    bits = lowering.builder.bitcast(thing._value, llvm.register_type(wanted))
+    return Value(wanted, bits)
 
 
 def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
@@ -228,8 +216,6 @@ def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
     kind, builder = lowering.unify(*kinds), lowering.builder
     if kind is None:
         raise Untraceable("items of several types at a place that only a run knows")
-    if builder is None:
-        return lowering.wrapped(kind, None)
     values = [lowering.lowered(thing, kind) for thing in things]
     index = _index(lowering, index, llvm.I64(len(values)))
     room = llvm.room(builder, ir.ArrayType(llvm.memory_type(kind), len(values)))

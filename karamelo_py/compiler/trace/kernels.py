@@ -221,8 +221,6 @@ class Kernel:
             return call_own(lowering, self.function, kinds, values)
         unit = self.unit(kinds)
         choices.note(unit.modules)
-        if lowering.builder is None:
-            return lowering.wrapped(unit.result, None)
         module = lowering.builder.module
         module.needs[unit.name] = unit
         declared = module.globals.get(unit.name)

@@ -41,11 +41,11 @@ def _is_of_values(one: type) -> bool:
 
 
 class Lowering:
-    """Writes code with a builder, or only determines types; ``seen(thing)`` replaces globals."""
+    """Writes code with a builder; ``seen(thing)`` replaces globals."""
 
     dispatch: Callable  # calls functions selected by type
 
-    def __init__(self, seen: Callable, builder: ir.IRBuilder | None = None):
+    def __init__(self, seen: Callable, builder: ir.IRBuilder):
         self.seen, self.builder = seen, builder
         self.operations = 0  # of the function that is being traced
         self.begun: set[tuple] = set()  # functions that are being traced
@@ -104,7 +104,7 @@ class Lowering:
 
     def constant(self, array: np.ndarray) -> traced.Value:
         kind = typeof(array)
-        return traced.Value(kind, self.builder and llvm.constant(self.builder, kind, array))
+        return traced.Value(kind, llvm.constant(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
         first = kinds[0]
@@ -134,8 +134,6 @@ class Lowering:
         operation = self.operation(function, kinds)
         if operation is None:
             return self.other(function, arguments, kinds)
-        if self.builder is None:
-            return self.wrapped(operation.result, None)
         values = [self.lowered(a, k) for a, k in zip(arguments, operation.arguments, strict=True)]
         return self.wrapped(operation.result, operation.code(self.builder, values))
 
@@ -170,18 +168,18 @@ class Lowering:
         kind = llvm.scalar_of(model._kind)
         if isinstance(thing._kind, llvm.Lanes):
             kind = llvm.Lanes(kind, thing._kind.width)
-        value = self.builder and llvm.cast(self.builder, thing._value, thing._kind, kind)
+        value = llvm.cast(self.builder, thing._value, thing._kind, kind)
         return traced.Value(kind, value)
 
     def cast(self, thing: Any, kind: types.Type) -> Any:
-        return self.wrapped(kind, self.builder and self.lowered(thing, kind))
+        return self.wrapped(kind, self.lowered(thing, kind))
 
     attribute, set_attribute = indexing.attribute, indexing.set_attribute
 
     def item(self, parent: traced.HeldValue, k: int) -> Any:
         key = id(parent), k
         if key not in self.read:
-            value = self.builder and item_of(self.builder, parent._kind, parent._value, k)
+            value = item_of(self.builder, parent._kind, parent._value, k)
             self.read[key] = self.wrapped(parent._kind[k], value), parent  # preserves its id
         return self.read[key][0]
 

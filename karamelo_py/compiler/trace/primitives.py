@@ -256,14 +256,13 @@ def _lanes_changed(thing: Any, change: Callable) -> Any:
 
 def _room(builder: ir.IRBuilder, lanes: Lanes) -> ir.Value:
     kind = ir.VectorType(llvm.memory_type(lanes.scalar), lanes.width)
-    return builder and llvm.room(builder, kind)
+    return llvm.room(builder, kind)
 
 
 def _in_memory(builder: ir.IRBuilder, value: Value) -> Value:
     room, bits = _room(builder, value._kind), value._value
-    if builder:
-        wanted = room.type.pointee
-        builder.store(bits if bits.type == wanted else builder.zext(bits, wanted), room)
+    wanted = room.type.pointee
+    builder.store(bits if bits.type == wanted else builder.zext(bits, wanted), room)
     return Value(value._kind, room)
 
 
@@ -293,8 +292,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
     def run(k: Any) -> Any:
         def of_lane(value: Value) -> Value:
             scalar = value._kind.scalar
-            address = builder and _lane_address(builder, value, k)
-            return Value(scalar, builder and llvm.get(builder, scalar, address))
+            return Value(scalar, llvm.get(builder, scalar, _lane_address(builder, value, k)))
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
@@ -302,13 +300,8 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
                 scalar = types.float32
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
-            if builder:
-                llvm.put(
-                    builder,
-                    scalar,
-                    lowering.lowered(thing, scalar),
-                    _lane_address(builder, made, k),
-                )
+            number = lowering.lowered(thing, scalar)
+            llvm.put(builder, scalar, number, _lane_address(builder, made, k))
             return made
 
         read, lowering.read = lowering.read, dict(lowering.read)
@@ -316,8 +309,6 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
         lowering.read = read
         return result
 
-    if builder is None:
-        return run(None)
     count = I64(width)
     if not unrolled:
         # Hides the count from LLVM, so that the loop remains, with one copy of the function.

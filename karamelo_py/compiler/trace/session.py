@@ -21,8 +21,7 @@ class Session:
         self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)
         self.seen: dict[Any, Any] = {}  # replacements of globals
         self.walked: dict[Callable, Any] = {}  # texts of functions
-        self.chosen: dict[tuple, Any] = {}  # functions by argument types
-        self.functions: dict[tuple, Any] = {}  # the same with result types
+        self.functions: dict[tuple, Any] = {}  # selected by argument types
         self.operations: dict[tuple, Any] = {}
         self.outdated = False  # functions have to be selected again
         self.changes = 0  # number of changed implementations that kernels may contain

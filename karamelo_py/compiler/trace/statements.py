@@ -582,8 +582,8 @@ class AstCompiler:
 
     def For(self, node: ast.For) -> None:
         through = self.do(node.iter)
-        if isinstance(through, range) and self.is_rolled(node, through):
-            through = Range(through.start, through.stop, through.step)
+        if isinstance(through, range) and len(through) > LONG and self.rolls(node, through):
+            return
         if is_value(through):
             self.roll(node, (through.shape[0],), lambda k: through[k])
         elif isinstance(through, Range):
@@ -591,39 +591,32 @@ class AstCompiler:
         else:
             self.unroll(node, through)
 
-    def is_rolled(self, node: ast.For, through: range) -> bool:
-        """Return True if a known range is long and may remain a loop."""
-        if len(through) <= LONG:
-            return False
+    def rolls(self, node: ast.For, through: range) -> bool:
+        """Compile a loop over a long known range as a loop; return False if that is impossible."""
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
-        if key not in loops:
-            bounds = through.start, through.stop, through.step
-            try:
-                self.without_code(lambda: self.roll(node, bounds, lambda k: k))
-            except (Exception, Untraceable):
-                loops[key] = None
-        return loops[key] is not None
-
-    def without_code(self, do: Callable[[], None]) -> None:
-        """Determine types only, and restore the state."""
-        go_back, here = self.state(), values.now()
-        typed = type(here)(here.seen)
-        typed.read = dict(here.read)
+        if loops.get(key, {}) is None:
+            return False
+        go_back = self.state()
         try:
-            with values.writing(typed):
-                do()
-        finally:
+            self.roll(node, (through.start, through.stop, through.step), lambda k: k)
+        except (Exception, Untraceable):
             go_back()
+            loops[key] = None
+            return False
+        return True
 
     def state(self) -> Callable[[], None]:
+        """Return a function that goes back to this state and removes what is written meanwhile."""
         names, depth = dict(self.names), self.depth
-        breaks, continues = self.breaks, self.continues
-        returns, read = [*self.returns], dict(self.flow.lowering.read)
+        breaks, continues, returns = self.breaks, self.continues, [*self.returns]
+        lowering = self.flow.lowering
+        read, remove = dict(lowering.read), lowering.removal()
 
         def go_back() -> None:
             self.names, self.breaks, self.continues = dict(names), breaks, continues
-            self.returns, self.flow.lowering.read = [*returns], dict(read)
+            self.returns, lowering.read = [*returns], dict(read)
             self.goes, self.depth = True, depth
+            remove()
 
         return go_back
 
@@ -652,9 +645,7 @@ class AstCompiler:
         If the type of an initial literal has to change, the loop is compiled again.
         """
         loops, key = self.walked.loops, (node, _shape((self.names, self.free)))
-        grown = loops.get(key) or {}
-        go_back = self.state()
-        remove = self.flow.builder and key not in loops and self.flow.lowering.removal()
+        grown, go_back = loops.get(key) or {}, self.state()
         while True:
             self.depth += 1
             try:
@@ -663,12 +654,8 @@ class AstCompiler:
                 self.depth -= 1
                 return
             except Grows as number:
-                if self.flow.builder and not remove:
-                    raise
                 grown = grown | number.grown
                 go_back()
-                if remove:
-                    remove()
 
     def rolled(
         self, node: ast.For | ast.While, bounds: tuple | None, item: Callable | None, grown: dict
