@@ -81,7 +81,7 @@ def profile(path):
 
 
 def test_the_slab_of_tnt(run_script):
-    """Front at 6930 m/s; in the 20 cells behind the burn zone the wave of Taylor (1950) within 1 %.
+    """Front at 6930 m/s; in the 20 cells after the burn zone the wave of Taylor (1950) within 1 %.
 
     The pressure falls from 21 GPa by 0.31 % per cell, and the front takes 8 cells.
     """
