@@ -92,7 +92,7 @@ ELSEWHERE = {
     "stability": ("karamelo_py.app.studies.stability", "Map where a method is stable."),
     "atlas": ("karamelo_py.app.studies.atlas", "Make all charts of a list of studies."),
 }
-OPTIONS = ("gpu", "ranks", "live", "threads")  # options of run
+OPTIONS = ("gpu", "ranks", "live", "threads")
 COMMANDS = ("run", "check", "styles", "help", *ELSEWHERE)
 
 

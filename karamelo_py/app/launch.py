@@ -1,6 +1,6 @@
 """karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
 
-Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets the terminal and the
+Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets terminal and
 signals. Output of mpiexec is shown only if nothing started.
 """
 
@@ -41,7 +41,7 @@ OF_THE_SYSTEM = tuple(
     if hasattr(errno, name)
 )  # fmt: skip
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# Own threads; more processes than cores, waiting ones yield, root in a container.
+# Several threads per process; waiting processes yield if cores are few; root in a container.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -128,7 +128,7 @@ class Launcher:
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
         self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
         self.reports: dict[int, Message] = {}
-        self.lost: list[Message] = []  # ended without a report, in order
+        self.lost: list[Message] = []  # without a report, in order
         self.over = False
         self.signals: list[int] = []
         self.process: subprocess.Popen | None = None
@@ -300,7 +300,7 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """Return False if mpiexec pretends that output is one."""
+    """Return False if mpiexec pretends that output is a terminal."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
@@ -379,7 +379,6 @@ def _join(asked: int | None, ends: Callable[[BaseException], None]) -> mpi.MpiCo
 
 
 def share(hub: "Hub", comm: mpi.MpiComm) -> None:
-    """Distribute a scene over all processes; rank 0 writes."""
     if comm.size > 1:
         hub.settings.comm = comm
     if not comm.leads:

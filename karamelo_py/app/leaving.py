@@ -5,7 +5,7 @@ An interrupt there may surface as any error; nothing is open yet.
 
 import os
 
-SIGNALLED = 128  # exit status for a signal: this plus its number
+SIGNALLED = 128  # plus the number of the signal
 INTERRUPTED = SIGNALLED + 2
 
 

@@ -74,7 +74,7 @@ class Quiet(Console):
 class Columns(Mapping, dict):  # type: ignore[metaclass]
     """Read-only columns by name, as arrays of numbers.
 
-    A dict, so that ``pandas.DataFrame(sim.log)`` works; the dict itself is empty.
+    A dict, so that ``pandas.DataFrame(sim.log)`` works, though an empty one.
     """
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
@@ -143,7 +143,7 @@ class PointColumns(Columns):
     """Columns of the points; ``points["vx"] = values`` sets one between two runs.
 
     Positions, velocities, temperatures, stresses (of rate-form materials) and declared fields can
-    be set, to a number or one per point (n,). Other columns are derived.
+    be set, to a number or one per point (n,).
     """
 
     def __init__(self, hub: Hub):
@@ -214,10 +214,9 @@ class Simulation:
     script
         Name or text of a script, executed up to its first run command; ``run()`` without a number
         continues from there. A str that names no file and contains a line break, a parenthesis or
-        an equals sign is text; a Path is always a name.
+        an equals sign is text; a Path is a name.
     out
-        Folder for log, dumps, plots and restart files. By default none is written; the log stays in
-        memory.
+        Folder for log, dumps, plots and restart files. By default none is written.
     threads
         Number of threads; by default all cores if the scene is large enough.
     gpu
@@ -227,8 +226,7 @@ class Simulation:
     trust_geometries
         Allow .geo files to run programs and write files.
     alone
-        Allow several processes of mpiexec, each with a separate scene; otherwise they are refused,
-        because all would repeat the same run.
+        Allow several processes of mpiexec, each with a separate scene.
     variables
         Override assignments in the script, like ``-var``.
 
@@ -241,12 +239,12 @@ class Simulation:
     -----
     Script commands are methods with the same arguments: ``sim.solid("body", "region", "box", 2,
     "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Strings are
-    names and formulas as in a script; None is NULL. ``sim.fix(ID, "python", group, function)``
-    takes a function, ``sim.solid(ID, "points", columns, ...)`` arrays by name or a DataFrame.
+    names and formulas; None is NULL. ``sim.fix(ID, "python", group, function)`` takes a function,
+    ``sim.solid(ID, "points", columns, ...)`` arrays by name or a DataFrame.
 
     Commands with a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
 
-    Simulations may run in different Python threads; a second thread's call of one gets a
+    Simulations may run in different Python threads; calling one from a second thread raises
     SimulationError.
 
     Examples
@@ -420,7 +418,7 @@ class Simulation:
         return _as_script_text(value)
 
     def run(self, steps: int | None = None) -> None:
-        """Take a number of steps; without one, execute the rest of the script and its runs."""
+        """Take a number of steps; without one, execute the rest of the script."""
         if steps is not None:
             self._do(f"run({_as_script_text(steps)})", "Simulation.run")
             return
@@ -460,7 +458,7 @@ class Simulation:
     def log(self) -> Columns:
         """Columns of the log by name, with one number per line.
 
-        If the columns have changed, only the last lines with the same columns count.
+        Only the last lines with the same columns count.
         """
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
@@ -492,7 +490,7 @@ class Simulation:
         file: str | PathLike | None = None,
         **look: Any,
     ) -> ShownPicture:
-        """Draw the points, coloured by a column (default: by solid); notebooks display the result.
+        """Draw the points, coloured by a column (default: by solid).
 
         Parameters
         ----------

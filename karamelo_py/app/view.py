@@ -149,7 +149,6 @@ def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _scene(options: argparse.Namespace) -> Hub:
-    """Build the scene of a script; without one it is empty."""
     if options.script is None and options.var:
         raise ScriptError(
             f"-var {options.var[0][0]} sets a variable of a script, and there is none here",
@@ -239,7 +238,7 @@ def _look(first: Snapshot, options: argparse.Namespace, scene: Hub) -> Look:
     names = SimpleNamespace(
         particle_names=lambda: columns, shown_names=lambda: [*columns, *named_sets(scene)]
     )
-    none = SimpleNamespace(variables={})  # columns take precedence over variables
+    none = SimpleNamespace(variables={})  # columns hide variables
     hub = SimpleNamespace(fields=names, values=scene.values, interpreter=none)
     (field,) = (word for word in help_of("dump", "pyplot").parameters if word.name == "field")
     look = {}
@@ -271,9 +270,8 @@ class Drawing:
         self.picture = self._picture(first)
 
     def chosen(self, snapshot: Snapshot) -> Snapshot:
-        """Return the points to draw, with the column of a colouring formula.
-
-        The scene gets the snapshot's time and log.
+        """Return the points to draw, with the column of a colouring formula; set the scene's
+        values.
         """
         columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
         values, row = self.scene.values, self.log.get(snapshot.step, {})

@@ -34,8 +34,8 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
     A point that leaves the domain ends the run (see boundary). Strain is uniaxial in 1D and plane
-    (unit thickness) in 2D. The grid starts at the lower corner and covers the domain. If a side is
-    not a multiple of the cell size, no node lies at its upper end: a wall there is too far out.
+    (unit thickness) in 2D. The grid starts at the lower corner; no node lies at an upper end that
+    is no multiple of the cell size from it, so a wall there is too far out.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     Parameters
     ----------
     bounds
-        ``xmin, xmax``, in 2D and 3D then ``ymin, ymax``, in 3D then ``zmin, zmax``; optionally the
-        cell size h. Without h the first solid sets it.
+        ``xmin, xmax``, then ``ymin, ymax`` and ``zmin, zmax`` in 2D and 3D; optionally the cell
+        size h. Without h the first solid sets it.
 
     Example
     -------
@@ -116,13 +116,12 @@ def boundary(
     ----------
     style
         ``error`` (the default): the run ends with an explanation. ``delete``: the point is removed,
-        with its mass and momentum. ``reflect``: the point is mirrored back inside, and its normal
-        velocity is reversed. ``periodic``: the point returns at the other end.
+        with its mass and momentum. ``reflect``: it is mirrored back inside, and its normal velocity
+        reversed. ``periodic``: it returns at the other end.
     directions
-        x, y, z: with ``periodic`` alone.
+        With ``periodic`` alone.
     shear
-        Velocity gradient dvx/dy of a cell that is periodic in x and y (Lees & Edwards 1972): the
-        cell above moves by `shear` times the height faster.
+        Velocity gradient dvx/dy of a cell that is periodic in x and y (Lees & Edwards 1972).
 
     Example
     -------
@@ -135,25 +134,23 @@ def boundary(
     ``delete`` and ``reflect`` are for splashes; for a body against a wall use fix velocity_nodes. A
     warning names the first point; the end of a run reports their number.
 
-    A point is deleted before the step in which it would leave: dumps omit it, other ids do not
-    change. The run returns to its last stored state, at most a hundred steps back, and repeats
-    these steps with their Python hooks (about six times as long if points leave in every step).
+    A point is deleted before the step in which it would leave. The run repeats the steps since its
+    last stored state, at most a hundred, with their Python hooks (about six times as long if points
+    leave in every step).
 
-    A reflected point retains its stress and tangential velocity. Neighbours may push it back to the
-    edge. A body that hits the edge as a whole loses most of its normal velocity.
+    A reflected point retains its stress and tangential velocity. A body that hits the edge as a
+    whole loses most of its normal velocity.
 
-    In a periodic direction the domain repeats endlessly: points that leave at one end enter at the
-    other, and bodies at both ends touch. Its length is a multiple of the cell size. Formulas of
-    nodes should be periodic. Points return to the domain every 10 steps; until then, dumps may show
-    them outside. It needs method ulmpm with a linear basis or splines, scheme musl, any transfer
-    except XPIC, and one process without a GPU. It refuses the other styles of boundary,
-    axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
+    In a periodic direction, bodies at both ends touch. Its length is a multiple of the cell size.
+    Points return to the domain every 10 steps; until then, dumps may show them outside. It needs
+    method ulmpm with a linear basis or splines, scheme musl, any transfer except XPIC, and one
+    process without a GPU. Refused are other styles of boundary, axisymmetry, F-bar, heat, contact
+    of points, tools, free rigid bodies, and pore_water.
 
-    In a sheared cell, start with fix initial_velocity_particles of the mean velocity `shear` y.
-    Bodies fill the cell. Positions and velocities belong to the image in the cell. Momentum is
-    conserved to round-off; the energy balance is not monitored.
+    In a sheared cell, which bodies fill, start with fix initial_velocity_particles of the mean
+    velocity `shear` y. Momentum is conserved to round-off; the energy balance is not monitored.
 
-    Methods with a separate grid for each solid (tlmpm, tlcpdi) have no edge.
+    Separate grids of solids (tlmpm, tlcpdi) have no edge.
 
     See Also
     --------
@@ -221,8 +218,7 @@ def region(
 
     Notes
     -----
-    A region includes its surface. A last word ``exterior`` inverts block, cylinder and sphere, for
-    groups and for solids.
+    A region includes its surface. A last word ``exterior`` inverts block, cylinder and sphere.
 
     See Also
     --------
@@ -266,7 +262,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         raise
     domain.mark = hub.mark
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
-    # One cell along a side is a line or column; a domain of one cell is an element that deforms.
+    # A domain of one cell is an element that deforms.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
@@ -285,9 +281,9 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
     kind
         Where the points come from.
     arguments
-        For ``region``: ``regionID, ppc, material, h[, T0]``: the region to fill, the points per
-        cell in each direction, the material, the cell size, the initial temperature (default: the
-        material's). For ``mesh``: ``file, material, h[, T0]``. For other styles see their pages.
+        For ``region``: ``regionID, ppc, material, h[, T0]``: the region, the points per cell in
+        each direction, the material, the cell size, the initial temperature (default: the
+        material's). For ``mesh``: ``file, material, h[, T0]``. See the pages of other styles.
 
     Example
     -------
@@ -364,16 +360,14 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    The command selects points by their reference positions, nodes by their positions. A group of
-    nodes also gets nodes of the separate grids of later solids, unless `solids` are named. The
-    group ``all`` always exists.
-
-    A set of faces, edges or nodes of a mesh selects members within half a cell of it.
+    Points are selected by their reference positions. A group of nodes also gets nodes of the
+    separate grids of later solids, unless `solids` are named. The group ``all`` always exists. A
+    set of faces, edges or nodes of a mesh selects members within half a cell.
 
     Parameters
     ----------
     ID
-        Name of the group. An existing group also gets the new members.
+        Name of the group; an existing group gets further members.
     kind
         ``particles`` or ``nodes``.
     by

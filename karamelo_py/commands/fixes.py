@@ -21,7 +21,7 @@ def fix(hub: Hub, ID: str, style: Annotated[str, StyleOf("fix")], *arguments: Ar
     Parameters
     ----------
     ID
-        Name of the fix. A fix with the same name is replaced.
+        Name of the fix; a fix with the same name is replaced.
     style
         What it does.
     arguments
@@ -180,7 +180,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
     Notes
     -----
-    Measured like a compute: when the log is written or a condition reads it.
+    Measured when the log is written or a condition reads it.
 
     See Also
     --------
@@ -209,10 +209,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes it is the sum of the forces from the points, by stress and by fixes on
-    points (contact, tools, tractions). At held nodes with little acceleration it is minus the
-    reaction. For points it is the rate of change of their momentum in the last step, sum m a. It is
-    0 before the first step.
+    For nodes it is the sum of the forces from the points, by stress and by fixes on points
+    (contact, tools, tractions). At held nodes with little acceleration it is minus the reaction.
+    For points it is the rate of change of their momentum in the last step, sum m a. It is 0 before
+    the first step.
 
     See Also
     --------
@@ -243,10 +243,9 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes these are fixes on nodes, such as body_force and force_nodes; for points,
-    fixes on points (contact, tools, tractions). Forces that prescribe a velocity are omitted; their
-    fixes publish reactions. It is 0 before the first step. Karamelo returns the internal force
-    instead.
+    For nodes these are fixes on nodes, such as body_force and force_nodes; for points, fixes on
+    points (contact, tools, tractions). Prescribed velocities are omitted; their fixes publish
+    reactions. It is 0 before the first step. Karamelo returns the internal force instead.
 
     See Also
     --------

@@ -137,10 +137,10 @@ def load_path(
     volumetric: float | None = None, turn: float = 0.0,
     duration: Annotated[float, Positive] | None = None,
 ) -> None:  # fmt: skip
-    """Define one segment of a load path, by its final strains or stresses.
+    """Define one segment of a load path by its final strains or stresses.
 
-    It starts from the current state and reaches its final values in equal increments. Strain
-    components that are not named stay constant.
+    The current state changes to the final values in equal increments. Strain components that are
+    not named stay constant.
 
     Parameters
     ----------
@@ -150,17 +150,16 @@ def load_path(
         Strain, summed over the increments: ln(length/initial length) for many increments. Shear
         strains are tensor components, half the shear angle.
     gxy, gxz, gyz
-        Angle of simple shear, twice the tensor strain. gxy is a displacement in x that grows with
-        y, and rotates the point by gxy/2; exy does not rotate it.
+        Angle of simple shear, twice the tensor strain: gxy, a displacement in x that grows with y,
+        rotates the point by gxy/2; exy does not.
     sxx, syy, szz, sxy, sxz, syz
-        Cauchy stress, tension positive. The program solves for the strain of this component.
+        Cauchy stress, tension positive, for which the strain is found.
     volumetric
-        exx + eyy + ezz: the remainder is split among the unspecified normal strains.
+        exx + eyy + ezz; the remainder is split among the unspecified normal strains.
     turn
-        Angle in radians by which the point rotates about z. Strains and stresses refer to fixed
-        axes.
+        Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        Duration for rate-dependent laws, by default 1. Given alone, it holds the strain.
+        For rate-dependent laws; default 1. Given alone, it holds the strain.
 
     Example
     -------
@@ -221,24 +220,24 @@ def element(
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
 
-    Writes the table element_ID.txt and the plot element_ID.png. Needs no domain and compiles
-    nothing. The point begins stress-free; cam-clay begins at its pressure p0.
+    Writes the table element_ID.txt and the plot element_ID.png; needs no domain and no compilation.
+    The point begins stress-free; cam-clay begins at its pressure p0.
 
     Parameters
     ----------
     ID
-        Name of the element, used in its file names.
+        Used in file names.
     material
         ID of a material.
     first, more
-        IDs of load paths, in order. A path may be repeated.
+        Load paths in order; they may be repeated.
     kinematics
-        Which strains are possible: ``3D``; ``plane-strain`` (none out of the plane xy);
-        ``plane-stress`` (no stress szz); ``axisymmetric`` (x the radius, y the axis, z around it);
-        ``1D`` (exx only); ``uniaxial-stress`` (stress sxx only).
+        Possible strains: ``3D``; ``plane-strain`` (none out of the plane xy); ``plane-stress`` (no
+        stress szz); ``axisymmetric`` (x the radius, y the axis, z around it); ``1D`` (exx only);
+        ``uniaxial-stress`` (stress sxx only).
     tangent
-        Whether to print the tangent of the last increment: derivatives of the Cauchy stress
-        with respect to the strains and shear angles (twice the tensor strains).
+        Print derivatives of the Cauchy stress with respect to the strains and shear angles (twice
+        the tensor strains) of the last increment.
 
     Example
     -------
@@ -256,10 +255,10 @@ def element(
     published as ID_exx, ID_sxx and so on.
 
     The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. For a rotation,
-    dt grad v is skew to first order. Laws in rate form and laws in F need different second-order
-    parts: the program takes the one that stores the least energy. Prescribed stresses are found by
-    Newton's method with the exact tangent. An increment that does not converge is halved, up to
-    eight times. If that fails, the files show the increments before it.
+    dt grad v is skew to first order; of possible second-order parts it is the one that stores the
+    least energy. Prescribed stresses are found by Newton's method with the exact tangent. An
+    increment that does not converge is halved, up to eight times; if that fails, the files show the
+    increments before it.
 
     See Also
     --------

@@ -37,10 +37,10 @@ def method(
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
         First the numbers of the transfer (the FLIP coefficient, the order of XPIC), of the basis
-        and the method; then words in any order. ``thermo-mechanical``: heat flows between points
-        (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the velocity
-        gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp. ``R4``,
-        ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
+        and the method; then words in any order. ``thermo-mechanical``: heat flows between points.
+        ``gradient-enhanced``: FLIP also maps the velocity gradient. ``det``, ``diagonal``,
+        ``stretch`` or ``corners``: the variant of cpgimp. ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or
+        ``Tet4``: the domains of the cpdi methods.
     mass
         ``corrected``: remove most of the error of the lumped masses from the accelerations, with
         APIC, AFLIP, MLS or TPIC and splines. Linear momentum is conserved.
@@ -58,15 +58,15 @@ def method(
     -----
     Before the first solid.
 
-    ``method(auto)``, without further arguments, reads the script up to its first run and chooses
-    method, transfer, basis, scheme, mass and F-bar for the scene (docs/choose.md).
+    ``method(auto)`` reads the script up to its first run and chooses method, transfer, basis,
+    scheme, mass and F-bar for the scene (docs/choose.md).
 
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
-    a temperature), also between bodies with common nodes. Only fixes add or remove other heat.
-    Points take temperature increments (FLIP, for any velocity transfer), so only conduction smooths
-    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
-    dimensions. If ``mechanical``, points are heated only by their own work.
+    a temperature), also between bodies with common nodes. Other heat comes only from fixes. Points
+    take temperature increments (as in FLIP), so only conduction smooths temperatures. `dt` also
+    respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d dimensions. If
+    ``mechanical``, points are heated only by their own work.
 
     See Also
     --------
@@ -108,9 +108,9 @@ def _refuse_after_solids(hub: Hub) -> None:
 def auto(hub: Hub, kind: Literal["auto"]) -> None:
     """Choose the method for the scene that the rest of the script describes.
 
-    The script is read up to its first run; materials, bodies, speeds, contact and duration select
-    a row of the table in docs/choose.md. Banner and ``check`` show the lines. A ``scheme``,
-    ``anti_volumetric_locking`` or ``dt_factor`` of the script remains.
+    The script is read up to its first run; materials, bodies, speeds, contact and duration select a
+    row of the table in docs/choose.md. Banner and ``check`` show the lines. ``scheme``,
+    ``anti_volumetric_locking`` and ``dt_factor`` of the script take precedence.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
@@ -142,8 +142,8 @@ def scheme(
     arguments
         Arguments of the style; explicit schemes have none.
     start
-        Fraction of the first explicit step in which forces act: ``full``, or ``half``: velocities
-        and kinetic energies then belong to the logged time.
+        ``half``: forces act for half of the first explicit step, so that velocities and kinetic
+        energies belong to the logged time.
 
     Example
     -------
@@ -152,11 +152,11 @@ def scheme(
 
     Notes
     -----
-    Explicit positions belong to the end of a step, velocities to its middle. With
-    ``full`` the initial velocity is the velocity half a step before the start: a projectile is g dt
-    t/2 too far, and logged velocities and kinetic energies are half a step early. With ``half``
-    both are second-order accurate in the step, and points also store their previous velocity.
-    Velocities set later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
+    Explicit positions belong to the end of a step, velocities to its middle. With ``full`` the
+    initial velocity is the velocity half a step before the start: a projectile is g dt t/2 too far,
+    and logged velocities and kinetic energies are half a step early. With ``half`` both are
+    second-order accurate in the step, and points also store their previous velocity. Velocities set
+    later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
 
     See Also
     --------
@@ -214,10 +214,10 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     """Average volume changes over neighbouring points (F-bar).
 
-    Low-order basis functions constrain the volume of each point: nearly incompressible and plastic
-    bodies are too stiff. Averaging the volume increment with the basis weights removes the excess
-    constraints (Coombs et al. 2018); the mean stress is averaged likewise, so that forces do the
-    work of the averaged strain.
+    Low-order basis functions constrain the volume of each point, so that nearly incompressible and
+    plastic bodies are too stiff. Averaging the volume increment with the basis weights removes the
+    excess constraints (Coombs et al. 2018); the mean stress is averaged likewise, so that forces do
+    the work of the averaged strain.
 
     Example
     -------
@@ -229,8 +229,8 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
     fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
-    sin(psi))). With the point's pressure alone, non-dilatant sand would lose half of its strength.
-    Load steps use the point's pressure alone, so do not average such sand there.
+    sin(psi))). With p alone, non-dilatant sand would lose half of its strength. Load steps use p
+    alone, so do not average such sand there.
 
     See Also
     --------
@@ -252,7 +252,6 @@ class _Call:
         domain = hub.domain
         self.dimension = domain.dimension if domain is not None else hub.announced_dimension
         self.styles = self._found()
-        # The shape of domains chooses the class of the basis.
         self.shapes = variants_of(self.styles["method"])
         self.variants = {"method": {}, "transfer": variants_of(self.styles["transfer"])}
         self.fit = [n for n, s in self.shapes.items() if self.dimension in (None, s.dimension)]

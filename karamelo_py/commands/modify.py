@@ -23,8 +23,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     ID
         Name of the material or of the part.
     numbers
-        ``name=value`` for each changed constant, with the names on the page of the style. They are
-        checked together, as in the first definition.
+        ``name=value`` for each changed constant, named as on the page of the style.
 
     Example
     -------
@@ -40,8 +39,8 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     a law of the total deformation it changes at once. The density (points have masses) and
     constants of the initial state, such as pc of cam-clay, cannot be changed.
 
-    With ``material``, the command also changes constants of the parts of eos-strength, if only one
-    part has a constant of that name.
+    ``material`` also changes constants of the parts of eos-strength, if only one part has that
+    name.
 
     See Also
     --------

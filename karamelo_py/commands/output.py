@@ -103,14 +103,14 @@ def set_output(
 ) -> None:
     """Set how often a line is logged, and in which format.
 
-    Lines go at once to the terminal and to log.mpm in the current folder. The first and last state
-    of each run are always logged; by default every step is.
+    The first and last state of each run are always logged, at once to the terminal and to log.mpm
+    in the current folder; by default every step is.
 
     Parameters
     ----------
     every
-        Steps between two lines, counted over all runs, or ``time(T)``: a line at the first step at
-        or after each multiple of the time T.
+        Steps between two lines, counted over all runs, or ``time(T)``: the first step at or after
+        each multiple of the time T.
     form
         ``csv``: the file is log.csv, with commas between the columns.
 
@@ -240,14 +240,14 @@ def plot(
 
 
 def save_plot(hub: Hub, file: Annotated[Path, OutputFile]) -> None:
-    """Draw the curves of all plot commands to a file at the end of each run.
+    """Draw the curves of all plot commands to a file at the end of each run, also if it fails.
 
-    Interrupted and failed runs draw them too. After a run, the command draws at once.
+    After a run, the command draws at once.
 
     Parameters
     ----------
     file
-        File name ending in .png, .pdf or .svg. A file of that name is overwritten.
+        File name ending in .png, .pdf or .svg; an existing file is overwritten.
 
     Example
     -------

@@ -64,8 +64,8 @@ def plane_strain(hub: Hub, *, ezz: Expression) -> None:
     -----
     Before the first material, explicit and in load steps. The column ``thickness`` is F_zz, and s33
     the stress across. Masses, forces and energies refer to the initial thickness, 1. The energy
-    balance includes the work done across. Rigid solids do not stretch. GPUs, pore_water, and points
-    that enter after a run (solid, activate, fix inflow) are refused.
+    balance includes the work done across. Rigid solids do not stretch. Refused are GPUs,
+    pore_water, and points that enter after a run (solid, activate, fix inflow).
 
     See Also
     --------

@@ -53,9 +53,9 @@ def delete_particles(
 
     Notes
     -----
-    Use ``where`` between runs. The mass and energy of the deleted points are printed. Before the
-    first run, the other points are renumbered: the command must precede particle groups and contact
-    fixes of these solids, and a solid cannot lose all its points. Between runs ids do not change.
+    Use ``where`` between runs: the mass and energy of the deleted points are printed, and ids do
+    not change. Before the first run, the other points are renumbered, so the command must precede
+    particle groups and contact fixes of these solids, and a solid cannot lose all its points.
 
     See Also
     --------
@@ -124,8 +124,8 @@ def translate_particles(
     region
         ID of the region whose points move.
     shift
-        dx, dy, dz, one per dimension of the domain: numbers or formulas of x, y and z. NULL leaves
-        a component unchanged.
+        dx, dy, dz, one per dimension: numbers or formulas of x, y and z. NULL leaves a component
+        unchanged.
 
     Example
     -------
@@ -188,15 +188,14 @@ def populate_cylindrical_coordinates(
     Parameters
     ----------
     solid
-        ID of the solid. Its material and cell size do not change.
+        Its material and cell size do not change.
     region
-        ID of the region. Points outside it are dropped.
+        Points outside it are dropped.
     lattice
-        In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: the centre, the outer radius, the number of rings,
-        the points per ring, the initial temperature. In 3D ``axis, c1, c2, R, lo, hi, Ndx, Ndr,
-        Ndtheta, T0``: the word x, y or z, the centre in the other two directions (in the order x,
-        y, z), the outer radius, the ends along the axis, the number of slices along it, then as in
-        2D.
+        In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: centre, outer radius, number of rings, points per
+        ring, initial temperature. In 3D ``axis, c1, c2, R, lo, hi, Ndx, Ndr, Ndtheta, T0``: the
+        word x, y or z, the centre in the other two directions (in the order x, y, z), outer radius,
+        ends along the axis, number of slices along it, then as in 2D.
 
     Example
     -------
@@ -206,9 +205,8 @@ def populate_cylindrical_coordinates(
     -----
     Ring j = 0, 1, ... has the radius ``r = (j + 1/2) dr`` with ``dr = R / Ndr``, and points at the
     angles ``k dtheta`` with ``dtheta = 2 pi / Ndtheta``. Slice i lies at ``lo + (i + 1/2) dx`` with
-    ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``, in
-    total ``pi R^2 (hi - lo)`` (in 2D ``pi R^2``). Karamelo differs: its rings lie at ``j dr``, with
-    a point in the centre, and its slices at ``lo + i dx``.
+    ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``.
+    Karamelo's rings lie at ``j dr``, with a point in the centre, and its slices at ``lo + i dx``.
 
     Before the first run, and before groups of these points. T0 replaces the solid's.
 

@@ -9,7 +9,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
-LEAST, MOST = 0.01, 0.9  # porosities
+LEAST, MOST = 0.01, 0.9
 HEAVIEST = 3.2  # density of grains over the density of water: 2.6 to 2.8 in soils, 3.5 if saturated
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
@@ -34,7 +34,7 @@ def pore_water(
         The skeleton: any law of a solid, with the dry density, (1 - n) times the density of grains.
         Its stress is the effective stress.
     n
-        Porosity before deformation, from 0.01 to 0.9.
+        Porosity before deformation.
     permeability
         Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water is k
         times the gradient of the head.
@@ -47,12 +47,12 @@ def pore_water(
     rho
         Density of the water.
     gravity
-        Gravity in the definition of the conductivity; it is no load (see fix body_force).
+        In the definition of the conductivity; it is no load (see fix body_force).
     kozeny
-        true: the permeability follows the porosity as n^3/(1 - n)^2 (Kozeny & Carman).
+        true: the permeability follows n^3/(1 - n)^2 (Kozeny & Carman).
     suction
         Pores empty above the water table (load steps): at a pressure p < 0, saturation and relative
-        permeability are exp(p/suction) (Gardner 1958). Without it pores stay full.
+        permeability are exp(p/suction) (Gardner 1958).
 
     Example
     -------
@@ -63,26 +63,25 @@ def pore_water(
     Notes
     -----
     Points carry the water in their pores; nodes have velocities of soil and water (Jassim, Stolle &
-    Vermeer 2013; Bandara & Soga 2015). Columns of dumps and computes: ``pore_pressure``,
-    ``saturation``, ``porosity``, ``water_content`` (mass of the water per volume before
-    deformation), and ``wx``, ``wy``, ``wz``, its velocity relative to the soil (times the porosity,
-    Darcy's). ``s11`` ... is the effective stress, ``t11`` ... the total one.
+    Vermeer 2013; Bandara & Soga 2015). Columns: ``pore_pressure``, ``saturation``, ``porosity``,
+    ``water_content`` (mass of the water per volume before deformation), and ``wx``, ``wy``, ``wz``,
+    its velocity relative to the soil (times the porosity, Darcy's). ``s11`` ... is the effective
+    stress, ``t11`` ... the total one.
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
     acts on both. Computes of mass, momentum and energy (linear_momentum, kinetic_energy, ...) count
-    the soil alone; the stored energy includes the compressed water. The energy balance includes
-    the water, its drag, and the water that leaves or enters.
+    the soil alone; the stored energy includes the compressed water. The energy balance includes the
+    water, its drag, inflow and outflow.
 
-    The step follows the fast wave, about 1850 m/s in soil with stiff water. The drag is implicit
-    and never shortens it. With N cells over a drainage path of length L, consolidation to Tv = 1
-    takes about 2 N L c/c_v steps, too many at 1e-9 m/s. Use scheme(quasi-static) then, whose load
-    steps follow the consolidation, or multiply the densities by a factor, as inputs/in.terzaghi
-    does.
+    The step follows the fast wave, about 1850 m/s in soil with stiff water, but not the drag. With
+    N cells over a drainage path of length L, consolidation to Tv = 1 takes about 2 N L c/c_v steps,
+    too many at 1e-9 m/s. Then use scheme(quasi-static), or multiply the densities by a factor, as
+    in inputs/in.terzaghi.
 
-    Use the command before the solid of the material. It needs method ulmpm or tlmpm with FLIP or
-    PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a scene in
-    1D, plane strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
+    Use it before the solid of the material. It needs method ulmpm or tlmpm with FLIP or PIC and
+    linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a scene in 1D, plane
+    strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
 
     See Also
     --------

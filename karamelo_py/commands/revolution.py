@@ -15,8 +15,8 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     active
         ``true``, or ``false`` for plane strain (the default).
     twist
-        Bodies also rotate around the axis, each point with a different angle: torsion, spinning
-        bodies, swirling fluids.
+        Bodies also rotate around the axis, by an angle per point: torsion, spinning bodies,
+        swirling fluids.
 
     Example
     -------
@@ -33,9 +33,9 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
     and fix angular_velocity_nodes holds and rotates nodes. The third component of force_nodes,
     force_particles, body_force and edge_traction acts around the axis; they publish its torque per
-    radian as ID_z. Columns of points: ``vtheta``, this
-    velocity, and ``twist``, the angle of rotation in radians. compute angular_momentum gives the
-    angular momentum about the axis as ID_y; steps conserve it to round-off.
+    radian as ID_z. Columns of points: ``vtheta``, this velocity, and ``twist``, the angle of
+    rotation in radians. compute angular_momentum publishes the angular momentum about the axis as
+    ID_y, conserved to round-off.
 
     Load steps (scheme quasi-static) find the angles of the nodes, too. In ulmpm/contacts, fix
     contact/friction also rubs around the axis: ContactTorque_ID_y is the torque about it. Refused:
@@ -64,8 +64,8 @@ def cylindrical(hub: Hub, active: bool) -> None:
     -----
     Before the first solid, in a 1D domain with x >= 0. The hoop strain is the radial displacement
     over r (component 22); there is no strain along the axis (33). Points carry the volume and mass
-    of one radian and of unit length, r dr: multiply masses, forces and energies by 2 pi for the
-    whole ring. A node at x = 0 does not move.
+    of one radian and of unit length, r dr: multiply by 2 pi for the whole ring. A node at x = 0
+    does not move.
 
     See Also
     --------
@@ -86,9 +86,9 @@ def spherical(hub: Hub, active: bool) -> None:
     -----
     Before the first solid, in a 1D domain with x >= 0. The hoop strains, components 22 and 33, are
     the radial displacement over r. Points carry the volume and mass of one steradian, r^2 dr:
-    multiply masses, forces and energies by 4 pi for the whole sphere. A node at x = 0 does not
-    move. The material must be the same in y and z. With a Poisson's ratio near 0.5, or metals that
-    flow, linear cells lock: use anti_volumetric_locking(true).
+    multiply by 4 pi for the whole sphere. A node at x = 0 does not move. The material must be the
+    same in y and z. With a Poisson's ratio near 0.5, or metals that flow, linear cells lock: use
+    anti_volumetric_locking(true).
 
     See Also
     --------

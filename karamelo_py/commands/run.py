@@ -69,13 +69,13 @@ def carry_out(hub: Hub, **length: Any) -> None:
 
 
 def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
-    """Set a constant time step, instead of one that follows the fastest point.
+    """Set a constant time step.
 
     Parameters
     ----------
     dt
-        Time step. A run warns above the stable limit: cell size over wave speed plus velocity, less
-        with scheme usl. It refuses to start above four times the limit of conduction.
+        A run warns above the stable limit: cell size over wave speed plus velocity, less with
+        scheme usl. Above four times the limit of conduction it refuses to start.
 
     Example
     -------
@@ -97,10 +97,10 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Above 0, by default 0.9; 0.4 (0.2 with one point per cell) where a drifting body would gain
-        energy: linear basis in ulmpm, FLIP coefficient above 0.99, and musl or usf. Until a point
-        has moved a quarter of a cell, it is 0.9, and more with splines. A given factor always
-        refers to the stable step of moving bodies; a run warns of unstable factors.
+        By default 0.9; 0.4 (0.2 with one point per cell) where a drifting body would gain energy:
+        linear basis in ulmpm, FLIP coefficient above 0.99, and musl or usf. Until a point has moved
+        a quarter of a cell, it is 0.9, and more with splines. A given factor always refers to the
+        stable step of moving bodies; a run warns of unstable factors.
 
     Example
     -------
@@ -130,9 +130,9 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
         Exact number of steps.
     on_trouble
         ``stop``, or ``halve``: when a point fails, energy appears that no load supplied (otherwise
-        a warning), or the step becomes unstable, the run returns to its last good state and halves
-        the step, at most five times. Log, dumps, curves and computes are rewound too. Points that
-        leave the domain without an energy gain stop the run (see `boundary`).
+        a warning), or the step becomes unstable, the run returns to its last good state, with log,
+        dumps, curves and computes, and halves the step, at most five times. Points that leave the
+        domain without an energy gain stop the run (see `boundary`).
 
     Example
     -------
@@ -141,9 +141,9 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
 
     Notes
     -----
-    The log shows positions and stresses at the end of a step, and velocities half a step earlier.
-    After n steps of free fall, the kinetic energy is too low by the fraction 1/(n + 1). For
-    velocities and kinetic energies at the logged time: ``scheme(musl, start=half)``.
+    The log shows positions and stresses at the end of a step, and velocities half a step earlier:
+    after n steps of free fall, the kinetic energy is too low by the fraction 1/(n + 1). With
+    ``scheme(musl, start=half)`` both belong to the logged time.
 
     See Also
     --------
@@ -256,30 +256,29 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     every
         Steps between two files, or ``time(T)``; 0 stops writing.
     file
-        File name, ``restart.h5`` when left out. The first ``*`` becomes the step number; without
-        ``*`` each file replaces the previous one.
+        By default ``restart.h5``. The first ``*`` becomes the step number; without ``*`` each file
+        replaces the previous one.
 
     Notes
     -----
     ``karamelo-py SCRIPT -restart FILE`` resumes after the step of the file, bit-identically to an
-    uninterrupted run with any number of threads. Log and dumps are continued; lines written after
-    that step are cut off.
+    uninterrupted run with any number of threads. Log and dumps continue; later lines are cut off.
 
     The script must be unchanged up to this run, except for set_dt, dt_factor, set_output, dump,
     plot, an added ``boundary(delete)``, and the length of the last run, as a number in its line.
     Variables set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run of
-    this length; so is a longer ``run_time(T)``, if the file was written before the last two steps
-    of the shorter run, which are shortened.
+    this length; so is a longer ``run_time(T)`` from a file before the last two steps of the shorter
+    run.
 
     A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
     plots, and values that the script has read. A run killed while writing leaves the previous file.
     The last state of each run is written too. A failed run writes last_good.<step>.h5 instead: if
     its energy has grown, the last state before the growth, accurate to ten steps; if its step was
-    above the stable limit from the start, the state before the first step. There is no such file
-    with boundary(delete), or if the run was resumed from a file at that step.
+    above the stable limit from the start, the initial state. There is none with boundary(delete),
+    or if the run was resumed from a file at that step.
 
     Dumps include the state of an interruption or failure; a resumed run removes it from files with
-    several snapshots, but not separate files.
+    several snapshots.
 
     Example
     -------
@@ -342,8 +341,8 @@ def read_restart(hub: Hub, file: str) -> None:
     Parameters
     ----------
     file
-        Name of a file written by restart or write_restart, in the current folder or next to the
-        script. A ``*`` selects the file with the largest number.
+        Name of a file of restart or write_restart, in the current folder or next to the script. A
+        ``*`` selects the largest number.
 
     Notes
     -----

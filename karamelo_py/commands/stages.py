@@ -26,9 +26,9 @@ def deactivate(hub: Hub, group: ParticleGroup) -> None:
 
     Notes
     -----
-    Before the first run or between runs. Output, groups and fixes then omit the points;
-    ids do not change. Between runs, their mass and energy are printed, and the energy balance
-    counts the energy as work.
+    Before the first run or between runs. Output, groups and fixes then omit the points; ids do not
+    change. Between runs, their mass and energy are printed, and the energy balance counts the
+    energy as work.
 
     See Also
     --------
@@ -66,9 +66,9 @@ def activate(hub: Hub, group: ParticleGroup) -> None:
 
     Notes
     -----
-    The points enter at their initial positions, at rest, without stress, with their
-    initial mass, temperature and state. To give them a stress, define a fix initial_stress or
-    geostatic_stress of the group afterwards. A warning reports other points at these positions.
+    The points enter at their initial positions, at rest, without stress, with their initial mass,
+    temperature and state. To give them a stress, define a fix initial_stress or geostatic_stress of
+    the group afterwards. A warning reports other points at these positions.
 
     See Also
     --------

@@ -29,12 +29,12 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
 
     Notes
     -----
-    Before the first material. Each law finds the strain across the plate for which szz
-    vanishes. The column ``thickness`` is the present thickness over the initial one. Masses, forces
-    and energies refer to the whole thickness. Liquids, gases and loose grains are refused, because
-    they have no strength unless confined; so is anti_volumetric_locking, because plane stress does
-    not lock. With a thickness other than 1, fixes that use sizes of points are refused: contact
-    between points and with surfaces, and fluxes through faces of points.
+    Before the first material. Each law finds the strain across the plate for which szz vanishes.
+    The column ``thickness`` is the present thickness over the initial one. Masses, forces and
+    energies refer to the whole thickness. Refused are liquids, gases and loose grains, which have
+    no strength unless confined, and anti_volumetric_locking, which plane stress does not need; with
+    a thickness other than 1 also fixes that use sizes of points (contact between points and with
+    surfaces, fluxes through faces of points).
 
     See Also
     --------
@@ -60,10 +60,10 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 
     Notes
     -----
-    Before the first material. Each law finds the strain across the bar, equal in y and
-    z, for which the stress across vanishes. The column ``thickness`` is this stretch. Masses,
-    forces and energies refer to the whole cross-section. The command refuses the same materials and
-    fixes as plane_stress, and orthotropic materials that differ in y and z.
+    Before the first material. Each law finds the strain across the bar, equal in y and z, for which
+    the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces and
+    energies refer to the whole cross-section. Refused are the materials and fixes that plane_stress
+    refuses, and orthotropic materials that differ in y and z.
 
     See Also
     --------

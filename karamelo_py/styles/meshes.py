@@ -89,9 +89,9 @@ class MeshRegion(Enclosed):
     Parameters
     ----------
     file
-        Name of a mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), LS-DYNA (.k), Nastran (.bdf),
-        Exodus (.e), MED, CGNS, MFEM, VTK and any other format that meshio reads; or of a geometry
-        (.geo, .step, .brep), which Gmsh meshes.
+        A mesh file: Gmsh (.msh), Abaqus or CalculiX (.inp), LS-DYNA (.k), Nastran (.bdf), Exodus
+        (.e), MED, CGNS, MFEM, VTK and any other format that meshio reads; or a geometry (.geo,
+        .step, .brep), which Gmsh meshes.
     group
         Name or number of a physical group; in other formats, of a set, an instance, a block, a
         property or a surface; in VTK, ``name:number`` of cell data. Default: the whole mesh. A
@@ -231,11 +231,10 @@ class MeshSolid(Solid):
     Parameters
     ----------
     file
-        Name of a mesh file or of a geometry, as in region mesh, in the current folder or next to
-        the script.
+        Mesh or geometry, as in region mesh, in the current folder or next to the script.
     group
-        Name or number of a physical group (a set of elements, a part or an instance in other
-        formats). Default: the whole mesh.
+        Name or number of a physical group (in other formats a set of elements, a part or an
+        instance). Default: the whole mesh.
 
     Example
     -------

@@ -19,7 +19,7 @@ class Primitive(region.Region):
     """Base of shapes with an exact depth: planes across some axes, round across the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
-    across: Sequence[int] = ()  # axes across which it is round, with a centre and a radius
+    across: Sequence[int] = ()  # axes across which it is round
     centre: Sequence[float] = ()
     radius: float
 
@@ -74,10 +74,10 @@ class BlockRegion(Primitive):
     Parameters
     ----------
     bounds
-        In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D
-        ``xlo, xhi, ylo, yhi, zlo, zhi``. Each is a number, or ``INF`` (or ``EDGE``) for the
-        edge of the domain. Equal numbers make a plane, a line or a point, for groups of nodes. A
-        last word ``exterior`` selects everything outside the block.
+        In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D ``xlo, xhi, ylo, yhi, zlo, zhi``.
+        Each is a number, or ``INF`` (or ``EDGE``) for the edge of the domain. Equal numbers make a
+        plane, a line or a point, for groups of nodes. A last word ``exterior`` selects everything
+        outside.
 
     Example
     -------
@@ -199,9 +199,8 @@ class Plane(Primitive):
     Parameters
     ----------
     plane
-        A position on the plane and a normal of any length, which points into the region: in 2D
-        ``x, y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` selects the other
-        side.
+        A position on the plane and a normal of any length, which points into the region: in 2D ``x,
+        y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` selects the other side.
 
     Example
     -------

@@ -20,8 +20,8 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MISSED = 0.01  # fraction of a shape's volume
-COARSE = 0.08  # fraction of a box's or ball's volume
+MISSED = 0.01  # of a shape's volume
+COARSE = 0.08  # of a box's or ball's volume
 MANY = 10  # per cell and direction
 
 
@@ -58,9 +58,9 @@ class RegionSolid(Solid):
     A cut point has the volume and centroid of the remaining part of its box; a part of less than 10
     % is merged with the nearest point. Round bodies have their volume to 0.01 %, and no
     stair-stepped surface for contacting bodies to lock on. Fins and slots as thin as 10 % of h/ppc
-    have their mass to 3 %; a message warns if thinner parts may be missing. The region of a plug-in
-    without `distance` is sampled along the axes and may miss thin parts. With ugimp and cpgimp, cut
-    points have square domains, which do not tile the edge; cpdi refuses them.
+    have their mass to 3 %; a message warns of thinner ones, except in regions of plug-ins without
+    `distance`. With ugimp and cpgimp, cut points have square domains, which do not tile the edge;
+    cpdi refuses them.
 
     See Also
     --------
@@ -169,9 +169,9 @@ class PointsSolid(Solid):
         A file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z`` (one per
         dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains the area in
         the xy plane) or ``mass``. Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
-        stresses (``s11`` ..., of materials in rate form). Or a dump of points (dump particle, vtk
-        or hdf5, or of LAMMPS), points in VTK (.vtu), or an .xyz file, whose last snapshot gives
-        these columns. In Python, a dictionary of arrays or a DataFrame.
+        stresses (``s11`` ..., of materials in rate form). Or the last snapshot of a dump of points
+        (dump particle, vtk or hdf5, or of LAMMPS), a .vtu or an .xyz file. In Python, a dictionary
+        of arrays or a DataFrame.
     volume
         Volume of each point, if the file has none.
     GlueToSolid

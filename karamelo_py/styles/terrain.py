@@ -10,7 +10,7 @@ from karamelo_py.scene.terrain import HeightsFile, faces_of, outline_of, read_pr
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import Enclosed
 
-AROUND = 4  # cells of ground beyond the domain
+AROUND = 4  # of ground beyond the domain
 
 
 class Heights(Enclosed):
@@ -34,8 +34,8 @@ class Heights(Enclosed):
 
     Notes
     -----
-    Heights are given at the centres of cells; between four centres the surface has two triangles.
-    Beyond the outer centres it is level. The raster must cover the domain. A landslide is the
+    Heights are those of the centres of cells; between four centres the surface has two triangles,
+    and it is level beyond the outer ones. The raster must cover the domain. A landslide is the
     difference of two such regions, the initial surface and the slip surface. fix contact/surface
     makes the ground a wall with friction.
 

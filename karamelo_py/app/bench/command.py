@@ -1,6 +1,6 @@
 """karamelo-py bench: speed of this machine on known scenes.
 
-Compare speeds within one bench only: machines are shared and clocks change.
+Compare speeds within one bench only, since machines are shared and clocks change.
 """
 
 import json

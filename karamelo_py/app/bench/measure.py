@@ -38,7 +38,7 @@ APART = 1.5  # trusted ratio of separate sweeps to a compiled step
 class Workload(NamedTuple):
     title: str
     script: str
-    lead: int = 3  # before the measurement
+    lead: int = 3  # steps before the measurement
     karamelo: float | None = None  # published: million/s of one core of a small AMD EPYC
 
 
@@ -76,8 +76,8 @@ class Measured(NamedTuple):
     speeds: list[float]
     bytes_per_particle: int
     bytes_per_particle_step: float  # without caches
-    roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # fraction of the bandwidth of arrays as large as the scene
+    roofline: float  # of the memory bandwidth at the best speed
+    roofline_in_place: float  # of the bandwidth of arrays as large as the scene
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
     waits: float  # seconds per step to start and join threads
@@ -115,8 +115,8 @@ class Measured(NamedTuple):
     def limit(self) -> str:
         """The component with at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
-        Memory is relative to arrays as large as the scene. Else ``arithmetic`` (instructions or
-        latency), or ``unknown`` if not `told_apart`.
+        Otherwise ``arithmetic`` (instructions or latency), or ``unknown`` if not `told_apart`.
+        Memory is relative to arrays as large as the scene.
         """
         if not self.told_apart:
             return "unknown"
@@ -333,8 +333,8 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
     """Bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
-    Point fields count per sweep that reads and that writes them, node fields in node loops, tile
-    buffers when written and summed.
+    Point fields count per sweep that reads or writes them, node fields in node loops, tile buffers
+    when written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])

@@ -25,7 +25,7 @@ class OnCard(NamedTuple):
     points: int
     speeds: list[float]
     bytes_per_particle_step: float  # without caches
-    roofline: float  # fraction of the memory bandwidth at the best speed
+    roofline: float  # of the memory bandwidth at the best speed
     bytes_on_card: int
     stages: dict[str, float]
     made: float  # seconds to compile a step

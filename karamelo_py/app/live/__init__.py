@@ -1,5 +1,5 @@
 """Live pages in a browser: for a study, a run, or dumps written by another run.
 
-Served to this machine only, at an address with a secret word, from files or copies at an output:
-runs are unchanged. docs/live-measurements.md compares with trame and Rerun.
+Served to this machine only, at an address with a secret word. docs/live-measurements.md compares
+with trame and Rerun.
 """

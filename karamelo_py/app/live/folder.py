@@ -25,7 +25,7 @@ WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 class FolderPage:
     """The page of a folder and its updates.
 
-    ScriptError if the folder is missing, or has neither log nor particle dump.
+    Raises ScriptError if the folder is missing, or has neither log nor particle dump.
     """
 
     def __init__(self, folder: Path):

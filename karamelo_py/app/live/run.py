@@ -33,7 +33,7 @@ class Row(NamedTuple):
     time: float
     dt: float
     limit: str
-    gain: float | None  # energy gain in %, if monitored
+    gain: float | None  # energy gain in %
     log: dict[str, float]
 
 
@@ -89,7 +89,7 @@ class RunPage(Rhythmic, Listener):
         if isinstance(error, FAILURES):
             ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._ended = ended  # last: until then a page shows a running run
+        self._ended = ended  # last, as a page shows a running run until then
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened

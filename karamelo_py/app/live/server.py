@@ -45,8 +45,8 @@ class Server:
     """Serves a page to browsers on this machine, at the URL `address`.
 
     ``news(seen)`` returns the new `seen` and the news since the old one (0 at first), in server
-    threads, after each `changed`. `answers` (bytes, JSON or None) and `actions` (POST) are
-    functions of the query, by name.
+    threads. `answers` (bytes, JSON or None) and `actions` (POST) are functions of the query, by
+    name.
     """
 
     def __init__(
@@ -57,12 +57,12 @@ class Server:
         self.page, self.news = page, news
         self.answers = {"plotly.js": _plotly, "points.js": _points, **answers}
         self.actions = {"here": lambda _: None, **actions}
-        self.heard = 0.0  # time of the last request
+        self.heard = 0.0  # of the last request
         self.version = 0
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}
-        self.opened = False  # a page has been open
-        self.framed = False  # the page is shown in a notebook
+        self.opened = False
+        self.framed = False  # in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
@@ -85,7 +85,7 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Wait until pages are closed or give no sign: a page that takes nothing has buffers."""
+        """Wait until pages are closed or give no sign, as writing to a dead page may succeed."""
         self.heard = time.monotonic()
         with self._changed:
             while not self.opened or (self._shown and time.monotonic() < self.heard + AWAY):

@@ -22,7 +22,7 @@ LINES = 12
 class StudyPage:
     """The page of a study; `stopped` is set when a viewer ends it.
 
-    `recorded` are recorded values, `axes` initial axes of the chart; row folders are relative to
+    `recorded` are recorded values, `axes` initial axes of the chart; folders are relative to
     `base`.
     """
 
@@ -79,7 +79,6 @@ class StudyPage:
         self.server.changed()
 
     def _news(self, seen: Any) -> tuple[Any, dict]:
-        """Return the news since `seen`; cases that neither run nor have a row are waiting."""
         first_row, first_case = seen or (0, 0)
         rows, cases = self._rows[first_row:], [*self._cases.items()][first_case:]
         news = {

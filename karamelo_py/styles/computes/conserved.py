@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
 
 
 class Drift:
-    """|value - first value|, relative to the largest scale so far."""
+    """value - first value|, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -129,8 +129,8 @@ class EnergyBalance(Compute):
     Parameters
     ----------
     work
-        Work of known loads on the group since the start: a formula of time and published values.
-        Default 0.
+        Work of known loads on the group since the start, as a function of time and published
+        values.
 
     Example
     -------

@@ -19,7 +19,7 @@ from karamelo_py.script.expressions import Expression
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
-VANISHED = 1e-9  # fraction of the largest exact norm so far, below which values are round-off
+VANISHED = 1e-9  # of the largest exact norm so far; smaller values are round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
@@ -50,8 +50,7 @@ class PointField:
 class Norm:
     """Norm L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    Histories weight differences by the time since the last output, so the number of outputs has no
-    effect.
+    Histories weight differences by the time since the last output.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -85,7 +84,6 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """Return `scaled`, and add a new output to `history` and `largest`."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -141,13 +139,13 @@ class Error(Compared, Compute):
     Parameters
     ----------
     field
-        A column of a dump (x, vy, s11, T, ...), ux, uy, uz (displacement by component), or a whole
-        field: ``displacement``, ``velocity``, ``stress``, ``strain``.
+        A column of a dump (x, vy, s11, T, ...), a displacement ux, uy or uz, or a whole field:
+        ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
-        The exact value: a formula of x, y, z (present position), x0, y0, z0 (initial position),
-        time, and published values. For a whole field: one per known component, in the order x, y, z
-        or 11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2``
-        (default) or ``max``, and ``absolute`` (default) or ``relative``.
+        The exact value, a function of x, y, z (present position), x0, y0, z0 (initial position), time,
+        and published values. For a whole field: one per component, in the order x, y, z or 11, 22, 33,
+        12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2`` (default) or
+        ``max``, and ``absolute`` (default) or ``relative``.
 
     Example
     -------
@@ -157,14 +155,13 @@ class Error(Compared, Compute):
 
     Notes
     -----
-    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and
-    its initial volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e.
-    ``relative`` divides by the same norm of the exact values. While they vanish it divides by the
-    largest norm so far, and gives inf if there is none.
+    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and its initial
+    volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e. ``relative``
+    divides by the same norm of the exact values, or by the largest so far while they vanish.
 
     Publishes ID, the present error; ID_max, the largest so far; and ID_history, the norm over
-    points and all outputs so far, weighted by the time since the previous one. With ``relative``
-    both norms cover the whole history: exact values may vanish at times.
+    points and outputs so far, weighted by the time since the previous one. With ``relative`` both
+    norms cover the whole history.
 
     See Also
     --------
@@ -228,12 +225,12 @@ class Reference(Compared, Compute):
     Parameters
     ----------
     subject
-        A value (``v_x``, a variable, a formula of values), compared over time, or a group of
-        points, compared over a coordinate.
+        A value (``v_x``, a variable, a formula), compared over time, or a group of points, compared
+        over a coordinate.
     file
-        Columns of numbers, separated by commas, semicolons or blanks, with names in the first row
-        (else 1, 2, ...); # begins a comment line. The first column is the time, or for points the
-        coordinate of that name: x, y, z, x0, y0, z0 or any other column of points.
+        Columns separated by commas, semicolons or blanks, with names in the first row (else 1, 2,
+        ...); # begins a comment line. The first column is the time, or for points a coordinate or
+        another column by its name.
     column
         The column to compare with; for points also their column, such as s11 or vx.
     norm
@@ -251,10 +248,10 @@ class Reference(Compared, Compute):
     -----
     The curve is linear between its rows. Values beyond its ends are not compared.
 
-    For a value, ID is the norm of its difference over the outputs so far, weighted by the time
+    For a value, ID is the norm of the difference over the outputs so far, weighted by the time
     since the previous one, ID_now the present difference, ID_curve the present value of the curve.
     For points, ID and ID_now are the present norm, weighted by initial volumes, ID_curve the mean
-    of the curve at the points.
+    of the curve.
 
     See Also
     --------
@@ -314,8 +311,7 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Return magnitudes (2, n) of differences and of the curve, weights, the curve, and
-        ones."""
+        """Return magnitudes (2, n) of differences and curve, weights, the curve, and ones."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])

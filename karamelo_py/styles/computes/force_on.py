@@ -17,8 +17,6 @@ AXES = "x", "y", "z"
 
 
 class Acting(NamedTuple):
-    """Script argument: a solid, or a fix that exerts a force."""
-
     ID: str
     mark: Mark | None
     solid: Solid | None  # None: a fix
@@ -60,8 +58,8 @@ class ForceOn(Compute):
     Parameters
     ----------
     part, more
-        A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A
-        fix: its force on the points or nodes of its group. Several: their sum.
+        A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A fix:
+        its force on its group. Several: their sum.
     x, y, z
         Position that the torque is about; default: the origin.
 
@@ -75,24 +73,22 @@ class ForceOn(Compute):
     Notes
     -----
     Publishes the force ID_x, ID_y, ID_z, the torque ID_tx, ID_ty, ID_tz, and the point of action
-    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, a tool or a surface takes the
-    opposite force.
+    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, tool or surface takes the opposite
+    force.
 
-    The force acts along a line; ID_px, ... is its point nearest to x, y, z. In 3D this line is the
-    central axis, along which a torque may remain. If the torque is about the origin, the line meets
-    y = 0 at x = ID_tz/ID_y.
+    The point of action is the nearest to x, y, z on the line of action, in 3D on the central axis,
+    along which a torque may remain. With the torque about the origin, the line meets y = 0 at x =
+    ID_tz/ID_y.
 
-    Walls (fix velocity_nodes), loads and the weight of a solid count only if their fixes are named.
-    Forces of points act at their positions, forces of nodes at the nodes, both at the beginning of
-    the step: in load steps torques err by the displacement in a step. In tlmpm nodes stay at their
-    initial positions.
+    Walls (fix velocity_nodes), loads and weight count only if their fixes are named. Forces act at
+    present positions of points and nodes at the beginning of the step (in load steps torques err by
+    the displacement in a step), in tlmpm at initial positions of nodes.
 
     Fixes: velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
-    other tools. They must precede this compute.
-    Friction of contact/minimize_penetration acts between the centres of points, so the torques on
-    the two solids are not quite opposite. The torque of velocity_particles lacks the angular
-    momentum that affine transfers store within points.
+    other tools. They must precede this compute. Friction of contact/minimize_penetration acts
+    between the centres of points, so the torques on the two solids are not quite opposite. The
+    torque of velocity_particles lacks the angular momentum within points (affine transfers).
 
     See Also
     --------

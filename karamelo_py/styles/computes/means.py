@@ -197,7 +197,7 @@ class MinPosition(MaxPosition):
     extreme = staticmethod(np.min)
 
 
-BITS = 8  # bits of a coordinate examined at a time
+BITS = 8  # of a coordinate examined at a time
 SIGN = np.uint64(1 << 63)
 
 
@@ -262,7 +262,7 @@ class PositionQuantile(Compute):
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
     """Map floating-point numbers to integers in the same order."""
-    bits = (numbers + 0.0).view(np.uint64)  # + 0.0 makes -0 a 0
+    bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
 

@@ -77,9 +77,9 @@ class TableRows(NamedTuple):
 class TableDump(Dump):
     """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, an earlier base of the style, defines the `names` of columns, the
-    `absent` ones (always 0), the `extent` (number of rows, largest id), and `tables` of rows by id
-    that fit into memory.
+    `OfPoints` or `OfNodes`, an earlier base, defines the `names` of columns, the `absent` ones
+    (always 0), the `extent` (number of rows, largest id), and `tables` of rows by id that fit into
+    memory.
 
     Attributes
     ----------

@@ -209,7 +209,7 @@ class Hdf5Dump(TableDump):
 def _opened_to_append(path: Path) -> Any:
     """Open a file so that its content stays readable if the program dies.
 
-    h5py's swmr=True also opens a file left by a killed program, if it was opened that way from the
+    h5py's swmr=True also opens a file left by a killed program if it was opened that way from the
     start (`h5py.File.swmr_mode` sets it a moment later).
     """
     import h5py

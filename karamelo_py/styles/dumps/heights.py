@@ -21,8 +21,7 @@ class HeightsDump(Dump):
     file
         File name with a ``*``, which becomes the step number: a raster has one snapshot.
     cell
-        Side of a cell of the raster: at least twice the point spacing, or cells inside the deposit
-        remain empty.
+        Side of a cell: at least twice the point spacing, or cells inside the deposit remain empty.
     of
         ``depth``: volume of the points in a cell over its area. ``top``: height of the highest
         upper face of these points, -9999 (NODATA) in empty cells.
@@ -34,8 +33,8 @@ class HeightsDump(Dump):
 
     Notes
     -----
-    The raster covers the domain, in 2D with one row. The sum of the depths times the area of a cell
-    is the volume of the points. QGIS, ArcGIS, GDAL and region heights read the files.
+    The raster covers the domain, in 2D with one row. The volume of the points is conserved. QGIS,
+    ArcGIS, GDAL and region heights read the files.
 
     See Also
     --------

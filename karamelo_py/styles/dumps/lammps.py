@@ -60,8 +60,8 @@ class LammpsDump(TableDump):
                     file.write(encoder.compress(text))
                 file.write(encoder.flush())
             return
-        # The file is complete after every snapshot: the next one overwrites its last bytes. (OVITO
-        # reads only the first of separately compressed snapshots.)
+        # The next snapshot overwrites the last bytes of the file, which is complete after each.
+        # (OVITO reads only the first of separately compressed snapshots.)
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
         tail = before.copy().flush() if start else b""
@@ -207,8 +207,8 @@ class GridDump(OfNodes, LammpsDump):
     number of its grid (``type``, from 1). Positions are always written.
 
     Grids have consecutive ids: one in ulmpm and ulcpdi; in tlmpm and tlcpdi one for each solid,
-    over its reference shape; in ulmpm/contacts one grid of the domain for each velocity field, so
-    several rows have the same position.
+    over its reference shape; in ulmpm/contacts one for each velocity field, so several rows have
+    the same position.
 
     Example
     -------

@@ -31,30 +31,28 @@ PNG_COMPRESSION = 1
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # number of points for the typical size
+SAMPLE = 1 << 16  # points for the typical size
 
 
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 1D the field is drawn over x. By default the colour limits grow with the values, so the
-    pictures of a run can be compared.
+    In 1D the field is drawn over x. By default the colour limits grow with the values.
 
     Parameters
     ----------
     every
-        Steps between two pictures, or ``time(T)``. The first and the last state of a run are always
-        drawn.
+        Steps between two pictures, or ``time(T)``. The first and the last state of a run are drawn.
     file
-        File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
-        ``*`` each picture replaces the previous one.
+        Ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without ``*`` each
+        picture replaces the previous one.
     width, height
         Up to 50 in inches (of 100 pixels), above in pixels; from 20 to 20000 pixels.
     field
         Column of dump particle that sets the colour, or a formula of columns, groups and solids (1
         for their points, else 0), time and published values. Default: the solid (in 1D: vx).
     vmin, vmax
-        Limits of the colours. If values exceed them, the colour bar ends in an arrow.
+        Limits of the colours; the colour bar ends in an arrow if values exceed them.
     cmap
         A Matplotlib colour map; default viridis, or coolwarm for components with either sign.
     azimuth, elevation
@@ -62,8 +60,8 @@ class PyPlot(Dump):
     axes
         false: without axes and numbers.
     title
-        Text above, before step and time. A name or formula in braces becomes its present number, as
-        in "force {press_y} N"; two braces make one. Mathematics is in dollars, as in "$v_{max}$".
+        Text above, before step and time. A name or formula in braces becomes a number, as in "force
+        {press_y} N"; two braces make one. Mathematics is in dollars, as in "$v_{max}$".
     label
         Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
@@ -73,19 +71,17 @@ class PyPlot(Dump):
     scale
         log: colours follow the logarithm of the column.
     quantile
-        Fraction of the values beyond either colour limit, such as 0.01, so that a few extremes do
-        not use up all colours.
+        Fraction of the values beyond either colour limit, such as 0.01.
     dpi
         Pixels per inch, by default 100: with 300, a picture of 600 pixels has 1800.
     fontsize
         Font size in points.
     pointsize
-        Size of the drawn points, relative to the material points; 1.4 fills all gaps.
+        Size of the drawn points over the material points; 1.4 fills all gaps.
     mirror
         true: in an axisymmetric scene, draw the points on both sides of the axis.
     outlines
-        true: a line around each solid, and around the regions, walls and rigid tools of fixes. In
-        3D tools are drawn by edges and sections; hidden lines are light.
+        true: lines around each solid, and around the regions, walls and rigid tools of fixes.
 
     Example
     -------
@@ -340,12 +336,11 @@ class Movie(PyPlot):
     Parameters
     ----------
     every
-        Steps between two frames, or ``time(T)``. The first and the last state of a run are always
-        drawn.
+        Steps between two frames, or ``time(T)``. The first and the last state of a run are drawn.
     file
         File name ending in .gif or, if the program ffmpeg is installed, .mp4.
     vmin, vmax
-        Limits of the colours. Without them the colours change when values exceed them.
+        Limits of the colours; by default the colours change when values exceed the present limits.
 
     Example
     -------

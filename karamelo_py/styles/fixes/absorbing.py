@@ -55,9 +55,9 @@ class Absorbing(Fix):
     Parameters
     ----------
     material
-        The material at the edge, whose wave speeds set the dashpots.
+        Its wave speeds set the dashpots.
     side
-        Outward direction of the edge: xlo, xhi, ylo, yhi, zlo or zhi.
+        Outward direction of the edge.
 
     Example
     -------
@@ -66,14 +66,12 @@ class Absorbing(Fix):
     Notes
     -----
     The traction is -rho c v, with the P wave speed for the normal velocity and the S wave speed
-    along the surface. A pulse 20 cells long at normal incidence reflects 0.2 % of its energy.
-    Plane waves at up to 45 degrees reflect up to 1.4 % (P) and 4.7 % (S, at 30 degrees), 0.2 %
-    with a layer of fix mass_damping before the edge. In saturated ground, soil and water move as
-    one at the edge.
+    along the surface. A pulse 20 cells long at normal incidence reflects 0.2 % of its energy. Plane
+    waves at up to 45 degrees reflect up to 1.4 % (P) and 4.7 % (S, at 30 degrees), 0.2 % with a
+    layer of fix mass_damping. In saturated ground, soil and water move as one at the edge.
 
-    The fix balances the force that it measures on each node in its first step. Ground with an
-    initial stress (fix initial_stress) therefore stays at rest; a later load, such as weight,
-    slowly pushes the edge outwards.
+    The fix balances the force on each node in its first step: ground with an initial stress (fix
+    initial_stress) stays at rest. A later load, such as weight, slowly pushes the edge outwards.
 
     Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
     move less than half a cell.

@@ -28,8 +28,7 @@ class EdgeHeat(OnEdge, HeatFix):
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Return the heat per time (n,) into the points from values of formulas at the faces
-        (m,)."""
+        """Return the heat per time (n,) into the points from `values` at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -53,8 +52,8 @@ class EdgeHeatFlux(EdgeHeat):
     Parameters
     ----------
     q
-        Heat per area and time, negative if it leaves the body: a number or a formula of x, y, z
-        (initial position of the edge), time and published values.
+        Heat per area and time, negative if it leaves the body, a function of x, y, z (initial
+        position of the edge), time and published values.
 
     Example
     -------
@@ -64,8 +63,7 @@ class EdgeHeatFlux(EdgeHeat):
     -----
     Each point gets the heat through the adjacent surface of the region, by the initial area of the
     smooth surface (for a mesh, of its points' faces). To load part of an edge, restrict the group,
-    or set q to 0 elsewhere. A region that extends beyond the domain or a symmetry plane has no
-    surface there.
+    or set q to 0 elsewhere. Beyond the domain or a symmetry plane, a region has no surface.
 
     Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in axisymmetry
     per radian).
@@ -88,8 +86,8 @@ class EdgeConvection(EdgeHeat):
     Parameters
     ----------
     h
-        Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z
-        (initial position of the edge), time and published values.
+        Heat transfer coefficient, heat per area, time and kelvin, a function of x, y, z (initial
+        position of the edge), time and published values.
     T_inf
         Temperature of the surrounding fluid, likewise.
 
@@ -99,9 +97,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    Areas are as in edge_heat_flux. T is the temperature at the surface after the step,
-    so even a large h cools no point below the fluid temperature. Publishes the heat per time into
-    all points as ID_s, and the area as ID_area.
+    Areas are as in edge_heat_flux. T is the temperature at the surface after the step, so even a
+    large h cools no point below the fluid temperature. Publishes the heat per time into all points
+    as ID_s, and the area as ID_area.
 
     See Also
     --------

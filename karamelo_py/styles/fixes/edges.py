@@ -78,7 +78,7 @@ def joined(tables: Sequence[Columns]) -> Columns:
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     """Return the surface at the points `ids` of a solid that fills `region`.
 
-    The surface in a sub-box belongs to the nearest inside point in this box or an adjacent one.
+    The surface in a sub-box belongs to the nearest point in this box or an adjacent one.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -139,7 +139,7 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
     """Return faces of cut boxes: projections of the surface across the axes (see `surface_at`).
 
-    At an edge within a sub-box, opposite projections cancel, and only the difference remains.
+    At an edge within a sub-box, only the difference of opposite projections remains.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
@@ -162,8 +162,7 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
-    """Divide simplices (m, d, d) of a set of faces into pieces, each assigned to the nearest
-    point."""
+    """Divide simplices (m, d, d) of a set of faces into pieces, for the nearest points."""
     none = np.zeros(0, np.int64)
     if not len(ids) or not len(sheet):
         return Faces(ids[:0], none, none, np.empty(0), np.empty((0, d)))
@@ -207,7 +206,7 @@ class OnEdge(Fix):
 
     group: ParticleGroup
     region: Region
-    side: int | None = None  # of `SIDES`; None: all of them
+    side: int | None = None  # of `SIDES`; None: all
     _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
@@ -227,8 +226,7 @@ class OnEdge(Fix):
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # A fixed order of sums over the faces of a point, regardless of when its faces were
-            # found.
+            # Fixes the order of sums over the faces of a point.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -299,12 +297,11 @@ class EdgeTraction(EdgeFix):
     Parameters
     ----------
     side
-        The loaded side, by its outward direction: xlo (left), xhi (right), ylo, yhi, zlo, zhi; or
-        ``all`` faces of a set in a mesh file.
+        The loaded side, by its outward direction; or ``all`` faces of a set in a mesh file.
     traction
-        tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z (initial
-        position of the edge), time and published values. NULL leaves a component unchanged. With
-        axisymmetric(true, twist=true), tz acts around the axis.
+        tx, ty, tz, one per dimension: functions of x, y, z (initial position of the edge), time and
+        published values. NULL leaves a component unchanged. With axisymmetric(true, twist=true), tz
+        acts around the axis.
 
     Example
     -------
@@ -317,12 +314,11 @@ class EdgeTraction(EdgeFix):
     Points are boxes that fill the region; those with an outer face in the direction of `side` take
     the traction on its initial area. It is a dead load (constant magnitude and direction), acts
     half a box inside the edge, and sums exactly to traction times area on a plane side. Faces of a
-    hole in this direction are loaded too: for a plate with a hole, use the region without it. In
-    axisymmetry, area and force are per radian.
+    hole are loaded too: for a plate with a hole, use the region without it. In axisymmetry, area
+    and force are per radian.
 
     Faces of a set in a mesh load the nearest points of the group: ``region(top, mesh, deck.inp,
-    TOP)`` with a surface, side set or boundary group, and ``fix(lid, edge_traction, all, top, all,
-    0, -1e3)``.
+    TOP)`` and ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
 
     See Also
     --------
@@ -371,8 +367,7 @@ class EdgePressure(EdgeFix):
     Parameters
     ----------
     p
-        Pressure: a number or a formula of x, y, z (initial position of the edge), time and
-        published values.
+        As a function of x, y, z (initial position of the edge), time and published values.
 
     Example
     -------
@@ -384,7 +379,7 @@ class EdgePressure(EdgeFix):
 
     The pressure acts inwards on the initial area of each outer face of the points' boxes, with
     constant magnitude and direction. A curved edge is stair-stepped, but the force along each axis
-    (pressure times projected area) is correct. With points=cut, forces are those on the smooth
+    (pressure times projected area) is correct; with points=cut, forces are those on the smooth
     edge. In axisymmetry, forces are per radian.
 
     To load part of an edge, define a separate region; the group may have to exclude other sides of

@@ -19,9 +19,8 @@ class Erosion(Fix):
     Parameters
     ----------
     condition
-        A formula of columns of dump particle (damage, volume, x, ep, T, ...), names of groups and
-        solids, time and published values; points for which it is not 0 are deleted. Column names
-        take precedence over variables.
+        A formula of columns of dump particle (damage, volume, x, ep, T, ...), groups, solids, time
+        and published values: 0 for points that remain. Columns hide variables.
     every
         Checks follow steps whose number is a multiple of this.
 

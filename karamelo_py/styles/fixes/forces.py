@@ -62,9 +62,9 @@ class BodyForce(Fix):
     Parameters
     ----------
     acceleration
-        bx, by, bz, one per dimension of the domain: force per mass, numbers or formulas of x0, y0,
-        z0, time and published values. NULL leaves a component unchanged. With axisymmetric(true,
-        twist=true), bz acts around the axis.
+        bx, by, bz, one per dimension: force per mass, functions of x0, y0, z0, time and published
+        values. NULL leaves a component unchanged. With axisymmetric(true, twist=true), bz acts
+        around the axis.
 
     Example
     -------
@@ -231,8 +231,8 @@ class ForceParticles(PointForces):
     Parameters
     ----------
     force
-        fx, fy, fz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
-        time and published values. NULL leaves a component unchanged.
+        fx, fy, fz, one per dimension: functions of x, y, z, x0, y0, z0, time and published values.
+        NULL leaves a component unchanged.
 
     Example
     -------
@@ -286,7 +286,7 @@ class LocalDamping(Fix):
     Parameters
     ----------
     alpha
-        The fraction, from 0 to 1; 0.8 is usual. A number or a formula of time, so damping may end.
+        From 0 to 1; 0.8 is usual.
 
     Example
     -------
@@ -295,14 +295,14 @@ class LocalDamping(Fix):
 
     Notes
     -----
-    The force f of a node becomes f - alpha |f| sign(v), by component (Cundall 1987). Balanced
-    forces cause no damping: the state of rest is unchanged, and steady motion is not damped. With
-    0.8 a scene comes to rest within about ten periods of its slowest vibration.
+    The force f of a node becomes f - alpha |f| sign(v), by component (Cundall 1987). Neither a
+    state of rest nor steady motion is damped. With 0.8 a scene comes to rest within about ten
+    periods of its slowest vibration.
 
-    The damping acts on the net force after all other fixes, in ulmpm/contacts after contact:
+    The damping acts on the net force after all other fixes, in ulmpm/contacts after contact, so
     touching bodies come to rest with correct contact forces. Nodes that are held or move at a
-    prescribed constant velocity are not damped; their reactions are correct. Publishes the sum of
-    the damping forces as ID_x, ID_y, ID_z.
+    prescribed constant velocity are not damped, so their reactions are correct. Publishes the sum
+    of the damping forces as ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -329,8 +329,8 @@ class InitialStress(Fix):
     Parameters
     ----------
     sxx, syy, szz, syz, sxz, sxy
-        Components, tension positive: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a
-        component unchanged. Shear components outside the dimension must be NULL or 0.
+        Components, tension positive: functions of x, y, z, x0, y0, z0. NULL leaves a component
+        unchanged. Shear components outside the dimension must be NULL or 0.
 
     Example
     -------
@@ -339,8 +339,8 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean, orthotropic) follows from its deformation
-    and cannot be set. Tension that a material cannot sustain, as in soil without cohesion, gives a
-    warning.
+    and cannot be set. A warning names tension that a material cannot sustain, such as soil without
+    cohesion.
     """
 
     published = ()

@@ -22,10 +22,10 @@ class GeostaticStress(Fix):
     Parameters
     ----------
     k0
-        Horizontal over vertical effective stress: a number, or a formula of x, y, z, x0, y0, z0,
-        such as if(y0 < 5, 1.2, 0.5) for two layers.
+        Horizontal over vertical effective stress, as a function of x, y, z, x0, y0, z0, such as
+        if(y0 < 5, 1.2, 0.5) for two layers.
     gravity
-        Acceleration downwards, against the last direction of the scene: y in 2D, z in 3D.
+        Acceleration against the last direction of the scene: y in 2D, z in 3D.
 
     Example
     -------
@@ -35,10 +35,9 @@ class GeostaticStress(Fix):
     -----
     The vertical stress of a point is the weight of the group's points above it, in columns as wide
     as the largest point; layers may differ in material and in points per cell. A material with
-    pore_water is saturated up to its highest point in the column: the water pressure is hydrostatic
-    below that point, and the stress is the effective stress. With fix body_force, ground with a
-    level surface is at rest, and a slope is close to it. The material must accept a stress: see
-    initial_stress.
+    pore_water is saturated up to its highest point in the column, with hydrostatic pressure, and
+    the stress is the effective stress. With fix body_force, ground with a level surface is at rest,
+    and a slope is close to it. The material must accept a stress: see initial_stress.
 
     See Also
     --------
@@ -85,8 +84,8 @@ class GeostaticStress(Fix):
 def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return steps (n, d) from the points of one solid to the centres of their boxes.
 
-    Adjacent boxes fill the cells, but Gauss points (and Karamelo's three per cell) are not at their
-    centres. Other points do not move.
+    Gauss points (and Karamelo's three per cell) are not at the centres of their boxes, which fill
+    the cells. Other points do not move.
     """
     step = np.zeros_like(x)
     for along, length, out in zip(x.T, size.T, step.T, strict=True):
@@ -107,15 +106,9 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Return the weight per area (n, k) above the centres of points that are boxes.
 
-    Parameters
-    ----------
-    x, size
-        Centres and sizes of the boxes, (n, d); the last direction is up.
-    weights
-        Weights per volume, (n, k).
-
-    Columns are at least as wide as the widest box. Each box gives its weight to the columns that it
-    overlaps, and takes the mean of their loads.
+    `x`, `size` (n, d): centres and sizes of the boxes; the last direction is up. `weights` (n, k)
+    are per volume. Each box loads the columns that it overlaps, at least as wide as the widest box,
+    and takes the mean of their loads.
     """
     flat, half = x[:, :-1], size[:, :-1] / 2
     begin = (flat - half).min(axis=0)

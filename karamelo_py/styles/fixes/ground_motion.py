@@ -46,8 +46,6 @@ PUSHES = [
 
 
 class BaseAcceleration:
-    """Script argument: a formula of the acceleration."""
-
     script_kind = "a formula of time, or the name of a file with the columns time and acceleration"
 
     def __init__(self, hub: Hub, formula: Expression):
@@ -73,9 +71,8 @@ class BaseAcceleration:
         """Choose the column of a direction."""
 
     def motion(self, time: float, step: float, before: tuple[float, float]) -> tuple:
-        """Return velocity, acceleration, and its rate in the next `step`.
-
-        `before` are a time, and the velocity then.
+        """Return velocity, acceleration, and its rate in the next `step`; `before`: a time, the
+        velocity then.
         """
         since, speed = before
         at = np.array([since, (since + time) / 2, time, time + step])
@@ -125,10 +122,10 @@ class GroundMotion(VelocityNodes):
     Parameters
     ----------
     acceleration
-        ax, ay, az, one per dimension of the domain: a formula of time, or the name of a file with
-        the columns time and acceleration (of several, those named ax, ay, az). NULL: none.
+        ax, ay, az, one per dimension: a formula of time, or a file with the columns time and
+        acceleration (of several, those named ax, ay, az). NULL: none.
     through
-        A fix absorbing of the same nodes: the base is compliant. Default: the base is rigid, and
+        A fix absorbing of the same nodes, for a compliant base. By default the base is rigid and
         its nodes have the velocity of the record.
 
     Example
@@ -138,12 +135,11 @@ class GroundMotion(VelocityNodes):
     Notes
     -----
     Accelerations are linear between the times of a file, 0 after the last one, and integrated from
-    rest; a record whose velocity does not return to 0 leaves the base in motion. A rigid base
-    reflects all waves that return to it; NULL directions are free.
+    rest. A rigid base reflects all waves that return to it; NULL directions are free.
 
     With `through`, waves enter and leave through the edge. The record is the outcrop motion of
     rock, twice the incoming wave (Joyner & Chen 1975): its velocity v gives the traction rho c v of
-    the material of that fix. Waves at normal incidence are exact.
+    the material of that fix, exact at normal incidence.
 
     Publishes the force on the nodes as ID_x, ID_y, ID_z, and velocity and acceleration of the
     record as ID_vx, ID_ax and so on.

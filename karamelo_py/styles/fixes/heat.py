@@ -135,7 +135,6 @@ class TemperatureParticles(HeatFix):
 
 
 def heat(pt):
-    """Supply heat through one face of the point."""
     return 1.0, pt.supply + pt.face * pt.value, pt.T
 
 
@@ -167,10 +166,10 @@ class HeatFluxParticles(FacesOfPoints):
     Parameters
     ----------
     group
-        Group of points: a single layer along the surface.
+        A single layer along the surface.
     q
-        Heat per area and time, negative if it leaves the body: a number or a formula of x, y, z,
-        x0, y0, z0, time and published values.
+        Heat per area and time, negative if it leaves the body, a function of x, y, z, x0, y0, z0,
+        time and published values.
 
     Example
     -------
@@ -179,10 +178,10 @@ class HeatFluxParticles(FacesOfPoints):
     Notes
     -----
     A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
-    at an edge of the body has two and needs two fixes. In axisymmetry the face is at the radius of
-    the point, slightly inside the surface. On curved surfaces the printed area depends on the layer
-    of points (0.66 to 1.44 of the surface); edge_heat_flux uses the exact area. Publishes the heat
-    per time (in 2D per thickness, in axisymmetry per radian) as ID_s.
+    at an edge of the body needs two fixes. In axisymmetry the face is at the radius of the point,
+    slightly inside the surface. On curved surfaces the printed area depends on the layer of points
+    (0.66 to 1.44 of the surface); edge_heat_flux uses the exact area. Publishes the heat per time
+    (in 2D per thickness, in axisymmetry per radian) as ID_s.
 
     See Also
     --------

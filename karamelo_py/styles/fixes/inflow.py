@@ -41,10 +41,9 @@ class Inflow(VelocityNodes):
     Parameters
     ----------
     solid
-        The solid that fills the inlet, at least one cell long: its points enter first, layer by
-        layer.
+        It fills the inlet, at least one cell long: its points enter first, layer by layer.
     velocity
-        vx, vy, vz, one per dimension of the domain: numbers, of which one is not 0.
+        vx, vy, vz, one per dimension, of which one is not 0.
     until
         Time of the last layer.
 
@@ -54,11 +53,10 @@ class Inflow(VelocityNodes):
 
     Notes
     -----
-    Nodes of the inlet have the velocity. A layer of points enters at its upstream end
-    whenever the previous layer has moved by the spacing of the layers. Only whole layers enter, so
-    the mass is exact. The layers repeat the solid, and ids follow the order of entry. The fix
-    creates all points up to the time `until` before the first run. The energy balance counts the
-    energy of entering points as work.
+    Nodes of the inlet have the velocity. A layer of points enters at its upstream end whenever the
+    previous layer has moved by the spacing of the layers, so that the mass is exact. The layers
+    repeat the solid, and ids follow the order of entry. All points up to the time `until` are
+    created before the first run. The energy balance counts the energy of entering points as work.
 
     Publishes the force on the nodes of the inlet as ID_x, ID_y, ID_z, and the number and mass of
     the points that have entered as ID_points and ID_mass.
@@ -102,7 +100,7 @@ class Inflow(VelocityNodes):
         group = NodeGroup(hub)
         group.id = f"inlet of {solid.id}"
         group.add(self._inlet(hub), None)
-        self.entered = 0  # layers
+        self.entered = 0
         self._fill(hub, until)
         super().__init__(hub, group, *v)
         self.held_directions = ()  # no wall: splines reach past it
@@ -121,7 +119,6 @@ class Inflow(VelocityNodes):
         return Inlet(hub, corner + lo * h, corner + hi * h)
 
     def _fill(self, hub: Hub, until: float) -> None:
-        """Give the solid the points of all layers that enter."""
         solid, axis, h = self.solid, self.axis, hub.lattices[0].h
         along = np.rint(self.sign * solid.x0[:, axis] / (ALIKE * h)).astype(np.int64)
         places, layer = np.unique(along, return_inverse=True)
@@ -163,7 +160,6 @@ class Inflow(VelocityNodes):
         self._refuse_others()
 
     def _refuse_others(self) -> None:
-        """Refuse points of other solids that begin in the inlet."""
         inner = self.solid.half_size[0] / 2
         lo, hi = self.solid.lo + inner, self.solid.hi - inner
         for other in self.hub.solids.values():

@@ -21,7 +21,7 @@ class MassDamping(Fix):
     Parameters
     ----------
     rate
-        Number or formula of x0, y0, z0 and time, in 1/time. A wave decays by exp(-rate t/2).
+        In 1/time, a function of x0, y0, z0 and time. A wave decays by exp(-rate t/2).
 
     Example
     -------
@@ -31,9 +31,9 @@ class MassDamping(Fix):
     -----
     For waves, put a layer before fix absorbing with a thickness L of one wavelength, and a rate
     that grows with the square of the depth to 6 c/L at the edge (c: P wave speed). It reflects
-    below 0.2 % of the energy of P and S waves at up to 45 degrees. Rigid motion is damped, too:
-    this is mass-proportional Rayleigh damping. In saturated ground it acts on the soil, which drags
-    the water.
+    below 0.2 % of the energy of P and S waves at up to 45 degrees. Rigid motion is damped, too
+    (mass-proportional Rayleigh damping). In saturated ground it acts on the soil, which drags the
+    water.
 
     Publishes the sum of the damping forces as ID_x, ID_y, ID_z.
 

@@ -14,7 +14,6 @@ def force_of_nodes(node):
 
 
 def momentum_rate(pt):
-    """Return the momentum over the time that forces act."""
     return pt.v, pt.x, pt.mass * pt.v / pt.kick
 
 

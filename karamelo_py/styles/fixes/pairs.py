@@ -65,7 +65,7 @@ class PairContact(Gripping):
     def law(self) -> NamedTuple:
         """Tag of :mod:`karamelo_py.points.bodies` for the force between two points.
 
-        Read in each step: constants of materials may change between runs.
+        Read in each step, as constants of materials may change between runs.
         """
         raise NotImplementedError
 
@@ -96,12 +96,11 @@ class PairContact(Gripping):
         torque[:] = turning[: len(torque)]
 
     def sent(self, simulation: Any) -> int:
-        """Number of points that may touch others now; one process searches all of them."""
+        """Number of points that may touch others now, searched by one process."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Rows of the points of each block in the overlap of the solids' boxes; None without
-        overlap.
+        """Rows of the points of each block in the overlap of the solids' boxes, or None.
 
         Boxes are extended by the contact distance of two points.
         """
@@ -171,7 +170,7 @@ class ContactMinimizePenetration(PairContact):
     solid1, solid2
         IDs of the two solids.
     mu
-        Coefficient of friction (Coulomb); default 0.
+        Coefficient of friction (Coulomb).
 
     Example
     -------
@@ -183,22 +182,20 @@ class ContactMinimizePenetration(PairContact):
 
     Points are spheres (in 2D disks) with a radius R of half the side of a cube (in 2D a square) of
     their present volume. Two points with the penetration p = R1 + R2 - |x2 - x1| > 0 get the force
-    m1 m2 / (m1 + m2) p / dt^2, which separates two free points within one step. Friction, at most
-    mu times this force, stops and reverses the slip (de Vaucorbeil & Nguyen 2021, "Modelling
-    contacts with a total Lagrangian material point method"): a point whose load it can hold is at
-    rest, after a displacement of at most mu p.
+    m1 m2 / (m1 + m2) p / dt^2, which separates free points within one step. Friction, at most mu
+    times this force, stops and reverses the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts
+    with a total Lagrangian material point method"): a point at rest is displaced by at most mu p.
 
-    dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, as
-    by set_dt, it decreases by 1 % of the elapsed time.
+    dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, it
+    decreases by 1 % of the elapsed time.
 
     A surface of spheres is rough. The force on a block (two points per cell and direction) is 0.19,
     0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces inclined to the grid lock:
     on a slope of 20 degrees with mu = 0 a block sticks, and with points=cut it accelerates by 2.8
-    instead of 3.4. A coefficient therefore gives a warning. For correct friction use method
-    ulmpm/contacts.
+    instead of 3.4. For correct friction use method ulmpm/contacts.
 
-    The cost is proportional to the number of points. With several processes, the first one searches
-    among all points that may touch.
+    The cost is proportional to the number of points that may touch; the first of several processes
+    searches among them.
 
     See Also
     --------
@@ -247,7 +244,7 @@ class ContactHertz(PairContact):
     Parameters
     ----------
     solid1, solid2
-        IDs of the two solids; their materials have a Young's modulus and a Poisson's ratio.
+        Their materials have a Young's modulus and a Poisson's ratio.
 
     Example
     -------
@@ -255,13 +252,13 @@ class ContactHertz(PairContact):
 
     Notes
     -----
-    Points are spheres as in contact/minimize_penetration. Two points that overlap by p
-    repel each other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1
-    R2 / (R1 + R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. It is meant for single points: bodies
-    overlap noticeably before the force is large, and a fast body may pass through.
+    Points are spheres as in contact/minimize_penetration. Two points that overlap by p repel each
+    other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 +
+    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. It is meant for single points: bodies overlap
+    noticeably before the force is large, and a fast body may pass through.
 
-    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. With
-    several processes, the first one searches among all points that may touch.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. The
+    first of several processes searches for pairs.
 
     See Also
     --------
@@ -286,10 +283,9 @@ class ContactFriction(Fix):
     Parameters
     ----------
     solid1, solid2
-        IDs of the two solids; one fix per pair, other pairs are frictionless.
+        One fix per pair; other pairs are frictionless.
     mu
-        Coefficient of friction (Coulomb), a bound of tangential over normal force; or ``no-slip``:
-        the solids stick while pressed together.
+        Coefficient of friction (Coulomb); or ``no-slip``: the solids stick while pressed together.
 
     Example
     -------

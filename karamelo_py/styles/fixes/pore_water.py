@@ -42,7 +42,7 @@ class PorePressure(Fix):
     Parameters
     ----------
     p
-        Pressure of the water: a number or a formula of x0, y0, z0, time and published values.
+        Pressure of the water, a function of x0, y0, z0, time and published values.
 
     Example
     -------
@@ -91,7 +91,7 @@ class SeepageFace(PorePressure):
 
     Notes
     -----
-    A node is open, at the pressure p, while the pressure in the soil is above p. Otherwise it is
+    A node is open, at the pressure p, while the pressure in the soil is above p; otherwise it is
     impermeable. Publishes ID_s, as fix pore_pressure does.
 
     See Also
@@ -108,11 +108,11 @@ class WaterFlux(Fix):
     Parameters
     ----------
     q
-        Volume of water that enters per time and area of the surface (negative: leaves): a number or
-        a formula of x0, y0, z0, time and published values.
+        Volume of water that enters per time and area of the surface (negative: leaves), a function
+        of x0, y0, z0, time and published values.
     through
-        Faces that it enters through: by their outward direction (xlo, xhi, ...), or any
-        ``surface``. ``volume``: q is per volume of the body, not per area.
+        Faces that it enters through, by their outward direction, or any ``surface``. ``volume``: q
+        is per volume of the body.
 
     Example
     -------

@@ -68,14 +68,14 @@ class PythonFunction:
 
 
 class Python(Fix):
-    """Call a Python function on points or nodes in every step: write your own fix.
+    """Call a Python function on points or nodes in every step.
 
     Parameters
     ----------
     group
         Group of points or of nodes, or ``all``.
     function
-        ``module.function``; the module is next to the script or installed.
+        ``module.function``, of a module next to the script or installed.
     moment
         When it is called in a step. Default for points: ``initial_integrate``, where
         ``points.force`` accepts forces; for nodes: ``post_update_grid_state``, where
@@ -84,20 +84,19 @@ class Python(Fix):
     Notes
     -----
     The function gets a view of the group: dt, time, and arrays with a row per member (position,
-    velocity, mass, force ...; of nodes also velocity_update), described on the page on plug-ins.
-    Changes to them take effect. The return value is published: a number as ID, up to three as ID_x,
-    ID_y, ID_z. A call costs some ten microseconds.
+    velocity, mass, force ...; see the page on plug-ins). Changes to them take effect. The return
+    value is published: a number as ID, up to three as ID_x, ID_y, ID_z. A call costs some ten
+    microseconds.
 
     With several processes all points are gathered in each step. Set ``pull.point_by_point = True``
     for a function ``pull`` that treats each point or node separately and moves no points: each
-    process then calls it for its local points, in any order. ``points.total(terms)`` sums terms
-    (n,) or (n, k) over all points.
+    process then calls it for its points, in any order. ``points.total(terms)`` sums terms (n,) or
+    (n, k) over all points.
 
-    Restart files contain values that the function stores between steps if it names them, as in
-    ``remembers = ("taken", "left")``: in the module, or in the class of a callable object. They are
-    numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. The
-    first file warns of other such data that has changed. Defaults of arguments, other objects,
-    other modules, and ``np.random`` itself are not checked.
+    Restart files contain values that the function stores between steps if its module, or the class
+    of a callable object, names them: ``remembers = ("taken", "left")``. They are numbers, texts,
+    arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. The first file warns
+    of other such data that has changed.
 
     Example
     -------

@@ -65,14 +65,13 @@ class RigidBody(Fix):
     gravity
         Acceleration, one formula per dimension.
     force, torque
-        Further force on its centre, and torque about it: formulas of time and published values.
+        Further force on its centre and torque about it: functions of time and published values.
     motion, turning
-        Prescribed velocity of its centre and angular velocity: formulas; NULL leaves a component of
-        the velocity free.
+        Prescribed velocity of its centre and angular velocity; NULL leaves a component free.
     fixed
         Directions in which it does not move: some of x, y, z, and rx, ry, rz for rotation.
     pivot
-        Coordinates of a position that the body rotates about, as on a hinge or a ball joint.
+        Position that the body rotates about, as on a hinge or a ball joint.
     mass
         Default: the mass of its points. In axisymmetry, masses and forces are per radian.
     inertia
@@ -88,14 +87,13 @@ class RigidBody(Fix):
     -----
     Publishes its centre ID_x, ID_y, ID_z; velocity ID_vx, ...; rotation ID_rx, ...; angular
     velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ... In
-    2D: x, y, vx, vy, rz, wz, fx, fy, tz; the rotation may exceed 2 PI. In 3D the rotation is a
-    vector along the axis, at most PI long.
+    2D: x, y, vx, vy, rz, wz, fx, fy, tz. In 3D the rotation is a vector along the axis, at most PI
+    long.
 
-    In ulmpm/contacts the body and other solids push each other on the grid (with the friction of
-    fix contact/friction); in other methods use fix contact/rigid_body. Its velocity at the end of
-    the step is solved together with all impulses, so it may be far lighter than the bodies that it
-    touches. Momentum is conserved to round-off. As for points, velocities are at the middle of a
-    step, unless scheme(..., start=half).
+    In ulmpm/contacts the body and other solids push each other on the grid (with fix
+    contact/friction); in other methods use fix contact/rigid_body. Velocities at the end of the
+    step are solved together with all impulses, so a light body may touch heavy ones. Momentum is
+    conserved to round-off. Velocities are at the middle of a step, unless scheme(..., start=half).
 
     Formulas may contain its published values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the
     same ID replaces this one, and the body retains its velocity: to release it, repeat the line
@@ -124,7 +122,7 @@ class RigidBody(Fix):
     for_method = True
     reads_itself = True
     remembers = ("memory",)
-    reported = 0  # steps
+    reported = 0
 
     def __init__(
         self,
@@ -275,7 +273,7 @@ class RigidBody(Fix):
         return self._moved(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
 
     def _moved(self, x0: np.ndarray) -> np.ndarray:
-        """Return present positions (n, d) of those at the start."""
+        """Return present positions (n, d) of initial ones."""
         d, arm = self.hub.domain.dimension, np.zeros((len(x0), 3))
         arm[:, :d] = x0
         arm -= self.constants.start
@@ -428,7 +426,7 @@ class ContactRigidBody(Fix):
     solid
         The rigid body, with a fix rigid_body.
     mu
-        Coefficient of friction (Coulomb); default 0.
+        Coefficient of friction (Coulomb).
     region
         Its surface at the start; default: the region that the solid fills.
 
@@ -441,16 +439,15 @@ class ContactRigidBody(Fix):
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
     A point is a ball (in 2D a disk) with half the side of a cube of its volume as its radius. Its
-    impulse acts on the nodes of the point, and on the body at the point: a spring of 0.1 m/dt^2
-    stops it, implicit in the velocity of the body at the end of the step; it hardens from 1/8 of a
-    cell of penetration on. Friction stops the slip, with at most mu times the normal impulse. Nodes
-    held by fix velocity_nodes do not yield.
+    impulse acts on the nodes of the point, and on the body at the point: a spring of 0.1 m/dt^2,
+    implicit in the velocity of the body at the end of the step, which hardens from a penetration of
+    1/8 of a cell on. Friction stops the slip, with at most mu times the normal impulse. Nodes held
+    by fix velocity_nodes do not yield.
 
     For ulmpm and tlmpm. A body rolls on its radius plus half a point: with a radius of 3 cells, its
     acceleration on a slope is 3.6 % too large (2 % in 3D). Use ulmpm/contacts for liquids, and for
     bodies that slide or are held by friction: a sliding box accelerates 0.04 % too much there and 5
-    % too little with this fix, and a box that friction should hold creeps by 0.04 cells in 500
-    steps.
+    % too little with this fix, where a box at rest creeps by 0.04 cells in 500 steps.
 
     See Also
     --------

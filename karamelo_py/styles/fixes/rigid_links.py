@@ -68,9 +68,9 @@ class ContactBodies(Fix):
     first, second, more
         Rigid solids, each with a fix rigid_body, and regions that do not move. Any two may touch.
     mu
-        Coefficient of friction (Coulomb); default 0.
+        Coefficient of friction (Coulomb).
     restitution
-        Speed after a collision over the speed before, along the normal: from 0 (default) to 1.
+        Normal speed after a collision over the speed before, from 0 to 1.
 
     Example
     -------
@@ -82,15 +82,14 @@ class ContactBodies(Fix):
 
     Works in every method, and together with contact with deformable solids. Stacks come to rest,
     even a heavy body on light ones. Momentum and angular momentum are conserved to round-off, and
-    no collision adds energy. Collisions within a step are taken one by one, fastest first, so an
-    impulse travels through a row of balls that touch.
+    no collision adds energy. Collisions within a step are resolved one by one, fastest first.
 
-    Disks and spheres touch as a whole. Corners and edges of other shapes touch as small balls: they
-    are rounded by 0.05 cells, and edges in 3D have one ball per cell. A fixed region is a wall or a
-    container; a body with motion=... is a moving one. Bodies that a joint connects do not touch.
+    Disks and spheres touch as a whole. Corners and edges of other shapes are rounded by balls of
+    0.05 cells, in 3D one per cell along edges. A fixed region is a wall or a container. Bodies that
+    a joint connects do not touch.
 
-    The cost of a step grows with the number of pairs, and with the cube of the number of bodies
-    that move: use it for up to some tens.
+    The cost of a step grows with the number of pairs, and with the cube of the number of moving
+    bodies: use it for up to some tens.
 
     See Also
     --------
@@ -153,15 +152,14 @@ class Joint(Fix):
     first, second
         Rigid solids, each with a fix rigid_body. Without a second one, the ground.
     at
-        Position of the joint; for a spring, its end in the first body. Default: the centre of the
-        first body.
+        Position of the joint, or end of a spring in the first body. Default: its centre.
     end
-        End of a spring in the second body, or in the ground. Default: the centre of the second.
+        End of a spring in the second body, or in the ground. Default: the body's centre.
     axis
         Direction of a hinge (in 3D) or slider, fixed in the first body.
     stiffness, damping, length
-        Of a spring: force per extension, force per speed (default 0), and the length without force
-        (default: at the start).
+        Of a spring: force per extension, force per speed, and the length without force (default: at
+        the start).
 
     Example
     -------
@@ -178,7 +176,7 @@ class Joint(Fix):
     in the step; the next step removes this.
 
     A spring with up to 1/dt^2 of stiffness per mass is explicit and dissipates nothing; a stiffer
-    one is implicit, and the step damps it. Damping is implicit.
+    one is implicit and damped by the step. Damping is implicit.
 
     See Also
     --------

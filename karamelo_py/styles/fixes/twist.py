@@ -15,8 +15,8 @@ class AngularVelocityNodes(Fix):
     Parameters
     ----------
     omega
-        Angular velocity in radians per time, from x to z: a number or a formula of x0, y0, time and
-        published values.
+        In radians per time, from x to z: a number or a formula of x0, y0, time and published
+        values.
 
     Example
     -------

@@ -21,7 +21,6 @@ def prescribe(node):
 
 
 def prescribe_motion(node):
-    """Leave v, so that FLIP points acquire the value."""
     return node.v, node.value, node.force, node.mass * (node.value - node.v_star) / node.kick
 
 
@@ -86,13 +85,12 @@ class VelocityNodes(Fix):
     Parameters
     ----------
     velocity
-        vx, vy, vz, one per dimension of the domain: numbers or formulas of x0, y0, z0, time and
-        published values. NULL leaves a component free. With ``leq`` or ``geq`` before it, the
-        velocity is an upper or lower bound: nodes within it are free.
+        vx, vy, vz, one per dimension: functions of x0, y0, z0, time and published values.
+        NULL leaves a component free. After ``leq`` or ``geq``, the velocity is an upper or lower bound.
     mu
-        Coefficient of friction (Coulomb): a number or a formula. The wall is at rest in NULL
-        directions. On nodes that it holds or bounds, the tangential force is at most mu times the
-        normal force. With `velocity` (not ``geq`` or ``leq``), friction also acts under tension.
+        Coefficient of friction (Coulomb). The wall is at rest in NULL directions. On nodes that it
+        holds or bounds, the tangential force is at most mu times the normal force. With `velocity`
+        (not ``geq`` or ``leq``), friction also acts under tension.
 
     Example
     -------
@@ -107,8 +105,8 @@ class VelocityNodes(Fix):
     Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work
     heats points with a temperature; the wall takes no heat.
 
-    Of several such fixes on a node in one direction, the last decides: it publishes the node's
-    whole reaction, and only its friction acts. A bound that is not reached exerts no force.
+    Of several such fixes on a node in one direction, the last decides: it publishes the whole
+    reaction, and only its friction acts. A bound that is not reached exerts no force.
 
     A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
     in cells next to faces whose nodes are all held or bounded, so a group should extend to the last
@@ -144,8 +142,8 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all directions drags material along; all others are clamps, rollers
-        # or symmetry planes.
+        # A wall that moves in all directions drags material along; others are clamps, rollers or
+        # symmetry planes.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
@@ -216,8 +214,8 @@ class InitialVelocityNodes(Fix):
     Parameters
     ----------
     velocity
-        vx, vy, vz, one per dimension of the domain: numbers or formulas of x0, y0, z0. NULL leaves
-        a component unchanged.
+        vx, vy, vz, one per dimension: numbers or formulas of x0, y0, z0. NULL leaves a component
+        unchanged.
 
     Example
     -------
@@ -256,8 +254,7 @@ class Reaction(Compute):
     Parameters
     ----------
     group
-        Group of nodes, or ``all``. Each fix velocity_nodes must act on nodes of the group only, or
-        on none of them.
+        Group of nodes, or ``all``, with all or no nodes of each fix velocity_nodes.
 
     Example
     -------

@@ -18,7 +18,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
-ALIKE = 1e-6  # fraction of a velocity or the wave speed below which differences are ignored
+ALIKE = 1e-6  # of a velocity or the wave speed; smaller differences are ignored
 DIFFERENT = " how they move, the other how they deform"
 
 
@@ -48,8 +48,8 @@ class VelocityParticles(VelocityOfPoints):
     Parameters
     ----------
     velocity
-        vx, vy, vz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
-        time and published values. NULL leaves a component free.
+        vx, vy, vz, one per dimension: functions of x, y, z, x0, y0, z0, time and published values.
+        NULL leaves a component free.
 
     Example
     -------
@@ -83,9 +83,9 @@ class InitialVelocityParticles(VelocityOfPoints):
     Parameters
     ----------
     velocity
-        vx, vy, vz: numbers or formulas of x, y, z, x0, y0, z0. NULL leaves a component unchanged;
-        in 1D and 2D, omit the last ones or set them to NULL or 0. With axisymmetric(true,
-        twist=true), vz is the velocity around the axis.
+        vx, vy, vz: functions of x, y, z, x0, y0, z0. NULL leaves a component unchanged; in 1D and
+        2D, omit the last ones or set them to NULL or 0. With axisymmetric(true, twist=true), vz is
+        the velocity around the axis.
 
     Example
     -------
@@ -94,8 +94,8 @@ class InitialVelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    With transfers that store a velocity gradient or affine velocity (APIC, TPIC and similar ones),
-    points also get the gradient of the formulas, so the first step preserves an affine motion.
+    With transfers that store a velocity gradient or affine velocity (APIC, TPIC ...), points also
+    get the gradient of the formulas, so the first step preserves an affine motion.
 
     See Also
     --------

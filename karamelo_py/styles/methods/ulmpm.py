@@ -28,8 +28,8 @@ class ULMPM(Method):
     Notes
     -----
     Publishes the force on every rigid solid ID as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, and its torque about the origin as ContactTorque_ID_x and so on. The torque
-    about a position c is ContactTorque_ID - c x ContactForce_ID.
+    ContactForce_ID_z, and its torque about the origin as ContactTorque_ID_x and so on. About a
+    position c it is ContactTorque_ID - c x ContactForce_ID.
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:

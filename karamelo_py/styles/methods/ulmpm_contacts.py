@@ -26,7 +26,6 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 
 
 def fields(hub: Hub) -> list[int]:
-    """Velocity field of each solid; glued solids have the same one."""
     numbers: dict[str, int] = {}
     for solid in hub.solids.values():
         other = solid.glued_to
@@ -44,8 +43,8 @@ def flows(law: NamedTuple) -> bool:
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     """Fraction (F, F) of frictional heat that the first of two solids takes.
 
-    With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces in contact (Carslaw &
-    Jaeger 1959, section 2.15); otherwise half each, none without a temperature.
+    With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces (Carslaw & Jaeger
+    1959, section 2.15); otherwise half each, none without a temperature.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
     root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
@@ -58,9 +57,8 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
 class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: a velocity field on the grid for each solid.
 
-    Solids that approach each other push each other along their common normal once the gap is
-    closed, and separate freely. Contact is frictionless unless fix contact/friction defines
-    friction for a pair of solids. Rigid solids do not yield to contact.
+    Solids push each other along their common normal once the gap is closed, and separate freely.
+    Contact is frictionless without fix contact/friction. Rigid solids do not yield to contact.
 
     Example
     -------
@@ -75,33 +73,32 @@ class ULMPMContacts(Method):
     The gap follows from the mean position of the points around a node, with the outermost layer
     half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the material
     point method using multimaterial methods"): exact for plane surfaces along the grid. Solids with
-    curved or inclined faces use cut points (points=cut), unless the command ``solid`` says
-    otherwise: whole squares (points=regular) make such a face stair-stepped, and a block on a slope
-    of 20 degrees sticks. With bernstein-quadratic the gap is unknown, and contact begins as soon as
-    two solids have mass at one node.
+    curved or inclined faces use cut points (points=cut) by default: whole squares make such a face
+    stair-stepped, and a block on a slope of 20 degrees sticks. With bernstein-quadratic, contact
+    begins as soon as two solids have mass at one node.
 
     A node at a surface loses its velocity of approach. Colliding bars of 4, 8 and 16 cells lose 15,
     11 and 4 % of the kinetic energy.
 
-    For a fixed base, use a rigid solid or fix velocity_nodes with all components, on a group with
-    all corners of the cells of the base. With splines it should be three cells thick: the surface
-    of a thinner base appears higher by up to a quarter of a cell.
+    For a fixed base, use a rigid solid or fix velocity_nodes with all components, on all corners of
+    its cells. With splines it should be three cells thick: a thinner base appears higher by up to a
+    quarter of a cell.
 
     Walls one cell thick contain liquids and granular materials, even with corners, inclined or
     moving: in 1e5 steps points of water and sand penetrated walls at rest by at most 10 % of a
     cell, gel by 15 %, and moving walls by 26 %. For 100 steps after contact at a node, points may
-    move away from the wall there but not approach it.
+    leave the wall there but not approach it.
 
     Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
-    grad N of both, averaged over the neighbouring nodes with the weights 1/4, 1/2, 1/4 along each
-    axis. The solid whose sums scatter less has more weight, so a face outweighs a corner. If the
-    velocity of a solid is prescribed, its normal alone is used, except at the end of its face.
-    Solids separated along a grid axis are not in contact.
+    grad N of both, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4 along each axis;
+    the solid whose sums scatter less has more weight, so a face outweighs a corner. If the velocity
+    of a solid is prescribed, its normal alone is used, except at the end of its face. Solids
+    separated along a grid axis are not in contact.
 
     At a node of more than two solids, the impulses of all approaching pairs follow from the same
     velocities, reduced for solids in several pairs; the rest is removed in up to 16 passes. The
-    order of the solids has no effect. Contact does not move nodes held by fix velocity_nodes: their
-    impulse is added to the reaction of that fix.
+    order of the solids has no effect. Contact does not move nodes held by fix velocity_nodes, whose
+    reaction includes the impulse.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
@@ -134,7 +131,7 @@ class ULMPMContacts(Method):
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
         """`nodes`, and nodes around points of a body in cells with all corners in `nodes`.
 
-        Otherwise the contact normal would rotate: splines and domains reach further nodes.
+        Otherwise the contact normal would rotate, as splines and domains reach further nodes.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes

@@ -22,7 +22,7 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     solid
         ID of the solid.
     x, y, z
-        A point of the plane: numbers or formulas of time; z is 0 in 2D.
+        A point of the plane, as a function of time; z is 0 in 2D.
     nx, ny, nz
         Its normal, of any length, towards the solid.
     mu
@@ -38,8 +38,8 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     volume. A point with the penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which
     moves a free point out within one step. Friction and dt are as in contact/minimize_penetration
     (de Vaucorbeil & Nguyen 2021). A moving plane does not drag. The force acts at the centres of
-    points: the lowest row of a body at rest has a third of its stress too little, and disks that
-    hit at 25 % of their wave speed gain 2 to 4 % of energy. contact/surface has neither error.
+    points: the lowest row of a body at rest has 33 % too little stress, and disks that hit at 25 %
+    of their wave speed gain 2 to 4 % of energy. contact/surface has neither error.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 

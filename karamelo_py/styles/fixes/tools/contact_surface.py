@@ -42,13 +42,13 @@ class ContactSurface(StiffTool):
     Parameters
     ----------
     region
-        The region that pushes points out. It needs an inside: a mesh of solid elements (in 2D of
-        area elements), a closed STL surface, or a plane. With the word ``exterior`` it is a mould.
+        It needs an inside: a mesh of solid elements (in 2D of area elements), a closed STL surface,
+        or a plane. With the word ``exterior`` it is a mould.
     mu
-        Coefficient of friction (Coulomb); default 0.
+        Coefficient of friction (Coulomb).
     way
-        ux, uy, uz, one per dimension of the domain: displacement of the region, formulas of time.
-        Default: none. A region does not rotate.
+        ux, uy, uz, one per dimension: displacement of the region as a function of time. A region
+        does not rotate.
 
     Example
     -------
@@ -61,31 +61,29 @@ class ContactSurface(StiffTool):
 
     Points are spheres (in 2D disks) with a radius of half the side of a cube of their volume,
     stretched along the normal while they touch, and cut at the surface if they overlap it from the
-    start, as at stair-stepped faces. The force acts at their surface. At the depth p it is
-    k p + 0.02 m p'/dt out of the region, and never a pull. k is 0.5 m/dt^2 at the first touch,
-    with dt as in contact/minimize_penetration. Friction, at most mu times this force, stops the
-    slip on the moving region and reverses it with the same stiffness: a point whose load it can
-    hold is at rest, after a displacement of at most mu p.
+    start. The force acts at their surface. At the depth p it is k p + 0.02 m p'/dt out of the
+    region, and never a pull. k is 0.5 m/dt^2 at the first touch, with dt as in
+    contact/minimize_penetration. Friction, at most mu times this force, stops and reverses the slip
+    on the moving region with the same stiffness: a point at rest is displaced by at most mu p.
 
-    The spring conserves energy. Damping and friction dissipate it: the summary of the run has the
-    line ``lost by contact``, energy that the balance counts as work of the fix. A disk that hits at
-    5 to 25 % of its wave speed loses 0.6, 0.3 and 0.1 % with 4, 8 and 16 cells in the radius. A rod
-    of 8 x 2 cells returns with 0.94 of its speed at the program's step, 0.98 at dt_factor(0.9).
+    The spring conserves energy. Damping and friction dissipate it (``lost by contact`` in the
+    summary of the run), which the balance counts as work of the fix. A disk that hits at 5 to 25 %
+    of its wave speed loses 0.6, 0.3 and 0.1 % with 4, 8 and 16 cells in the radius. A rod of 8 x 2
+    cells returns with 0.94 of its speed, 0.98 at dt_factor(0.9).
 
-    Under its weight, a block has the right stress in its lowest row within 6 % with a linear
-    basis, and 22 % too little (29 % too much in the next row) with quadratic-spline.
+    Under its weight, a block has the right stress in its lowest row within 6 % with a linear basis,
+    and 22 % too little (29 % too much in the next row) with quadratic-spline.
 
     The force acts in the direction in which the depth decreases fastest. A point deeper than a
-    cell, or in the middle of a thin region, ends the run. A point past the middle of a thin region
-    is pushed out on the other side: a wall of one cell stops bodies up to 1/3 of their wave speed.
+    cell, or in the middle of a thin region, ends the run; past the middle it is pushed out on the
+    other side. A wall of one cell stops bodies up to 1/3 of their wave speed.
 
-    A block of 0.4 m whose weight acts at once bounces on a slope. With each push, friction takes mu
-    times the change of its velocity across the slope, within 0.1 % at 20 to 45 degrees with mu =
-    0.2. A block that hardly slides gains up to 0.03 m/s in its first bounces, in which its points
-    stick. Energy is balanced within 0.3 %. The block sinks in by twice the force on a point divided
-    by m / dt^2, here 1 % of a cell.
-    A belt over half a bollard with mu = 0.3 is drawn slowly with 2.50 times its load (exact 2.57
-    for a thin belt, 2.45 for this one, as thick as 10 % of the radius).
+    A block whose weight acts at once bounces on a slope; friction takes mu times the change of its
+    velocity across the slope, within 0.1 % at 20 to 45 degrees with mu = 0.2. A block of 0.4 m that
+    hardly slides gains up to 0.03 m/s in its first bounces. Energy is balanced within 0.3 %. The
+    block sinks in by twice the force on a point divided by m / dt^2, here 1 % of a cell. A belt
+    over half a bollard with mu = 0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a
+    thin belt, 2.45 for this one, as thick as 10 % of the radius).
 
     See Also
     --------

@@ -20,13 +20,13 @@ class CuttingTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness relative to the shear modulus of the point: a number or a formula of time.
+        Stiffness relative to the shear modulus of the point, as a function of time.
     x_tip, y_tip, z_tip
-        The tip: numbers or formulas of time; z is 0.
+        The tip, as a function of time; z is 0.
     vx, vy, vz
-        Its velocity, for compatibility with Karamelo; unused, as there is no friction.
+        Unused; for compatibility with Karamelo.
     xA, yA, xB, yB
-        A point on each of the two faces that meet at the tip: numbers or formulas of time.
+        A point on each of the two faces that meet at the tip, as a function of time.
 
     Example
     -------

@@ -18,9 +18,9 @@ class ImpenetrableSurface(PlaneTool):
     Parameters
     ----------
     K
-        Stiffness relative to the shear modulus of the point: a number or a formula of time.
+        Stiffness relative to the shear modulus of the point, as a function of time.
     xs, ys, zs
-        A point of the plane: numbers or formulas of time; z is 0 in 2D.
+        A point of the plane, as a function of time; z is 0 in 2D.
     nx, ny, nz
         Its normal, of any length, towards the side where points may be.
 

@@ -37,7 +37,7 @@ class Indent(BallTool):
     Parameters
     ----------
     K
-        Acceleration per depth squared: a number or a formula of time.
+        Acceleration per depth squared, as a function of time.
 
     Example
     -------

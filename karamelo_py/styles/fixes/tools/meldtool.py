@@ -20,10 +20,10 @@ class MeldTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness relative to the shear modulus of the point, a length. This and all further numbers
-        may be formulas of time.
+        Stiffness relative to the shear modulus of the point, a length. All numbers may be formulas
+        of time.
     axis
-        The word x, y or z: the direction of the axis.
+        Direction of the axis.
     half_width
         Half the width of the square channel along the axis.
     c1, c2
@@ -67,8 +67,7 @@ class MeldTool(ToolFix):
         self.across = [k for k in range(3) if k != self.along]
 
     def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
-        """Heights (n,) of points above the end, positions (n, 2) along fixed and rotating axes,
-        rotation."""
+        """Heights (n,) above the end, positions (n, 2) along fixed and rotating axes, rotation."""
         c1, c2, theta, lo = at
         x = points.position.astype(float)
         q = x[:, self.across] - np.array([c1, c2])

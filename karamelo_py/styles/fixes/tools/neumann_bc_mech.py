@@ -17,10 +17,10 @@ class NeumannBcMech(ToolFix):
     Parameters
     ----------
     group
-        Group of points: a single layer along the surface.
+        A single layer along the surface.
     traction
-        tx, ty, tz, one per dimension of the domain: numbers or formulas of x, y, z, x0, y0, z0,
-        time and published values. NULL leaves a component unchanged.
+        tx, ty, tz, one per dimension: functions of x, y, z, x0, y0, z0, time and published values.
+        NULL leaves a component unchanged.
 
     Example
     -------
@@ -30,7 +30,7 @@ class NeumannBcMech(ToolFix):
     -----
     A point has one outer face, the side of a cube of its present volume: V^(2/3) in 3D, V^(1/2) in
     2D, the whole section in 1D; in axisymmetry at the radius of the point. Points lie half a side
-    inside the loaded surface. Publishes the total force as ID_x, ID_y, ID_z.
+    inside the surface. Publishes the total force as ID_x, ID_y, ID_z.
 
     See Also
     --------

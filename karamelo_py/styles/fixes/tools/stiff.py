@@ -31,12 +31,12 @@ class StiffTool(Gripping, ToolFix):
         seen: np.ndarray,
         led: Any = 0.0,
     ) -> np.ndarray:
-        """Return forces (n, d) that move points by `push` (n,) along `normal` in a step: m push /
+        """Return forces (n, d) that move points by `push` (n,) along `normal` in a step, m push /
         dt^2.
 
-        Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops the slip on a
-        tool of this `velocity`, and reverses the slip distance: of the positions (n,
-        d) `seen`, minus the displacement `led` by the tool.
+        Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops and reverses the
+        slip on a tool of this `velocity`: of the positions `seen` (n, d) minus the displacement
+        `led` by the tool.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
         load = stiffness * np.maximum(push, 0)
