@@ -142,10 +142,10 @@ class Error(Compared, Compute):
         A column of a dump (x, vy, s11, T, ...), a displacement ux, uy or uz, or a whole field:
         ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
-        The exact value, a function of x, y, z (present position), x0, y0, z0 (initial position), time,
-        and published values. For a whole field: one per component, in the order x, y, z or 11, 22, 33,
-        12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2`` (default) or
-        ``max``, and ``absolute`` (default) or ``relative``.
+        The exact value, a function of x, y, z (present position), x0, y0, z0 (initial position),
+        time, and published values. For a whole field: one per component, in the order x, y, z or
+        11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2`` (default)
+        or ``max``, and ``absolute`` (default) or ``relative``.
 
     Example
     -------
