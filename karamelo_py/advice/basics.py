@@ -62,7 +62,7 @@ class BasicFacts:
 
     @cached_property
     def weights(self) -> list[np.ndarray]:
-        """Mean accelerations (d,) of the solids by each fix that accelerates."""
+        """Mean accelerations (d,) of the solids by each fix."""
         weights = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:

@@ -1,4 +1,4 @@
-"""Moving bodies: energy gain by drift and rotation, lag of rotation, fixes that hold bodies."""
+"""Moving bodies: energy gain, lag of rotation, fixes that hold them."""
 
 from collections.abc import Iterator
 from math import inf
@@ -42,7 +42,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """Return True if a body of this law vibrates, unlike fluids and flowing materials."""
+    """True for bodies that vibrate, unlike fluids."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -115,7 +115,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Lag of a free rotation in the total frame.
 
-    Of the angular momentum sum m r^2, the grid lacks sum m tr D, the contribution within stencils.
+    The grid lacks sum m tr D of the moment of inertia sum m r^2.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
@@ -163,10 +163,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Return True if smooth plates hold all sides of a box except one.
-
-    A plate is a fix that holds all nodes of one side in its normal direction.
-    """
+    """True if fixes hold all sides of a box except one in normal direction."""
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
     if facts.hub.domain.kin.hoops or np.sum(body.solid.volume0) < (1 - 1e-6) * box:

@@ -1,4 +1,4 @@
-"""The rules of ``method(auto)``: the first row whose `when` is true gives the lines.
+"""Rules of ``method(auto)``: the first row whose `when` is true counts.
 
 `when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`), whose attributes
 fill braces in `lines`. `evidence` names the scenes that the row follows from.

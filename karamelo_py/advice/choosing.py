@@ -1,7 +1,6 @@
-"""``method(auto)``: facts of the scene, from a rehearsal up to the first run, choose the method.
+"""``method(auto)``: choose a method by facts of a rehearsal.
 
-The first row of :data:`karamelo_py.advice.choices.CHOICES` counts that fits and that the program
-supports.
+The first supported row of :data:`karamelo_py.advice.choices.CHOICES` counts.
 """
 
 import copy
@@ -43,8 +42,6 @@ FAST = 0.005  # fraction of the wave speed above which impacts give shocks
 
 
 class AtFirstRun(Exception):
-    """A copy of the scene has reached its first run."""
-
     def __init__(self, run: RunLoop):
         self.run = run
 
@@ -154,7 +151,7 @@ class Scouted(SceneFacts):
 
 
 def is_round(solid: Solid) -> bool:
-    """True if no point is further out than 1.1 radii of a ball of equal volume."""
+    """No point is further out than 1.1 radii of a ball of equal volume."""
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)
@@ -171,7 +168,7 @@ def eos_traits(law: tuple) -> LawTraits:
 
 
 def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
-    """Execute `lines` and the rest of the script on a copy; None if it runs nothing."""
+    """Execute the rest of the script on a copy; None without a run."""
     other, settings = hub.rehearsal(), copy.copy(hub.settings)
     other.scouting, other.settings = True, settings
     settings.comm, settings.ranks = SerialComm(), 1
@@ -188,10 +185,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
 
 
 def choose(hub: Hub) -> Chosen:
-    """Choose a row, and write its lines for this scene.
-
-    Raises ScriptError for a mistake further on in the script.
-    """
+    """Choose a row for this scene; raises ScriptError for later mistakes."""
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
         return Chosen(RESUMED, lines)  # a longer run may suit another row
     if hub.rehearsing:

@@ -1,7 +1,7 @@
 """Stress that a linear basis loses when stressed material moves through the grid.
 
-Strain rates change at points that cross cell faces, and volumes drift: in the updated frame
-pressure falls by 10 to 35 % per cell, at any speed and strain. GIMP and splines lose 0 to 0.3 %.
+Strain rates change at points that cross cell faces: in the updated frame pressure falls by 10 to 35
+% per cell, at any speed and strain. GIMP and splines lose 0 to 0.3 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Return True if stress is lost; gases and liquids have separate rules."""
+    """Gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -66,7 +66,7 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Longest path, as speed and duration, of each solid that meets others.
+    """Speed and duration of each solid that meets others.
 
     With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
     returned through the thinner solid.
@@ -103,7 +103,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Time until a body is within a cell of each box ahead, (n, d); inf if never."""
+    """Time until a body is within a cell of each box ahead, (n, d), or inf."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)

@@ -23,7 +23,7 @@ APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain a failed step; `smaller` is the step to suggest if it was too large."""
+    """Explain a failed step; `smaller` is the step to suggest."""
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
     if status == SHRUNK:

@@ -32,7 +32,7 @@ class Vibration(NamedTuple):
 
 class SceneFacts(BasicFacts):
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Yield each part once, with its material if it belongs to a law."""
+        """Each part once, with its material."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [
@@ -122,7 +122,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def impact(self) -> float:
-        """Half of the largest velocity difference, over the wave speed."""
+        """Half of the largest velocity difference over wave speed."""
         if not (self.motions and self.waves > 0):
             return 0.0
         fast = np.max([motion.fast for motion in self.motions], axis=0)
@@ -147,10 +147,9 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid, by weight or motion.
+        """Bending strain of the slenderest solid.
 
-        Cantilever of length L and height H: 3 g L^2/(H c^2). Beam whose kinetic energy becomes
-        strain energy: sqrt(3) v/c.
+        Cantilever: 3 g L^2/(H c^2). Beam whose kinetic energy becomes strain energy: sqrt(3) v/c.
         """
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
@@ -164,7 +163,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def falls(self) -> float:
-        """Duration over sqrt(L/g), the time in which a solid falls by its size."""
+        """Duration over sqrt(L/g)."""
         sizes = [np.maximum(motion.high - motion.low, 1e-300) for motion in self.motions]
         rates = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(rate.max()) for rate in rates), default=0.0)

@@ -1,6 +1,6 @@
-"""Warnings before a run: combinations that are known to fail, with reason and fix.
+"""Combinations known to fail, with reason and fix.
 
-Rules here involve several parts (see `karamelo_py.language.rules`). Each is reported once.
+Rules of several parts (`karamelo_py.language.rules`), each reported once.
 """
 
 from collections.abc import Iterable, Iterator
@@ -125,9 +125,9 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """The step requested for run number `run`, and the scene on which its limit depends.
+    """The step of run number `run`, and what its limit depends on.
 
-    `span` is the run's length in time and in steps, infinite if a condition ends it.
+    `span` is the run's length in time and in steps.
     """
 
     run: int
@@ -140,7 +140,6 @@ class Step(NamedTuple):
 
 
 def step_of(hub: Hub, halves: bool, span: tuple[float, float] = (inf, inf)) -> Step:
-    """Return the step requested now; with `halves`, a run in trouble halves it."""
     update = hub.update
     method, scheme, transfer = update.method, update.scheme, update.transfer
     scene = (
@@ -158,7 +157,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn once (or `again`) of a step above the limit, in this or a later run."""
+    """Warn once (or `again`), also for later runs."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -272,7 +271,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Warn once if constant loads act in the first load step only."""
+    """Constant loads act in the first load step only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(
@@ -327,7 +326,7 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve the motion in a step.
+    """Warn if single precision cannot resolve a step.
 
     At 50 000 cells from the origin a falling block errs by 3.5 % of its path, at 200 000 it does
     not move. Raises ScriptError if positions have a spacing of 1/500 cell or more.

@@ -1,4 +1,4 @@
-"""Suggestions of `check`: fewer dimensions, or half of the body, suffice."""
+"""Suggestions of `check`: fewer dimensions, or half of the body."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -32,7 +32,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 
 def _given(fix: Fix) -> tuple:
-    """Return the formulas; NaN if there are none, because the effect of the fix is unknown."""
+    """NaN without formulas, as the effect is unknown."""
     return tuple(fix.formulas) or fix.components or (np.nan,) * 3
 
 
@@ -45,7 +45,7 @@ def _depends(formula: Any, axes: str) -> bool:
 
 
 def _alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if a group has all or no points (nodes) of equal `key`."""
+    """True if a group has all or no points (nodes) of equal `key`."""
     group, within = fix.group, fix.points_within()
     if group is None or (group.all and within is None):
         return group is not None
@@ -239,7 +239,7 @@ def _line_of_rotation(fix: Fix, omega: str) -> str:
 
 
 def _angular_velocity(hub: Hub, fix: Fix, across: list[int], centre: np.ndarray) -> str | None:
-    """Return the angular velocity of a fix; None if its velocities are not a rotation."""
+    """None if the velocities are not a rotation."""
     formulas = [fix.formulas[axis] for axis in across]
     if fix.style not in ROTATING or any(one is None for one in formulas):
         return None

@@ -37,7 +37,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe a slender elastic row of points that bends by its weight; or None."""
+    """A slender elastic row of points that bends by its weight, or None."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
@@ -53,7 +53,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Describe bodies that start within a cell of each other and separate; or None."""
+    """Bodies that start within a cell of each other and separate, or None."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
@@ -79,10 +79,10 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """The pair of elastic bodies in present or future contact with the worst step.
+    """The touching pair of elastic bodies with the worst step.
 
-    At a node of mostly light mass, the stiffness of a heavy point makes the step too long by
-    sqrt(rho_heavy / rho_light).
+    A heavy point at a node of mostly light mass makes the step too long by sqrt(rho_heavy /
+    rho_light).
     """
     most, dt = Uneven(), facts.simulation.dt
     if not (facts.moves and facts.linear and facts.waves > 0 and dt * STEPS < facts.duration):

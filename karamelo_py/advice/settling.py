@@ -1,9 +1,9 @@
 """Displacement of soft elastic bodies by a weight that acts from the first step.
 
-Points of a vibrating body cross cells repeatedly. With a linear basis it loses stress and sinks
-further: by 19, 28, 67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells (FLIP
-0.9). With a load that grows over 7 periods it is 1 and 3 % at 0.26 and 0.32 cells, with cpgimp and
-splines at most 7 %. Reactions are correct.
+Points of a vibrating body cross cells repeatedly. With a linear basis it sinks further: by 19, 28,
+67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells (FLIP 0.9). With a load
+that grows over 7 periods it is 1 and 3 % at 0.26 and 0.32 cells, with cpgimp and splines at most 7
+%. Reactions are correct.
 """
 
 from typing import NamedTuple
@@ -29,8 +29,8 @@ class Settling(NamedTuple):
 def expected(facts: BasicFacts) -> Settling:
     """Predict how far bodies settle by their weight.
 
-    The free end of a clamped column of length L and mass m, loaded by m_1, moves by g L^2/c^2 (1/2
-    + m_1/m), with the speed c of longitudinal waves.
+    The free end of a clamped column moves by g L^2/c^2 (1/2 + m_1/m), with its length L, mass m,
+    load m_1 and the speed c of longitudinal waves.
     """
     most = Settling()
     if facts.simulation.step or not (facts.waves > 0 and loses(facts)):

@@ -1,4 +1,4 @@
-"""The default step, the stable step, and their comparison with a script's step."""
+"""The default, the stable and the script's step."""
 
 from math import inf
 
@@ -12,7 +12,7 @@ EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (point
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """Return the default step now: at rest (`still`), or as if points had moved."""
+    """At rest (`still`), or as if points had moved."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
     courant, fraction = own_step_of_waves(simulation.hub, still=still)

@@ -1,4 +1,4 @@
-"""karamelo-py --ranks N: mpiexec starts the processes; they report and end as one.
+"""karamelo-py --ranks N: processes of mpiexec that report and end as one.
 
 Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets terminal and
 signals. Output of mpiexec is shown only if nothing started.
@@ -300,7 +300,7 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """Return False if mpiexec pretends that output is a terminal."""
+    """False if mpiexec pretends that output is a terminal."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 

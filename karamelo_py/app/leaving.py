@@ -1,6 +1,6 @@
-"""Exit with a message if the program is interrupted during its imports.
+"""End with a message if the program is interrupted during its imports.
 
-An interrupt there may surface as any error; nothing is open yet.
+An interrupt there may surface as any error.
 """
 
 import os
@@ -41,8 +41,6 @@ def end_with(study: int) -> None:
 
 
 class leaving_at_once:
-    """Let Ctrl-C end the program at once, during imports."""
-
     def __enter__(self) -> None:
         try:
             self.before = signal.signal(signal.SIGINT, _leave)

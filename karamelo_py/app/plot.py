@@ -31,7 +31,7 @@ def read_text(path: Path, expected: str | None = None) -> str:
 
 
 def read_rows(path: str | Path) -> list[dict[str, float]]:
-    """Read the rows of a log by column; words are NaN.
+    """Rows of a log by column; words are NaN.
 
     A line # renames the columns; a cut line is skipped.
     """
@@ -55,10 +55,7 @@ def read_rows(path: str | Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Read the columns of a log; {} if it cannot be read.
-
-    Columns that change between runs have all their rows.
-    """
+    """Columns of a log; {} if it cannot be read."""
     try:
         rows = read_rows(folder / name)
     except ScriptError:

@@ -41,7 +41,7 @@ _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
 
 
 class SimulationError(ScriptError):
-    """An error in a script or a command; its text is the whole message.
+    """An error in a script or a command.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Quiet(Console):
         super().__init__(quiet=True)
 
     def warn(self, text: str) -> None:
-        """Warn at the line outside the package that called it."""
+        """At the line outside the package that called it."""
         level, frame = 1, sys._getframe()
         while frame.f_back and frame.f_globals.get("__name__", "").startswith("karamelo_py."):
             level, frame = level + 1, frame.f_back
@@ -72,9 +72,9 @@ class Quiet(Console):
 
 
 class Columns(Mapping, dict):  # type: ignore[metaclass]
-    """Read-only columns by name, as arrays of numbers.
+    """Read-only columns by name.
 
-    A dict, so that ``pandas.DataFrame(sim.log)`` works, though an empty one.
+    A dict, for ``pandas.DataFrame(sim.log)``, though an empty one.
     """
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
@@ -122,7 +122,7 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
 
 
 class LivePage:
-    """A page that follows a simulation: its `address`, and its display in notebooks."""
+    """A page that follows a simulation, at its `address`."""
 
     def __init__(self, page: Any):
         self._page = page
@@ -143,7 +143,7 @@ class PointColumns(Columns):
     """Columns of the points; ``points["vx"] = values`` sets one between two runs.
 
     Positions, velocities, temperatures, stresses (of rate-form materials) and declared fields can
-    be set, to a number or one per point (n,).
+    be set, to a number or (n,).
     """
 
     def __init__(self, hub: Hub):
@@ -161,7 +161,7 @@ class PointColumns(Columns):
 
 
 class Variables(MutableMapping):
-    """Script variables, numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
+    """Numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
 
     def __init__(self, sim: Simulation):
         self._sim = sim
@@ -325,7 +325,7 @@ class Simulation:
             raise
 
     def command(self, text: str) -> None:
-        """Execute one or more lines of script; raises SimulationError."""
+        """Execute lines of script; raises SimulationError."""
         self._do(text, "command")
 
     def _do(self, text: str, name: str) -> None:
@@ -366,7 +366,7 @@ class Simulation:
             self._at_work.release()
 
     def evaluate(self, expression: str) -> float | str:
-        """Return the present value of an expression of the script language."""
+        """Return the present value of an expression."""
         return self._evaluated(expression, "evaluate")
 
     def _evaluated(self, expression: str, name: str) -> float | str:
@@ -446,20 +446,17 @@ class Simulation:
 
     @property
     def points(self) -> PointColumns:
-        """Columns of the points by name (x, vy, s11, seq ...), settable: arrays (n,) by id."""
+        """Columns of the points (x, vy, s11, seq ...), settable: arrays (n,) by id."""
         return PointColumns(self.hub)
 
     @property
     def nodes(self) -> Columns:
-        """Columns of the nodes by name (x, vx, mass ...): arrays (n,)."""
+        """Columns of the nodes (x, vx, mass ...): arrays (n,)."""
         return Columns(self.hub.fields.node_names, self.hub.fields.node)
 
     @property
     def log(self) -> Columns:
-        """Columns of the log by name, with one number per line.
-
-        Only the last lines with the same columns count.
-        """
+        """Columns of the last lines of the log with the same names."""
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
@@ -467,7 +464,7 @@ class Simulation:
 
     @property
     def values(self) -> Columns:
-        """Present values published by fixes and computes, by name."""
+        """Published values of fixes and computes, by name."""
 
         def read(name: str) -> float:
             if self.hub.solids and self.hub.update.method is not None:
@@ -478,7 +475,7 @@ class Simulation:
 
     @property
     def variables(self) -> Variables:
-        """The variables of the script; ``sim.variables["q"] = 0`` is the line q = 0."""
+        """Script variables; ``sim.variables["q"] = 0`` is the line q = 0."""
         return Variables(self)
 
     def show(
@@ -520,10 +517,10 @@ class Simulation:
         return ShownPicture(drawn.getvalue())
 
     def live(self) -> LivePage:
-        """Open a browser page that follows later runs; notebooks display it.
+        """Open a browser page that follows later runs.
 
-        It shows points, log curves and what limits the step, with buttons to pause, step and stop.
-        Close it with ``.close()``, or with the simulation. Needs plotly.
+        It has buttons to pause, step and stop. Close it with ``.close()``, or with the simulation.
+        Needs plotly.
         """
         from karamelo_py.app.live.run import RunPage
 

@@ -137,7 +137,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Add hints to errors: names missing in dumps come from logs or the script."""
+    """Names missing in dumps come from logs or the script."""
     try:
         yield
     except ScriptError as error:
@@ -270,9 +270,7 @@ class Drawing:
         self.picture = self._picture(first)
 
     def chosen(self, snapshot: Snapshot) -> Snapshot:
-        """Return the points to draw, with the column of a colouring formula; set the scene's
-        values.
-        """
+        """Points to draw, with the column of a colouring formula."""
         columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
         values, row = self.scene.values, self.log.get(snapshot.step, {})
         for name in values.names():

@@ -1,4 +1,4 @@
-"""Commands that define the domain and its bodies: dimension, boundary, region, solid, group."""
+"""Commands dimension, boundary, region, solid, group."""
 
 from collections.abc import Sequence
 from pathlib import Path

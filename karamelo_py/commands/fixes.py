@@ -1,4 +1,4 @@
-"""Commands that define loads and measurements: fix, compute, functions of groups."""
+"""Commands fix, compute, and functions of groups."""
 
 from typing import Annotated, Any, Literal
 

@@ -1,4 +1,4 @@
-"""Commands of the language itself: print, value (or evaluate), include, quit."""
+"""Commands print, value (or evaluate), include, quit."""
 
 import math
 

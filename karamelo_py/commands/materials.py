@@ -1,4 +1,4 @@
-"""Commands for materials and their parts, and for testing a law: element."""
+"""Commands for materials and their parts; element."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -112,7 +112,6 @@ temperature = _part(
 
 
 def define(hub: Hub, catalogue: Catalogue, ID: str, style: str, arguments: Sequence[Argument]):
-    """Define a part of a material; an ID in use is refused first."""
     kind = catalogue.kind
     catalogue.refuse(ID)
     values: dict = {}

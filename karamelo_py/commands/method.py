@@ -1,4 +1,4 @@
-"""Commands for the method: method, scheme, precision, anti_volumetric_locking."""
+"""Commands method, scheme, precision, anti_volumetric_locking."""
 
 from collections.abc import Container, Sequence
 from contextlib import suppress
@@ -343,7 +343,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """Choose the variant of a style that a word selects, and return the other options."""
+        """Choose the variant that a word selects; return the other options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:
@@ -363,7 +363,7 @@ class _Call:
         basis: str | None = None,
         by_name: bool = False,
     ) -> str:
-        """Write the command with another kind or basis, completed, and with `option` at the end."""
+        """The command with another kind or basis, and `option` at the end."""
         styles = [self.styles[family] for family in FAMILIES if family in self.styles]
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
@@ -421,7 +421,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """Return the option, if it is one of `words`; variables of these names are ignored."""
+    """Ignores variables with the name of an option."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

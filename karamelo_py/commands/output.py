@@ -1,4 +1,4 @@
-"""Commands for output: dump, log, plot and their options."""
+"""Commands dump, log, plot and their options."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Command plane_strain: a prescribed strain across the plane of a 2D scene."""
+"""Command plane_strain."""
 
 from karamelo_py.kernels.export import imposing
 from karamelo_py.language.rules import Restrictions
@@ -13,8 +13,6 @@ impose_stretch = imposing(with_stretch)
 
 
 class StretchAcross(Fix):
-    """Give points the stretch across at the end of each step."""
-
     published = ()
     style = "plane_strain"
     point_by_point = conserves = True

@@ -1,4 +1,4 @@
-"""Commands that delete, move or replace points of solids."""
+"""Commands that delete, move or replace points."""
 
 import math
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Command pore_water: fill the pores of a material."""
+"""Command pore_water."""
 
 from typing import Annotated
 

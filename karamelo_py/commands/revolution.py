@@ -1,4 +1,4 @@
-"""Commands for bodies around an axis or a centre: axisymmetric, cylindrical, spherical."""
+"""Commands axisymmetric, cylindrical, spherical."""
 
 from karamelo_py.commands.thin import refuse_across, refuse_uneven
 from karamelo_py.points.kinematics import KINEMATICS, Axisymmetric, Cylindrical, Spherical

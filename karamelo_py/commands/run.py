@@ -1,4 +1,4 @@
-"""Commands that run the simulation, and that write and read files to resume from."""
+"""Commands that run, and that write and read restart files."""
 
 from math import inf, isnan
 from pathlib import Path
@@ -30,8 +30,8 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 def carry_out(hub: Hub, **length: Any) -> None:
     """Run for `length` (see `RunLoop`), or do what replaces the run.
 
-    A rehearsal records the run, a `Pause` stops before it, and ``check`` reports instead. Runs that
-    were complete in the restart file of a resumed script are skipped.
+    A rehearsal records the run, a `Pause` stops before it, and ``check`` reports instead. A resumed
+    script skips complete runs.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)

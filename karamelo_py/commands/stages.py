@@ -1,4 +1,4 @@
-"""Commands for construction stages: points that are inactive for a time."""
+"""Commands for construction stages."""
 
 import numpy as np
 
@@ -114,7 +114,7 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """Return True in a rehearsal or replay, whose state differs."""
+    """True in a rehearsal or replay, whose state differs."""
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

@@ -21,7 +21,7 @@ _KEYWORD = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
 
 
 class Argument:
-    """An unevaluated argument of a call: its `text` without surrounding blanks, and `mark`."""
+    """The `text` of an argument without surrounding blanks, and its `mark`."""
 
     def __init__(self, raw: Raw, interpreter: Any):
         code = raw.code
@@ -49,9 +49,9 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """Return a word, bare, quoted, or in a text variable; None for arithmetic.
+        """A word, bare, quoted, or in a text variable; None for arithmetic.
 
-        ``neo-hookean`` or ``dump.*.gz`` are words, unless they contain the name of a value.
+        ``neo-hookean`` or ``dump.*.gz`` are words without the name of a value.
         """
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
@@ -134,7 +134,6 @@ class Argument:
         return Argument(Raw(self._raw.source, start, end), self._interpreter)
 
     def listed(self) -> list[Argument]:
-        """Split ``(a, b, ...)``, or return the argument itself."""
         code, parts = self._raw.code, []
         begin, depth = 1, 0
         for k, letter in enumerate(code):
@@ -169,7 +168,7 @@ def with_gap(arguments: Sequence[Argument]) -> Argument | None:
 
 
 class Named:
-    """Base of parts of a scene that scripts name by an ID; also a script argument."""
+    """Parts of a scene that scripts name by an ID."""
 
     id: str = ""
     mark: Mark | None = None

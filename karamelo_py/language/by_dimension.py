@@ -1,4 +1,4 @@
-"""Argument lists that depend on the dimension, as in dimension() and block."""
+"""Argument lists that depend on the dimension."""
 
 import math
 import re
@@ -17,9 +17,8 @@ _HUGE = 1e20  # Karamelo's infinity, for INF
 class Forms:
     """The forms of an argument list, by dimension.
 
-    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are listed by
-    dimension. Some arguments take one of a few `words`; INF and EDGE mean the `open_ends` (-inf,
-    inf).
+    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are by dimension. Some
+    arguments take `words`; INF and EDGE mean the `open_ends` (-inf, inf).
     """
 
     def __init__(
@@ -118,7 +117,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Return a finite constant; in a rehearsal, NaN is the result of a run."""
+    """A finite constant; NaN as result of a run in a rehearsal."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

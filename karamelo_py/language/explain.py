@@ -1,4 +1,4 @@
-"""Mistakes in the arguments of a call, and what to write instead."""
+"""Mistakes in arguments, and what to write instead."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Convert exceptions in styles and plug-ins to script errors."""
+"""Exceptions in styles and plug-ins as script errors."""
 
 import inspect
 import linecache
@@ -20,7 +20,7 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 @contextmanager
 def as_script_error(name: str, where: str, code: Any, mark: Mark | None) -> Iterator[None]:
-    """Convert an exception of a style (``fix drag``) to an error at `mark`.
+    """Convert an exception of a style (``fix drag``).
 
     `where` is the active part, such as a hook; the last line in the file of `code` is named.
     """
@@ -53,7 +53,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an exception in one line, with the user's line if it does not compile."""
+    """One line, with the user's line if it does not compile."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -84,7 +84,7 @@ def place_of(function: Callable) -> str:
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Return the last line in the file of `code` in the traceback: `` (spring.py:28)``."""
+    """Last line of `code` in the traceback: `` (spring.py:28)``."""
     try:
         source = inspect.getsourcefile(inspect.unwrap(code))
     except TypeError:

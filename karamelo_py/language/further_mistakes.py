@@ -1,6 +1,6 @@
-"""Find further, independent mistakes of a script after the first.
+"""Further, independent mistakes of a script.
 
-Statements that depend on a wrong or skipped one are skipped, but for command and style names.
+Of statements that depend on a wrong one, only command and style names are checked.
 """
 
 import re
@@ -40,7 +40,7 @@ class Dependents:
         self.lacks_columns = False
 
     def note(self, statement: Statement) -> bool:
-        """Record what `statement` would define; False if nothing else can be checked."""
+        """False if nothing else can be checked."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
         if not isinstance(statement, CommandCall):
@@ -85,10 +85,7 @@ class Dependents:
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Return the mistakes after the statement that failed with the error `first`, in order.
-
-    Uses up the interpreter's hub.
-    """
+    """Mistakes after the `first`; uses up the interpreter's hub."""
     errors = first.others
     seen = {error.message: error for error in (first, *errors)}
     passed_over: list[Statement] = []
@@ -149,7 +146,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 def misnamed(
     interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
 ) -> list[ScriptError]:
-    """Return errors about wrong names of commands and styles.
+    """Errors about wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
     are valid even if a `wanting` name has no definition.

@@ -1,4 +1,4 @@
-"""Help about commands and styles, from their signatures and docstrings."""
+"""Help from signatures and docstrings."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""Executes statements: variables, commands, and locations of errors."""
+"""Executes statements."""
 
 import inspect
 import re
@@ -39,7 +39,7 @@ def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
 
 
 class Interpreter:
-    """Executes a script on a hub; sets its ``interpreter`` and ``mark``."""
+    """Sets ``interpreter`` and ``mark`` of the hub."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
@@ -104,7 +104,7 @@ class Interpreter:
             self._call(statement)
 
     def rehearse(self, hub: Any, first: Sequence[str] = ()) -> None:
-        """Execute `first` and the rest of the script on another hub, to find mistakes."""
+        """Execute the rest of the script on another hub, to find mistakes."""
         other = self._copy(hub)
         try:
             other.perform(first)

@@ -1,4 +1,4 @@
-"""Kinds of arguments: conversion and description, by annotation."""
+"""Kinds of arguments, by annotation."""
 
 import inspect
 import math
@@ -23,13 +23,13 @@ _LARGEST_INTEGER = 2**53  # above, floats skip integers
 
 
 def _rounding(value: float) -> float:
-    """Tolerance for results such as 0.3/0.1 to count as integers."""
+    """For results such as 0.3/0.1."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """Annotation of a field given as ``name=value``, by default under its field name."""
+    """A field given as ``name=value``, by default under its own name."""
 
     name: str = ""
 
@@ -53,7 +53,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Constrain a number; `open` names the excluded ends (True: both)."""
+    """`open` names the excluded ends (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -69,7 +69,7 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """Script argument: a file to read, in the current folder or the script's folder."""
+    """Script argument: a file in the current or the script's folder."""
 
     script_kind = "the name of a file"
     # Lower-case endings; None: any.
@@ -139,8 +139,6 @@ def _file_name(argument: Argument) -> str:
 
 
 class Unfit(Exception):
-    """An argument is of another kind, described by `got`."""
-
     def __init__(self, got: str, mark: Mark | None = None, hint: str | None = None):
         super().__init__(got)
         self.got = got
@@ -231,7 +229,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Script argument: the name of a style, which hides a variable of that name."""
+    """Script argument: a style, which hides a variable of that name."""
 
     family: str
     script_kind = "a word"
@@ -295,7 +293,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Return the kind for an annotation; TypeError if it is not supported."""
+    """Raises TypeError for an unsupported annotation."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:

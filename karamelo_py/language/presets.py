@@ -1,4 +1,4 @@
-"""Variables of the command line, which override assignments of a script."""
+"""Command-line variables, which override assignments."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Command-line variables, texts by name, whose assignments are skipped."""
+    """Texts by name."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)

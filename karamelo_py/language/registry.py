@@ -1,4 +1,4 @@
-"""Families of commands and styles: built-in ones in styles.toml, others from packages.
+"""Commands and styles: built-in ones in styles.toml, others from packages.
 
 A package offers a style in its pyproject.toml::
 
@@ -34,7 +34,7 @@ _differences: dict[Any, bool | tuple[str, ...]] = {}
 
 @cache
 def _families() -> dict[str, dict[str, list[EntryPoint]]]:
-    """Entry points by family and name, several if packages clash."""
+    """Several entry points if packages clash."""
     table = {
         family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
         for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()
@@ -94,7 +94,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget a module imported by a script in another folder; return True if one exists."""
+    """Forget another folder's module; return True if one exists here."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -115,7 +115,7 @@ def origin(family: str, name: str) -> str:
 
 
 def find(family: str, name: str) -> Any:
-    """Return the class or function of a style, imported on first use.
+    """Return a style, imported on first use.
 
     Raises ScriptError for unknown styles, import errors and clashes of packages.
     """
@@ -147,7 +147,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """As `find`, for a statement whose first argument is an ID, not the style."""
+    """As `find`; the first argument may wrongly be the style."""
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")
@@ -177,7 +177,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
 
 
 def may_differ(*commands: Callable, keywords: bool | tuple[str, ...] = True) -> None:
-    """Allow other statements of `commands` (or other values of `keywords`) when a run resumes."""
+    """Allow other statements, or values of `keywords`, when a run resumes."""
     _differences.update(dict.fromkeys(commands, keywords))
 
 

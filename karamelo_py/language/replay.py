@@ -1,4 +1,4 @@
-"""Repeat a script up to the state at which an earlier run stopped."""
+"""Repeat a script up to a stored state."""
 
 import re
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """Statements executed so far, except by :func:`registry.may_differ`.
+    """Executed statements, except by :func:`registry.may_differ`.
 
     `values` has the results of value(...) by statement number.
     """
@@ -28,7 +28,7 @@ class Record:
 
 
 class Replay:
-    """Compares a repeated script with the record in a `file`.
+    """Compares a script with the record in a `file`.
 
     It ends at the restart state; its last statement may be an unfinished run (`within`).
     """

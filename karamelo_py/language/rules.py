@@ -1,4 +1,4 @@
-"""Declarations of parts: restrictions, known failures, needless costs, causes of energy gain.
+"""Restrictions, known failures, needless costs, causes of energy gain.
 
 A fix, a scheme (in its traits) or a fluid has `Restrictions`. Rules are declared next to the type
 of a part, field or law::
@@ -34,7 +34,7 @@ HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
 
 
 class Feature(NamedTuple):
-    """A choice of a scene, such as its basis, or an option in use, whose `name` is empty."""
+    """A choice of a scene, or an option, whose `name` is empty."""
 
     kind: str
     name: str
@@ -105,7 +105,7 @@ class Advice(NamedTuple):
 
 
 def code_of(name: str) -> str:
-    """Convert a name to kebab case: ``shocks of material 'm'`` is shocks-of-material."""
+    """``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 

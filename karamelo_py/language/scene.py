@@ -1,4 +1,4 @@
-"""The interface of the scene for lower layers."""
+"""The scene for lower layers."""
 
 from pathlib import Path
 from typing import Any, Protocol
@@ -41,7 +41,7 @@ class Scene(Protocol):
         """The grids of the scene."""
 
     def require_domain(self) -> Any:
-        """The domain; ScriptError if the script has none yet."""
+        """Raises ScriptError without a domain."""
 
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""

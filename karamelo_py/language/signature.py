@@ -1,4 +1,4 @@
-"""Convert script arguments to a Python call by its signature, and give help.
+"""Convert script arguments to a Python call, and give help.
 
 The first parameter of a command (function) or style (class) is the hub; annotations of the others
 define the arguments::
@@ -56,10 +56,7 @@ EMPTY, KEYWORD = inspect.Parameter.empty, inspect.Parameter.KEYWORD_ONLY
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Return the parameters of a command or style, without the hub.
-
-    Raises TypeError for an unsupported signature.
-    """
+    """Parameters of a command or style, without the hub; raises TypeError."""
     record = is_record(target)
     try:
         if record and not hasattr(target, "given"):
@@ -76,10 +73,10 @@ def parameters(target: Any) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """Return True for a NamedTuple, a tag that needs no hub.
+    """True for a NamedTuple, which needs no hub.
 
-    Its arguments are its fields, or the parameters of its classmethod ``given``. A method
-    ``checked`` returns a replacement.
+    Arguments are its fields, or the parameters of its classmethod ``given``. A method ``checked``
+    returns a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
@@ -106,7 +103,7 @@ def _parameter(name: str, annotation: Any, default: Any, kind: Any = None) -> Pa
 def call(
     target: Callable, hub: Scene, arguments: Sequence[Argument], name: str, converted: Any = None
 ) -> Any:
-    """Call a command or make a style from script arguments; store their values in `converted`.
+    """Call a command or make a style; store the arguments in `converted`.
 
     `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a mark.
     """
@@ -216,7 +213,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """Make a style from values, as `call` does; faults are reported as its author's."""
+    """As `call`, from values; faults are the author's."""
     is_class = inspect.isclass(target)
     try:
         if not is_record(target):
@@ -338,7 +335,7 @@ def default_variant(style: Any) -> str | None:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """Return the parameters for help, with the word that selects a variant."""
+    """Parameters for help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)

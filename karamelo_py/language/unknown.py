@@ -1,4 +1,4 @@
-"""Errors with suggestions for unknown or unusable names."""
+"""Suggestions for unknown or unusable names."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -147,9 +147,9 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield later statements: definition ("" for a variable), ID and line.
+    """Yield later statements: definition, ID and line.
 
-    The innermost script comes first, from `back` statements before its next one.
+    From `back` statements before the next one, innermost script first.
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
@@ -261,7 +261,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """Rewrite ``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
+    """``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None

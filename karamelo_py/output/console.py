@@ -1,6 +1,6 @@
-"""Terminal output: banner, log lines, progress, warnings, summary.
+"""Terminal output.
 
-Rich draws a progress bar on a terminal; pipes and files get plain lines, flushed at once.
+Rich draws a progress bar on a terminal; pipes and files get plain lines.
 """
 
 import contextlib
@@ -123,10 +123,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show progress, and the activity `within` a step; fast enough to call in each step.
-
-        `fraction` is None if the end is unknown.
-        """
+        """`within`: activity in a step; `fraction` is None if the end is unknown."""
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
         if now - self._shown < pause or not self._running:
@@ -206,7 +203,7 @@ def show(value: object) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Format a duration: 42 s, 3 min 20 s, 2 h 5 min."""
+    """42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -1,4 +1,4 @@
-"""Points and nodes for output, by id, and formulas of their columns."""
+"""Points and nodes for output, and formulas of their columns."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -89,7 +89,7 @@ class Fields(PointTable):
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: PointGroup | None = None) -> float:
-        """Sum a quantity of `SUMMED` exactly over a group or all points."""
+        """Exact sum over a group or all points."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -119,7 +119,7 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Sum terms exactly over the points of a part's group.
+        """Exact sums of terms over a part's group.
 
         ``owner.name(points, *arguments)`` returns terms (k, n), or the number of sums, the sum (n,)
         of each term, and terms.
@@ -157,7 +157,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Return the points within `half` (n, d) of one of `x` (n, d) along all axes."""
+        """Points within `half` (n, d) of one of `x` (n, d) along all axes."""
         size, found = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -173,7 +173,7 @@ class Fields(PointTable):
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Return the largest value and the first point that has it."""
+        """Largest value, and the first point with it."""
 
         def of_rank() -> tuple[float, int]:
             best = -inf, 0
@@ -285,7 +285,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial energy of a gas, subtracted from its stored energy to save digits."""
+    """Initial energy of a gas, subtracted to save digits."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
@@ -305,7 +305,7 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """Script argument: a formula of dump columns, groups and solids (1 or 0), time and values."""
+    """Script argument: a formula of columns, groups and solids (1 or 0), time and values."""
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
     MOST = 6

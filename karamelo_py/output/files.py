@@ -1,4 +1,4 @@
-"""Files written completely or not at all; locks; pictures and movies."""
+"""Complete files, locks, pictures and movies."""
 
 import errno
 import json
@@ -64,7 +64,7 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open at byte `start` (0: new); an error truncates the file to `start`, plus `tail`."""
+    """Open at byte `start` (0: new); errors restore the file, plus `tail`."""
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
@@ -182,7 +182,7 @@ class Frames:
 
 
 class Claim:
-    """Lock of a folder or file that one program writes, until `release` or its end."""
+    """Lock of a folder or file."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
@@ -193,7 +193,7 @@ _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDi
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock a path, if the system can; None if another program has locked it."""
+    """Lock a path; None if another program has locked it."""
     try:
         import fcntl
 

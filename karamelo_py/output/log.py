@@ -1,4 +1,4 @@
-"""The log: a row of numbers per output, in log.mpm (or log.csv) and on the terminal."""
+"""The log, in log.mpm (or log.csv) and on the terminal."""
 
 import os
 import re

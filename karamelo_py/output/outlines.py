@@ -1,4 +1,4 @@
-"""Lines around bodies of points and around tools, in 2D and projected in 3D."""
+"""Lines around bodies and tools, in 2D and projected in 3D."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -42,7 +42,7 @@ class Tool(NamedTuple):
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Lines (m, 2) where points x (n, 2) fill half of the space.
 
-    Points are scattered over three cells, so that surface nodes get half as much as inner nodes.
+    Points are scattered over three cells, so that surface nodes get half as much.
     """
     cell = spacing(x, 4)
     if not cell > 0:
@@ -69,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Scatter to nodes with linear weights; `at` is in cells."""
+    """Linear weights; `at` is in cells."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -92,7 +92,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) of zero depth between corners (2,), with `fine` steps on the long side."""
+    """Lines (m, 2) of zero depth, with `fine` steps on the long side."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -103,8 +103,7 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Lines (m, 3) on a tool's surface between two corners (3,).
 
-    Sections across each axis are at the ends, where faces meet, and between on curved surfaces:
-    edges of a box, circles of a ball.
+    Sections across each axis: at the ends, where faces meet, and between on curved surfaces.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -184,7 +183,7 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections of slight bends."""
+    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and slight bends."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -214,9 +213,9 @@ def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarra
 
 
 class Front:
-    """Height of the surface nearest to the eye by cell, from projected points x (n, 3).
+    """Height nearest to the eye by cell, from projected points x (n, 3).
 
-    A point fills its cell and adjacent ones; up to twice as many `gaps` are closed.
+    A point fills adjacent cells; up to twice as many `gaps` are closed.
     """
 
     def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):

@@ -107,9 +107,9 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes, labels and colour bar, with points on top.
+    """Axes and colour bar, with points on top.
 
-    Matplotlib spends most time on axes, so their pixels are stored until the limits change.
+    Pixels of the axes, which take longest, are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -142,7 +142,7 @@ class Picture:
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark the ends of the colour bar that values exceed."""
+        """Mark ends that values exceed."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
         factor, name = self._lengths_as(name)
@@ -209,7 +209,7 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Draw lines around points (n, 3) of bodies, and around tools."""
+        """Lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
         self.title.set_text(text)
@@ -257,7 +257,7 @@ class Picture:
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Reserve room for the widest labels, so that nothing moves between pictures."""
+        """Reserve room for the widest labels."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         for _ in range(2):  # the aspect ratio moves the axes
@@ -292,7 +292,7 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Extend limits to the finite values, rounded outwards to 2^k / 8 to change rarely."""
+    """Extend limits to finite values, rounded outwards to 2^k / 8 to change rarely."""
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -533,7 +533,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Light on `some` points; a surface faces the side with fewer points."""
+        """A surface faces the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

@@ -1,4 +1,4 @@
-"""Tables of points: of a scene, of a range of ids, or of part of a block."""
+"""Tables of points."""
 
 from collections.abc import Callable, Iterator, Set
 from functools import partial
@@ -79,7 +79,7 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components), initial where laws lack it; None if no block has it."""
+        """A declared field (n, components), initial where laws lack it, or None."""
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -101,7 +101,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Arrays (copies; 0 for deleted points) and columns of points in order."""
+    """Copies of arrays (0 for deleted points) and columns in order."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -165,9 +165,9 @@ class PointTable:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """Sums N v (X - x), (n, d d), for transfers that store them, else None.
+        """Sums N v (X - x), (n, d d), for transfers that store them.
 
-        In the total frame, the arms X - x are F times the reference arms.
+        In the total frame, X - x is F times the reference arm.
         """
         rows = self._rows
         have = [
@@ -188,7 +188,7 @@ class PointTable:
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """A column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
+        """A column (n,) of existing points; 0 if the scene lacks it."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -245,7 +245,6 @@ def named_sets(hub: Scene) -> list[str]:
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
-    """1 for points (0-based, (n,)) of a group or solid, else 0."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -261,7 +260,7 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of positions if rates are stored, else half a step earlier."""
+    """Velocities (d, n) at the time of positions, or half a step earlier without rates."""
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
         return points.v
@@ -328,7 +327,7 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 
 
 def _total_stress(k: int, table: PointTable) -> np.ndarray:
-    """Stress of soil and water (n,), with the saturated fraction of p (Bishop 1959)."""
+    """Stress of soil and water (n,) (Bishop 1959)."""
     load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
     return table._exported[:, k] - load
 

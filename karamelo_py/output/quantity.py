@@ -88,7 +88,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Look the source up again, as the script may redefine a variable between runs."""
+        """The script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula
@@ -104,7 +104,7 @@ class Quantity:
 
 
 class Caption:
-    """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
+    """Text with ``{name}`` or ``{formula}`` for numbers, and ``{{`` for a brace."""
 
     PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathtext in dollars
 

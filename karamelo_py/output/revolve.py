@@ -1,4 +1,4 @@
-"""Points of a body of revolution in 3D: copies around its axis, y."""
+"""Copies of points around the axis y, in 3D."""
 
 from collections.abc import Callable
 
@@ -17,9 +17,9 @@ VECTORS = {
 def revolved(
     names: tuple[str, ...], column: Callable[[str], np.ndarray], angle: float
 ) -> list[np.ndarray]:
-    """Return columns (n,) of a copy at an angle from x to z, in 3D.
+    """Columns (n,) of a copy at an angle from x to z.
 
-    `column` gives the columns of the half plane. Positions and tensors also rotate by twist.
+    `column`: columns of the half plane. Positions and tensors also rotate by twist.
     """
     made: dict[str, np.ndarray] = {}
     twist = column("twist")

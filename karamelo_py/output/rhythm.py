@@ -15,7 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step from each multiple of `span` on; `passed` counts them."""
+    """`passed` counts multiples of `span`."""
 
     def __init__(self, span: float):
         self.span = span
@@ -40,7 +40,7 @@ class Rhythmic:
         self.write()
 
     def finish(self) -> None:
-        """Complete the files at the end of each run, including failed ones."""
+        """At the end of each run, also of a failed one."""
 
     @property
     def passed(self) -> int | None:
@@ -77,7 +77,7 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """First step that may be due; unless `fixed`, half of a longer interval, as steps may grow."""
+    """First step that may be due; half of long intervals unless `fixed`."""
     if not isinstance(every, ByTime):
         return (step // every + 1) * every
     left = ((every.now(time) + 1) * every.span - time) / dt

@@ -20,8 +20,7 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    Due are the first and last state of every run, and multiples of `every` in absolute steps or
-    time. No state is written twice to a file, and none in a rehearsal.
+    Due are the first and last state of runs, and multiples of `every` in absolute steps or time.
     """
 
     def __init__(self, hub: Scene):
@@ -84,7 +83,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write all output that is due; with `last`, everything not yet written."""
+        """Write what is due, or with `last` everything not yet written."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -117,7 +116,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Complete the outputs of an aborted run; errors become warnings."""
+        """Errors become warnings."""
         if self.hub.rehearsing:
             return
         try:
@@ -166,7 +165,7 @@ def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
+    """Whether `path`, whose first ``*`` becomes a number, can name `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -27,7 +27,7 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield snapshots from the `first` on; ScriptError if the file is no dump."""
+    """Yield snapshots from the `first` on; raises ScriptError."""
     readers: dict[str, Callable[[Path, int], Iterator[Snapshot]]] = {
         ".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd,
     }  # fmt: skip

@@ -1,9 +1,9 @@
-"""Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``, compiled.
+"""Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``.
 
-The nine digits of x are the rounded digits of x 10^k, in twice the precision of a double. They are
-undecided within `DOUBT` of a tie unless 10^k is exact (0 <= k <= 22). Python formats undecided and
-extreme numbers, and all without compilation or on big-endian machines. Surplus digits are written
-and overwritten, since mispredicted branches cost more.
+The nine digits of x are digits of x 10^k, in twice the precision of a double. They are undecided
+within `DOUBT` of a tie unless 10^k is exact (0 <= k <= 22). Python formats undecided and extreme
+numbers, and all without compilation or on big-endian machines. Surplus digits are overwritten,
+since mispredicted branches cost more.
 """
 
 import sys
@@ -42,7 +42,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Yield rows as text in blocks: integers, the rest with nine significant digits."""
+    """Yield rows in blocks: integers, the rest with nine digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -70,9 +70,8 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(table, start, text, at):
     """Write rows up to the first number that Python must format.
 
-    Returns the index of that number, or the count, and the end of the text. `table`: numbers (rows,
-    columns), the same memory as integers, and a mask of integer columns. `start`: index of the
-    first number, along the rows. `text` has `NUMBER_BYTES` per number.
+    Returns its index, or the count, and the end of the text. `table`: numbers (rows, columns), the
+    same memory as integers, a mask of integer columns. `text` has `NUMBER_BYTES` per number.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -108,7 +107,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write nine significant digits and return their end, or `at` if undecided."""
+    """Return the end of nine digits, or `at` if undecided."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)

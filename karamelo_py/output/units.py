@@ -87,9 +87,7 @@ def time_text(time: float, unit: str) -> str:
 
 
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
-    """Return factor and name of the largest metric unit in which `size`, in `unit`, is at least
-    0.1.
-    """
+    """Factor and name of the largest metric unit in which `size` is at least 0.1."""
     metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
     if unit not in metric or not size or 0.1 <= size < 1e4:
         return 1.0, unit

@@ -1,4 +1,4 @@
-"""VTKHDF files: HDF5 dumps for ParaView, as virtual arrays (VTK File Formats, VTKHDF 2.0)."""
+"""VTKHDF files: virtual arrays of HDF5 dumps, for ParaView (VTK File Formats, VTKHDF 2.0)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,10 +15,9 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write `path` with the ending .vtkhdf: views of the positions, columns and vectors in the
-    dump.
+    """Write `path` with the ending .vtkhdf: views of the dump's data.
 
-    Positions of deleted points are NaN, which VTK does not draw.
+    VTK does not draw deleted points, whose positions are NaN.
     """
     import h5py
 

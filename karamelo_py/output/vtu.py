@@ -1,7 +1,6 @@
 """Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-Rows arrive with all columns, but the file has one array after another: compressed blocks wait in
-temporary files.
+Rows arrive with all columns: compressed blocks wait in temporary files.
 """
 
 import sys
@@ -30,7 +29,7 @@ ARRAYS = {
 
 
 def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
-    """Arrays whose components are all among the columns `names`, or 0 in this dimension."""
+    """Arrays whose components are among `names`, or 0 in this dimension."""
 
     def vanishes(name: str) -> bool:
         axes = {"xyz123".index(axis) % 3 for axis in name[1:]}
@@ -82,7 +81,7 @@ class Column:
 
 
 class Vtu:
-    """Points with columns `names`, and cells; temporary files in `folder` are as large."""
+    """Points with columns `names`, and cells."""
 
     def __init__(self, names: Iterable[str], folder: Path):
         self.points = Column("Points", folder)

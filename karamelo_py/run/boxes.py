@@ -1,4 +1,4 @@
-"""Boxes and spans of nodes, and buffers for contributions of points."""
+"""Boxes and spans of nodes, and buffers for points."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ class Boxes(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """Pairs of a box and a tile of nodes that overlap."""
+    """Pairs of an overlapping box and tile of nodes."""
 
     box: np.ndarray  # (k,)
     tile: np.ndarray  # (k,)
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return list number and index in the list of each item of k lists."""
+    """List number and index of each item of k lists."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -128,13 +128,12 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def read_beside(nodes: Nodes) -> list[np.ndarray]:
-    """Return the arrays that must be zero next to nodes in use."""
+    """Arrays that must be zero next to nodes in use."""
     beside = field(nodes.fields, Acceleration)
     return summed(nodes) + ([] if beside is None else [beside])
 
 
 def beyond(contact: Tag) -> int:
-    """Return how many cells further contact reads sums."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
@@ -150,7 +149,7 @@ def give_up(array: np.ndarray) -> None:
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """Resize in place, since setups hold the array."""
+    """In place, since setups hold the array."""
     if len(array) < rows:
         forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -1,4 +1,4 @@
-"""One material point under prescribed strains and stresses, in plain Python."""
+"""One material point under prescribed strains and stresses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Targets at the end of a load path; other strains stay constant."""
+    """Final values; other strains stay constant."""
 
     increments: int
     duration: float
@@ -197,7 +197,7 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """d(Cauchy stress) / d(free strains) (n, m) of the last increment, engineering shear."""
+        """d(Cauchy stress) / d(free strains, engineering shear) (n, m) of the last increment."""
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
         return self._slopes(*self.last, ways)[: len(self.kin.symmetric_names)]
@@ -261,7 +261,7 @@ class Point:
     def _turned(self, angle: float, dt: float) -> np.ndarray:
         """dt grad v (3, 3) of a rotation about z that the law sees as rigid.
 
-        Skew to first order; to second order it depends on how the law computes strain and volume.
+        Skew to first order; the second order depends on the law's strain and volume.
         """
         if angle == 0:
             return np.zeros((3, 3))

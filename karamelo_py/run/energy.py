@@ -1,4 +1,4 @@
-"""The energy balance of a run: tracking, growth and losses."""
+"""The energy balance of a run."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ GROWING = 2  # windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name the source of work that is not tracked, or "".
+    """Name the source of untracked work, or "".
 
-    Loops sum the work of compiled hooks; Python fixes declare by `Fix.conserves` that they do no
-    other.
+    Python fixes declare by `Fix.conserves` that they do no untracked work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -133,13 +132,13 @@ class EnergyWatch:
         return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
-        """Fraction of the largest energy lost since the first step; negative: a gain."""
+        """Fraction of the largest energy lost since the first step; negative: gained."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
     def grown_little(self) -> bool:
-        """Return True if energy and last step show no fault in the present state."""
+        """True if the present state shows no fault."""
         watch, heat = self.watch, self.heat
         swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
         if swings or self.has_grown():

@@ -69,7 +69,7 @@ def _no_hook(m, v, star, force, *_):  # loops contain a call that is never made
 
 
 class StepsOnCard:
-    """Steps of a lowered scene on a GPU.
+    """Steps of a scene on a GPU.
 
     `program`: classes of the scheme and its visits; `hooks`: by row.
     """
@@ -179,7 +179,6 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
-        """Counting sort by cell, with prefix sums by chunks."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -400,7 +399,7 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Return the median time of each launch of a step."""
+        """Median times of launches."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

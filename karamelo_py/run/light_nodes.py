@@ -38,9 +38,9 @@ class _Line(NamedTuple):
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Return the stable step over h/c allowed by the nodes of all solids; inf if unknown.
+    """Stable step over h/c by the nodes of all solids; inf if unknown.
 
-    Rounded down to four digits, so that the order of sums does not matter.
+    Four digits, so that the order of sums does not matter.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
@@ -101,7 +101,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     root[root == 0] = inf
 
     def stiffness(u: np.ndarray) -> np.ndarray:
-        """Return M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
+        """M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
         u_of_points = (u / root[:, None])[at]
         gradient = np.stack([(u_of_points * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
         trace = np.trace(gradient, axis1=1, axis2=2)
@@ -134,7 +134,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
+    """Shear over P-wave modulus, at most 1/2."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -142,7 +142,7 @@ def _shear_share(law: Tag, kin: Tag) -> float:
 
 
 def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
-    """Largest eigenvalue of a symmetric operator, by Lanczos iteration."""
+    """Largest eigenvalue, by Lanczos iteration."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

@@ -1,4 +1,4 @@
-"""Events of a run, and the base class of its listeners."""
+"""Events of a run."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -37,10 +37,10 @@ class Listener:
         """Some steps succeeded."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain `status` (DONE: energy gain); `too_large`: the step, from the start."""
+        """Explain `status` (DONE: energy gain)."""
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """The run is over: from `first_step`, in `wall` seconds."""
+        """Steps from `first_step` on took `wall` seconds."""
 
     def signalled(self, number: int) -> None:
-        """A signal arrived: the run ends after the present steps."""
+        """The run ends after the present steps."""

@@ -1,4 +1,4 @@
-"""One run: steps in chunks, outputs when due, events for listeners."""
+"""One run: chunks of steps, output, events."""
 
 import signal
 import time
@@ -24,12 +24,12 @@ SECONDS_PER_CHUNK = 0.3  # for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
-    """A signal such as Ctrl-C ended the run; outputs are complete."""
+    """Outputs are complete."""
 
 
 @dataclass(eq=False)
 class RunLoop:
-    """Runs a scene for a number of steps, to a time, or by a condition.
+    """Runs a number of steps, to a time, or by a condition.
 
     With `halve`, a failure returns to the last good state and halves the step.
     """

@@ -1,4 +1,4 @@
-"""NaN and infinite values of a run, and the fix formula they come from."""
+"""NaN and infinite values of a run, and their source."""
 
 from collections.abc import Iterator
 

@@ -26,10 +26,10 @@ def alike(hooks: Tag, others: Tag) -> bool:
 
 
 class SimulationOnCard(Simulation):
-    """Takes the steps on a GPU; everything else runs on the CPU.
+    """Takes the steps on a GPU; the rest runs on the CPU.
 
-    `setup` fetches the arrays after steps, with points in GPU order and tiles out of date. Changes
-    on the CPU call `changed` or `sort`, to send arrays again.
+    `setup` fetches the arrays, with points in GPU order and tiles out of date. `changed` and `sort`
+    send them again.
     """
 
     states_every = 1000  # states must be fetched

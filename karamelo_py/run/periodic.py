@@ -1,4 +1,4 @@
-"""Periodic directions of a run: nodes a period apart, and points that return."""
+"""Periodic directions of a run."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def seam_of(s: Setup, domain: Domain) -> Seam:
 
 
 def return_points(s: Setup, domain: Domain) -> None:
-    """Move points outside by whole periods, only at steps that do not depend on restarts."""
+    """Move points by whole periods, at steps that do not depend on restarts."""
     if int(s.control.values[TIMESTEP]) % EVERY:
         return
     for block in s.blocks:

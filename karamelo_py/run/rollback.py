@@ -1,4 +1,4 @@
-"""Return to the last good state of a run, to halve the step or to end."""
+"""Return to the last good state of a run."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,11 +20,10 @@ RETURNS = 2  # per state before an energy gain; two halvings without effect are 
 
 
 class Stopped(ScriptError):
-    """A run failed on all processes; its last good state is written."""
+    """The last good state of the failed run is written."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Return what follows after `status` or `grown` energy."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -36,9 +35,9 @@ class RollBack:
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or a file's state, which may be `ruined`.
+        """Begin with the present state or a file's, which may be `ruined`.
 
-        `looks`: a condition may read parts' values between any two steps.
+        `looks`: a condition may read values between any two steps.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
@@ -135,10 +134,9 @@ class RollBack:
         return kept
 
     def _stop(self, status: int) -> NoReturn:
-        """Return to the last good state, write it, and raise the user's error.
+        """Write the last good state and raise the user's error.
 
-        Log and dumps end with the last faultless state. If the step was too large from the start,
-        only the initial state is good.
+        If the step was too large from the start, only the initial state is good.
         """
         simulation = self.simulation
         too_large = self.too_large and simulation.steps.too_large

@@ -209,7 +209,7 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile, after exchange with other processes."""
+        """Sort by tile, after exchange with other processes."""
         self.setup = self.domain.migrate(self.setup)
         domain = self.hub.domain
         if domain.periodic:
@@ -224,7 +224,6 @@ class SceneArrays:
             self.sort()
 
     def bring(self) -> None:
-        """Bring the whole state here, in the order of tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
         if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift
@@ -232,7 +231,7 @@ class SceneArrays:
             self.sort()
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes, unless a step has."""
+        """Unless a step has mapped the present state."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -249,7 +248,6 @@ class SceneArrays:
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy all arrays that a step changes; see `copied`."""
         self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 

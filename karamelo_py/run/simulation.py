@@ -39,7 +39,7 @@ TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # of deleted points
 
 
 class Simulation(SceneArrays):
-    """Steps a scene or one process's subdomain on the CPU.
+    """Steps a scene or subdomain on the CPU.
 
     See `run.on_card` for GPUs, `run.implicit.load_steps` for Newton's method.
     """
@@ -106,9 +106,9 @@ class Simulation(SceneArrays):
         self.steps.measured = self.energy_watch.followed = False
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
-        """Delete points (ascending ids) and return their mass and energy.
+        """Delete points (ascending ids); return their mass and energy.
 
-        The balance counts their energy as work.
+        The balance counts the energy as work.
         """
         group = ParticleGroup(self.hub)
         group.take([ids])
@@ -128,7 +128,7 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change their velocities and positions by block.
+        `prepare` may change velocities and positions by block.
         """
         if self.comm.leads:  # the next sort hands them over
             blocks = []
@@ -162,9 +162,9 @@ class Simulation(SceneArrays):
         return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
-        """Take up to `count` steps, at most to the end time; return DONE or why it stopped.
+        """Take up to `count` steps; return DONE or why it stopped.
 
-        Load steps call `between` with a progress message, and end if it returns True.
+        Load steps end if `between(progress)` returns True.
         """
         self.between = between
         self.control.motion[0].wrong = 0  # from earlier steps

@@ -1,4 +1,4 @@
-"""The stable step over h/c, and the default fraction of it."""
+"""The stable step over h/c, and its default fraction."""
 
 from math import inf, sqrt
 
@@ -51,7 +51,7 @@ def sparse(hub: Hub) -> bool:
 
 
 def keeping_share(hub: Hub) -> float:
-    """Return the largest fraction of the stable step that conserves a drifting body's energy.
+    """Largest fraction of the stable step that conserves a drifting body's energy.
 
     With FLIP, gradient jumps add energy to points that cross cells, about as the step cubed.
     Fractions from docs/energy.md: at most 10 % in 50 periods.
@@ -90,12 +90,12 @@ def _flows(law: Tag) -> bool:
 
 
 def lone_point(hub: Hub) -> float:
-    """Return the stable step over h/c of an isolated point that stores a moment.
+    """Stable step over h/c of an isolated point that stores a moment.
 
     Its pressure drives the stored velocity gradient L by dL/dt = -p / (rho D): an oscillator of
     frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c. If gradients are stored, sums of
-    |grad N|^2 / N replace 1 / D. Flowing material can isolate points; gas points then store no
-    moments (`kernels.equations.loss.in_company`).
+    |grad N|^2 / N replace 1 / D. Gas points store no moments then
+    (`kernels.equations.loss.in_company`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
@@ -110,10 +110,10 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """Return True if a drifting body is as stable and conservative as one at rest.
+    """True if drift costs neither stability nor energy.
 
-    So it is with cubic splines, and with usavg and a smooth basis (50 periods at 0.05 to 0.5 of the
-    wave speed, in 2D). Colliding disks fracture sooner with these steps.
+    Cubic splines, and usavg with a smooth basis (50 periods at 0.05 to 0.5 of the wave speed, in
+    2D). Colliding disks fracture sooner.
     """
     basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
@@ -128,10 +128,10 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """Return the weight of the common velocity in the default step; 1 in h/(c + |v|).
+    """Weight of the common velocity in the default step; 1 in h/(c + |v|).
 
     Boxes (ugimp, cpgimp), two or more per cell, gain more energy at higher speed at the edges of
-    shaken bars and blocks (0.05 to 0.5 of the wave speed).
+    shaken bodies (0.05 to 0.5 of the wave speed).
     """
     if bears_drift(hub):
         return 0.0
@@ -151,7 +151,7 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step over h/c; `longer` for points that stay in their cells."""
+    """Stable step over h/c; `longer` for points that stay in their cells."""
     update = hub.update
     total = not (update.scheme.traits.implicit or update.method.frame.moves)
     courant = _courant_of_scheme(hub, longer=longer)
@@ -163,7 +163,6 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
 
 
 def corrected_share(hub: Hub) -> float:
-    """Return the fraction of the stable step with corrected accelerations."""
     method = hub.update.method
     if not method.corrected:
         return 1.0
@@ -188,7 +187,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the stable step over h/c and the default fraction; `still` before points move."""
+    """Stable step over h/c and its default fraction; `still` before points move."""
     method, share = hub.update.method, keeping_share(hub)
     # Moment transfers are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
@@ -215,10 +214,9 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 
 
 def stable_conduction(hub: Hub) -> float:
-    """Return the smallest stable step of conduction in undeformed bodies.
+    """h^2 / (4 d) capacity / conductivity of undeformed bodies.
 
-    h^2 / (4 d) capacity / conductivity, half the bound of lumped finite elements, since points are
-    anywhere in a cell.
+    Half the bound of lumped finite elements, since points are anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf
@@ -234,7 +232,6 @@ def stable_conduction(hub: Hub) -> float:
 
 
 def ruling_limit(state: SceneState) -> str:
-    """Name the present limit of the step (docs/energy.md)."""
     step, motion = state.control.step[0], state.control.motion[0]
     dt, heat = state.control.values[DT], state.control.heat[0]
     if step.fixed_dt > 0:

@@ -20,7 +20,7 @@ class NodeAccess(Protocol):
 
 
 class SceneState(Protocol):
-    """The arrays of a scene, or of one process's subdomain, and their clock."""
+    """The arrays of a scene or subdomain, and their clock."""
 
     hub: Hub
     comm: SerialComm

@@ -1,4 +1,4 @@
-"""The step size: a policy per run, applied by the clock of the kernels."""
+"""The step size: a policy per run, applied by the clock."""
 
 from __future__ import annotations
 
@@ -30,8 +30,6 @@ NO_STRIDE = 1e9  # cells, further than points ever move
 
 
 class StepPolicy(NamedTuple):
-    """The steps of a run, chosen at its beginning."""
-
     still: tuple[float, float]  # stable step over h/c, fraction of it
     moving: tuple[float, float]
     weight: float  # of the common velocity
@@ -65,7 +63,7 @@ Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Last steps of motion and contact, and path, for the next lowering."""
+    """Last steps of motion and contact, and path."""
     step = control.step[0]
     return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
@@ -81,7 +79,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Chooses the steps; only this code writes them to the clock."""
+    """Only this code writes steps to the clock."""
 
     policy: StepPolicy
 
@@ -98,7 +96,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose the first step again after initial values are set."""
+        """Choose again after initial values are set."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
@@ -197,7 +195,7 @@ class StepSize:
 
     @property
     def limit_moving(self) -> float:
-        """Stable step of points that cross cells, the basis of a script's fractions."""
+        """Stable step of points that cross cells, to which a script refers."""
         step, rate = self.step, self.motion.rate
         waves = step.courant_moving * step.spacing / rate if rate > 0 else np.inf
         return float(min(waves, self.control.heat[0].heat_limit))
@@ -208,7 +206,7 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """True if the step exceeded the stability limit from the start."""
+        """The step exceeded the stability limit from the start."""
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:

@@ -1,4 +1,4 @@
-"""Tiles of grids, to sort points and to sum at nodes on threads."""
+"""Tiles of grids, to sort points and to sum on threads."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -54,7 +54,7 @@ DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts points by tile, and finds the nodes that each tile may reach."""
+    """Sorts points by tile, and finds the nodes in reach."""
 
     threads = 1
     mode: Serial | Threaded = Serial()
@@ -132,14 +132,14 @@ class Tiles:
                     array[: self.rows] = 0
 
     def unsort(self, control: Control, *, limit: float | None = None) -> None:
-        """Sort the points before the next step; `limit` replaces the drift limit."""
+        """Sort before the next step; `limit` replaces the drift limit."""
         motion = control.motion[0]
         motion.drift = np.inf
         if limit is not None:
             motion.drift_limit = limit
 
     def sort(self, s: Setup) -> None:
-        """Sort all points by tile, find the nodes in use, and zero the sums at all others."""
+        """Sort by tile, find nodes in use, and zero the sums at others."""
         before = grid_boxes.used(s.spans)[1:].copy()
         motion = s.control.motion[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (MOST_DRIFT, SORT_STEPS)
@@ -245,10 +245,9 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Return spans and ranges of nodes in boxes, and the parts to sum.
+        """Spans and ranges of nodes in boxes, and the parts to sum.
 
-        Nodes go with the points that reach most of them, whose thread has the contributions in its
-        cache.
+        Nodes go to the thread whose points reach most of them, for its cache.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
@@ -281,10 +280,9 @@ class Tiles:
         return grid_boxes.joined_spans(local), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """Return the first tile of nodes (n,) in the same set as each.
+        """First tile of nodes (n,) in the same set.
 
-        Long tiles join tiles in the same rows: access with gaps of some thousand bytes is twice as
-        slow.
+        Long tiles join those in the same rows: gaps of some thousand bytes are twice as slow.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -377,15 +375,12 @@ class HasSetup(Protocol):
 
 
 class WholeDomain:
-    """All tiles on one process; `mpi.subdomain` divides them."""
-
     parted = False
 
     def __init__(self, simulation: HasSetup):
         self.simulation = simulation
 
     def migrate(self, s: Setup) -> Setup:
-        """Hand points to the process of their tile."""
         return s
 
     def share_memory(self) -> None:
@@ -422,7 +417,7 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Divide used nodes (n, 10) of tiles into SHARES sets (n,) of about equal numbers of nodes.
+    """Sets (n,) of tiles with about equal numbers of used nodes (n, 10).
 
     Neighbours with equal `beside` (n,) get the same set.
     """
@@ -440,7 +435,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Return the beginnings (size,) of about equal sets of tiles with point ranges (T, 2)."""
+    """Beginnings (size,) of about equal sets of tiles with point ranges (T, 2)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
@@ -450,6 +445,6 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
 
 
 def one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Shift ranges (k, 2) so that each begins at the end of the one before."""
+    """Shift ranges (k, 2) to follow each other."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)

@@ -1,4 +1,4 @@
-"""Seconds that a run spends on compilation, steps and output."""
+"""Seconds of compilation, steps and output."""
 
 import time
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ def _clocks() -> np.ndarray:
 
 
 class Timings:
-    """Seconds of a run: (2,) elapsed, and CPU time of all threads."""
+    """Seconds (2,): elapsed, and CPU time of all threads."""
 
     def __init__(self, hub: Hub):
         self.hub = hub

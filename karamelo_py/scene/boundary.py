@@ -1,4 +1,4 @@
-"""Points at the edge of the domain stop the run, are deleted or are reflected."""
+"""Points at the edge of the domain."""
 
 from collections.abc import Callable
 from typing import Any
@@ -30,9 +30,9 @@ RESTRICTIONS = {
 
 
 def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
-    """Delete points that left the domain in a failed step, whose start `repeat` restores.
+    """Delete points that left in a failed step, whose start `repeat` restores.
 
-    The result depends on the state only, not on threads or on how a run is divided.
+    The result does not depend on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -58,7 +58,7 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
 
 
 def take_away(hub: Scene, ids: np.ndarray, mark: Mark | None) -> tuple[float, float]:
-    """Delete points (ids, ascending); return mass and energy, negative work in the balance."""
+    """Delete points (ascending ids); return mass and energy."""
     simulation = hub.simulation
     for body, fix in moved(hub).items():
         if np.any((ids >= body.first_id) & (ids < body.first_id + body.count)):

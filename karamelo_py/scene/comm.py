@@ -1,4 +1,4 @@
-"""Signals, and communication of one process (:mod:`karamelo_py.run.mpi.comm`: several)."""
+"""Signals, and communication of one process (several: :mod:`karamelo_py.run.mpi.comm`)."""
 
 import signal
 import threading
@@ -70,7 +70,7 @@ class SerialComm:
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Words (size,) of all processes; None if one is late by `patience` seconds."""
+        """Words (size,); None if one is late by `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: T | None = None) -> Any:
@@ -83,7 +83,7 @@ class SerialComm:
         return [thing]
 
     def everyone(self, request: str, thing: T) -> list[T]:
-        """Gather objects of the same `request`, else raise ScriptError."""
+        """Gather objects; raises ScriptError for different requests."""
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(

@@ -1,4 +1,4 @@
-"""The domain: bounding box of the scene and its background grid."""
+"""The domain and its background grid."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -26,8 +26,8 @@ THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 class Domain:
     """A box with a grid of square cells from its lower corner.
 
-    The grid extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and
-    `hi` (3,) are 0 in unused directions. Without `h` the first solid sets the cell size.
+    It extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and `hi`
+    (3,) are 0 in unused directions. Without `h` the first solid sets it.
     """
 
     thin = False
@@ -60,18 +60,17 @@ class Domain:
         return round((self.hi[k] - self.lo[k]) / (self.h or 1.0))
 
     def with_images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ends (3,) of the grid: beyond the domain in periodic directions."""
+        """Ends (3,) of the grid, beyond the domain in periodic directions."""
         more = np.zeros(3)
         more[list(self.periodic)] = GHOSTS * (self.h or 0.0)
         return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Factor of volumes at `x` (n, d): thickness, or length or area per angle."""
+        """Thickness, or length or area per angle, at `x` (n, d)."""
         hoops = self.kin.hoops
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of `x` (n, >= dimension) in the closed box."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance

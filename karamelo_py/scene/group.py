@@ -1,4 +1,4 @@
-"""Groups of points or nodes for fixes, computes and dumps."""
+"""Groups of points or nodes."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -22,8 +22,8 @@ NOTHING_THERE = "fixes of this group have no effect there"
 class AnyGroup(Named):
     """A group of points or nodes; `all` includes later ones.
 
-    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, members other than
-    `all`; and ``add(region, solids)``, which returns the number added (0: region not known yet).
+    Subclasses have ``total()``, ``chosen()``, the members other than `all`, and ``add(region,
+    solids)``, which returns the number added (0: region unknown).
     """
 
     kind = ""
@@ -106,7 +106,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Membership of `count` points, one bit each, in whole 64-bit words."""
+        """One bit per point, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -148,7 +148,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by position, stored as a definition: later grids have members, too."""
+    """Nodes by definition: later grids have members, too."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
@@ -181,7 +181,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """Refuse a group that looks like a wall past an upper edge."""
+        """A wall past an upper edge would have no effect."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -217,7 +217,7 @@ class NodeGroup(AnyGroup):
 
 
 def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:
-    """Nodes inside the periodic cell, with those a period apart; ascending."""
+    """Nodes inside the periodic cell, and a period apart; ascending."""
     places = lattice.places(numbers)
     for k in domain.periodic:
         period = domain.cells_of_period(k)

@@ -1,4 +1,4 @@
-"""Memory of this machine, and of a job on it."""
+"""Memory of this machine or job."""
 
 import warnings
 from collections.abc import Callable
@@ -29,16 +29,16 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes, swap included; `free` omits caches that the system does not report (ZFS)."""
+    """Bytes, swap included."""
 
     free: float
     whole: float
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Return the memory with caches and swap; None if the system does not report it.
+    """Memory with caches and swap; None if unknown.
 
-    Limits of the machine, containers and jobs (cgroups) and processes (ulimit -v) count.
+    Limits of machine, containers, jobs (cgroups) and processes (ulimit -v) count.
     """
     import psutil
 
@@ -136,10 +136,10 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Return the room for points whose law has `state` state variables.
+    """Room for points with `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers, and in the last
-    good state a position, a velocity and the state again.
+    A point has two positions, a velocity, a mass, the state and three integers; the last good state
+    has a position, a velocity and the state.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

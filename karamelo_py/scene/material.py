@@ -1,4 +1,4 @@
-"""Named materials and their parts: entries of catalogues."""
+"""Named materials and their parts."""
 
 from typing import Any, NamedTuple
 
@@ -7,9 +7,9 @@ from karamelo_py.language.arguments import Named
 
 
 class MaterialPart(Named):
-    """A named law or component of a law, of a `kind` such as ``eos`` and a `style`.
+    """A law or component of a law, of a `kind` such as ``eos``.
 
-    `made` is the law, or `laws` by kind if the style has several; `given` are its arguments.
+    `made` is the law, or `laws` by kind if there are several; `given` are its arguments.
     """
 
     def __init__(

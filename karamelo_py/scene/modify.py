@@ -165,9 +165,9 @@ class Fix(Publisher):
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mask (m, k) of prescribed components of `nodes` at `x` (m, d), and values.
+        """Mask (m, k) and values of prescribed components of `nodes` at `x` (m, d).
 
-        Implicit schemes call this instead of hooks. Default: `formulas`.
+        Implicit schemes call this instead of hooks.
         """
         acts = np.isin(nodes, self.nodes)
         mask = np.outer(acts, [formula is not None for formula in self.formulas])
@@ -178,7 +178,7 @@ class Fix(Publisher):
         return mask, values
 
     def points_within(self) -> np.ndarray | None:
-        """Numbers of the points of the group on which the fix acts; None: all."""
+        """Members on which the fix acts; None: all."""
         return None
 
     def defined(self) -> None:
@@ -223,10 +223,10 @@ def _is_nothing(formula: Expression | None) -> bool:
 def per_direction(
     hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False, around: bool = False
 ) -> tuple:
-    """Require one formula (or NULL, unless `all_given`) per direction of the domain.
+    """Require one formula (or NULL, unless `all_given`) per direction.
 
-    Further components may be NULL or zero, as in published inputs. With `around`, a third component
-    acts around the axis of bodies that twist.
+    Further ones may be NULL or zero, as in published inputs. With `around`, a third component acts
+    around the axis of bodies that twist.
     """
     domain = hub.require_domain()
     d, twists = domain.dimension, isinstance(domain.kin, Twisted)

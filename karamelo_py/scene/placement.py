@@ -1,4 +1,4 @@
-"""Fill regions with points, cell by cell in the same pattern."""
+"""Fill regions with points in a pattern per cell."""
 
 import math
 from bisect import bisect_right
@@ -24,7 +24,7 @@ _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Points and initial domains; values equal for all points may be scalars."""
+    """Values equal for all points may be scalars."""
 
     x0: Any  # (n, d) positions: array or Filled
     volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D); without the radius
@@ -38,7 +38,7 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Selected positions (n, d) in a box of cells, computed on request from bits."""
+    """Positions (n, d) in a box of cells, computed from bits."""
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip
@@ -64,7 +64,7 @@ class Filled:
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Numbers (n,) of the positions `step` (n, d) away in the regular pattern, or -1."""
+        """Positions (n,) `step` (n, d) away in the regular pattern, or -1."""
         cell, index_in_cell = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
@@ -122,10 +122,10 @@ def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Latt
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of `ppc` points along a unit cell, from its centre, and lengths: (ppc,).
+    """Positions of `ppc` points along a unit cell, and lengths: (ppc,).
 
-    ``gauss``: Gauss-Legendre. The default is Karamelo's: equally spaced, but for 3 its rounded
-    Gauss points with equal lengths.
+    ``gauss``: Gauss-Legendre. Karamelo's default: equally spaced, but for 3 rounded Gauss points
+    with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -158,7 +158,7 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Fill a region in chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
+    """Chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(

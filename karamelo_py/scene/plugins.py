@@ -1,4 +1,4 @@
-"""Checks of a scene's parts, and attribution of exceptions to plug-ins."""
+"""Checks of parts, and exceptions of plug-ins."""
 
 import inspect
 import linecache
@@ -309,7 +309,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert exceptions in plug-in code to ScriptErrors that name the part (else `usual`)."""
+    """Convert exceptions to ScriptErrors that name the plug-in (else `usual`)."""
     try:
         yield
     except faults.KNOWN:

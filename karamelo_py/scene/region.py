@@ -1,4 +1,4 @@
-"""Base class of regions: inside test, bounding box, inversion."""
+"""Base class of regions."""
 
 import math
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ class Region(Named):
 
     @property
     def sheet(self) -> np.ndarray | None:
-        """Simplices (m, d, d) of a named set of faces, without volume."""
+        """Simplices (m, d, d) of a named set of faces."""
         return None
 
     @property
@@ -87,15 +87,14 @@ class Region(Named):
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of `x` (n, >= d) in the region."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Distance (n,) of `x` (n, >= d) from the surface, negative outside; ignores `exterior`.
+        """Distance (n,) of `x` (n, >= d) from the surface, negative outside, without `exterior`.
 
-        A lower bound, up to `reach`; linear near plane parts of the surface. The default tests
-        `contains` along the axes, and misses shapes thinner than `reach`.
+        A lower bound up to `reach`, linear near plane parts. The default tests `contains` along the
+        axes, and misses shapes thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -112,7 +111,7 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
-        """Mask (n,) of positions where the surface of `other` is this one, if known."""
+        """Mask (n,) of positions where `other` has the same surface, if known."""
         return None
 
     def shape(self) -> Any:
@@ -150,7 +149,6 @@ def check_radius(radius: float, **where: Any) -> None:
 
 
 def below(x: np.ndarray, centre: Sequence[float], axes: Sequence[int], radius: float):
-    """Depth (n,) below the surface of a ball or cylinder."""
     square = np.zeros(len(x))
     for axis, middle in zip(axes, centre, strict=True):
         square += (x[:, axis] - middle) ** 2

@@ -1,4 +1,4 @@
-"""Columns of numbers in users' files, or arrays of a Python program."""
+"""Columns of numbers in files, or arrays from Python."""
 
 import re
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Script argument: columns of a file or dump, or of arrays passed to `Simulation`."""
+    """Script argument: a file or dump, or arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 
@@ -64,9 +64,9 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_xyz(path: Path) -> dict[str, np.ndarray]:
-    """Last frame of an .xyz file: positions, velocities and masses.
+    """Last frame of an .xyz file.
 
-    Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
+    Rows are an element, x, y, z, or the Properties of extended XYZ.
     """
     lines = read_text(path).rstrip().splitlines()
     begin, first = 0, 0
@@ -97,10 +97,7 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Columns separated by commas, semicolons or blanks; # begins a comment line.
-
-    The first row names them, else "1", "2", ...
-    """
+    """Columns by commas, semicolons or blanks, named by the first row, else "1", "2", ..."""
     rows = []
     try:
         lines = read_text(path).splitlines()

@@ -1,4 +1,4 @@
-"""Rasters of heights (ESRI ASCII grids and GeoTIFF), profiles, and their skins."""
+"""Rasters of heights (ESRI ASCII grids, GeoTIFF), and profiles."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class HeightsFile(InputFile):
 
 
 class Raster(NamedTuple):
-    """Heights (ny, nx) at the centres of square cells, rows from the south; NaN where unknown."""
+    """Heights (ny, nx) at the centres of square cells, from the south; NaN: unknown."""
 
     corner: np.ndarray  # (2,) lower corner
     cell: float
@@ -99,7 +99,7 @@ def read_profile(path: Path) -> np.ndarray:
 
 
 def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.ndarray:
-    """Return segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
+    """Segments (m, 2, 2) around the ground, counter-clockwise."""
     x, z = np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([z[:1], z, z[-1:]])
     corners = np.column_stack([np.append(x, ends)[::-1], np.append(z, [bottom] * 2)[::-1]])
     corners[:2] = corners[1::-1]  # the bottom from left to right
@@ -107,7 +107,7 @@ def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.n
 
 
 def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.ndarray:
-    """Return outward triangles (m, 3, 3) around the ground below heights (ny, nx)."""
+    """Outward triangles (m, 3, 3) around the ground below heights (ny, nx)."""
     ny, nx = z.shape
     top = np.stack([*np.meshgrid(x, y), z], axis=2)
     low = top.copy()

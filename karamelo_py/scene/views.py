@@ -1,4 +1,4 @@
-"""Views of nodes and points for Python hooks, with a row per node or point of the group.
+"""Views of nodes and points for Python hooks.
 
 Changes are written back when the hook returns; other fields are read-only.
 """
@@ -186,7 +186,7 @@ class NodesView(View):
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over the group's nodes of all processes."""
+        """Sum terms (n,) or (n, k) over all processes."""
         terms = np.asarray(terms, float)
         local = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.points.summed(terms[local])
@@ -238,7 +238,7 @@ class NodesView(View):
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d) before the momentum update, or those that deform the points."""
+        """Velocities (n, d) before the momentum update, or those that deform points."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -256,7 +256,7 @@ class NodesView(View):
 
     @Shown
     def velocity_update(self) -> np.ndarray:
-        """Velocities v* (n, d) after the momentum update (``post_update_grid_state``)."""
+        """v* (n, d) after the momentum update (``post_update_grid_state``)."""
         return self._vectors("velocity" if self._on_velocity else "update")[self.index]
 
     @velocity_update.writer
@@ -272,8 +272,8 @@ class NodesView(View):
 class PointsView(View):
     """Points of a group at one stage of a step, ordered by id.
 
-    With `Fix.point_by_point`, these are local points in storage order, with read-only positions,
-    and before the first step (`in_steps` False) only some at a time.
+    With `Fix.point_by_point`, local points in storage order, with read-only positions, before the
+    first step (`in_steps` False) only some at a time.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -311,7 +311,7 @@ class PointsView(View):
         return numbers
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
+        """Exact sum of terms (n,) or (n, k) over the group; collective."""
         if not self._in_steps:
             raise ValueError(
                 "points.total(terms) is known only in steps; before the first, points come in "
@@ -350,7 +350,7 @@ class PointsView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """Positions (n, d); corners of convected domains move with the points."""
+        """Positions (n, d); corners of convected domains follow."""
         return self._rows.take(self._place)
 
     @position.writer
@@ -395,10 +395,10 @@ class PointsView(View):
         return self._rows.take(_declared(kind, "point", NO_HEAT))[:, 0]
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
-        """Set the velocity gradient of points that store one (APIC, TPIC ...).
+        """Set stored velocity gradients (APIC, TPIC ...).
 
         ``gradient(moves, step)`` returns derivatives (n, d) of a velocity `component` in grid
-        coordinates (reference positions if not `moves`); `step` is much smaller than a cell.
+        coordinates (reference positions if not `moves`).
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -421,7 +421,7 @@ class PointsView(View):
             kept[here, rows] = moment[here]
 
     def set_stress(self, components: dict[str, np.ndarray]) -> None:
-        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
+        """Set Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
         columns = [components.get(name, 0.0) for name in names]
@@ -437,11 +437,11 @@ class PointsView(View):
         self.impose(impose_temperature, values)
 
     def ignite(self, since: np.ndarray) -> None:
-        """Light explosives, times (n,) ago; below 0 later."""
+        """Times (n,) ago; below 0 later."""
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` with numbers (n,) of points with this `law`."""
+        """Call ``kernel(matter, rows, numbers)`` for points with this `law`."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -450,7 +450,7 @@ class PointsView(View):
             kernel(arrays.matter_of(s.kin, block), np.asarray(rows), numbers)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
-        """Set a dump column (n,): position, velocity, stress, T, or a declared field."""
+        """Set position, velocity, stress, T, or a declared field (n,)."""
         d, hub = self._simulation.kin.dimension, self._simulation.hub
         attribute, k = VECTORS.get(name, ("", 0))
         kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
@@ -502,9 +502,9 @@ def set_columns(
     ids: np.ndarray | None = None,
     mark: Mark | None = None,
 ) -> None:
-    """Set columns of points (ids from 0, by default all) between steps, to numbers or (n,).
+    """Set columns of points (ids from 0) between steps, to numbers or (n,).
 
-    Raises ScriptError for derived columns, wrong shapes and values that are not finite.
+    Raises ScriptError for derived columns, wrong shapes and infinite values.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

@@ -1,4 +1,4 @@
-"""Evaluate expression trees to numbers, texts and formulas."""
+"""Evaluate expression trees."""
 
 import math
 from collections.abc import Callable
@@ -72,7 +72,7 @@ def _inverse_normal(p: Expression) -> Expression:
 
 
 class NameScope(Protocol):
-    """Resolves names and calls of commands; a variable `hides` a function of its name."""
+    """A variable `hides` a function of its name."""
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
 

@@ -1,7 +1,6 @@
-"""Values of expressions: numbers, texts, and formulas.
+"""Numbers, texts, and formulas.
 
-An operation with a variable operand (position, time, published value) gives a formula, with
-constants folded.
+Operations with a position, time or published value give formulas, with constants folded.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ CHUNK = 1 << 18  # points per evaluation
 class Expression:
     """A number, or a formula of positions, time and published values.
 
-    `names` are its seeds: some of x y z x0 y0 z0, time timestep dt, published names.
+    `names`: some of x y z x0 y0 z0, time timestep dt, published names.
     """
 
     __slots__ = ("names", "operands", "operation", "size", "value")
@@ -86,11 +85,10 @@ class Expression:
         return f"Expression({self.text})"
 
     def is_like(self, other: Expression) -> bool:
-        """Return True if both are visibly the same number everywhere."""
         return terms.alike(self, other)
 
     def evaluate(self, values: Values) -> float:
-        """Return the present number; ScriptError for a formula of positions."""
+        """Raises ScriptError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
@@ -109,7 +107,7 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Evaluate (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
+        """Values (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 

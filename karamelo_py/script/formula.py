@@ -1,8 +1,7 @@
-"""Formulas as stack programs, evaluated over blocks of points.
+"""Formulas as stack programs over blocks of points.
 
-The evaluator loops over a block for each operation; no formula is compiled. Instructions with the
-flag `UNIFORM` compute a value common to the block, which `SPREAD` expands to a row. Common
-subexpressions are stored in rows after the stack.
+The evaluator loops over a block for each operation. Instructions with the flag `UNIFORM` compute a
+value common to the block, which `SPREAD` expands. Common subexpressions are rows after the stack.
 """
 
 from typing import NamedTuple
@@ -76,7 +75,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise the first `n` numbers of `a`, as `_power` does, branch-free if all exponents agree."""
+    """As `_power`, for `n` numbers of `a`; branch-free if exponents agree."""
     power = b[0]
     same = True
     for i in range(n):
@@ -94,10 +93,9 @@ def _powers(n, a, b):
 
 @kernel
 def evaluate(program, globals_, points, count, out, stack):
-    """Evaluate a program at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
+    """Evaluate at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
-    `globals_` are published values, `out` (BLOCK,) gets the results, `stack` (ROWS, BLOCK) is
-    scratch.
+    `out` (BLOCK,): results; `stack` (ROWS, BLOCK): scratch.
     """
     code, constants = program
     top = -1
@@ -142,7 +140,7 @@ def evaluate(program, globals_, points, count, out, stack):
 
 
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
-    """Evaluate the program code[begin:end] with constants[first:last].
+    """Evaluate code[begin:end] with constants[first:last].
 
     The first rows of `scratch` are the points, the last the stack; results go to row `result`.
     """

@@ -1,4 +1,4 @@
-"""Explain syntax errors: characters, quotes and parentheses, then expressions.
+"""Explain syntax errors.
 
 Lark's parser, fed token by token, shows where it stopped and with which stack.
 """
@@ -96,9 +96,9 @@ def _type(symbol: Any) -> str:
 
 
 class _Stop(NamedTuple):
-    """Tokens before and at the parser's stop, and its stack.
+    """Tokens before and at the parser's stop.
 
-    `here` is a character that starts no token, a token, or None at the end.
+    `here` is a character, a token, or None at the end.
     """
 
     code: str

@@ -1,4 +1,4 @@
-"""The operations of formulas: one table of number functions, for kernels and Python."""
+"""The operations of formulas, for kernels and Python."""
 
 import functools
 import math
@@ -10,7 +10,7 @@ from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 @noinline
 def _whole(a, down, up):
-    """Round to an integer by sums, which every processor has."""
+    """Round by sums, which every processor has."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -51,7 +51,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Use products for small integer exponents: pow costs ten multiplications."""
+    """Products: pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
@@ -116,7 +116,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """Apply an operation like floating-point hardware: inf or NaN, no exceptions."""
+    """As hardware does: inf or NaN, no exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))

@@ -1,4 +1,4 @@
-"""Parse text as statements and expression trees, by Lark (script.lark, expression.lark)."""
+"""Parse text by Lark (script.lark, expression.lark)."""
 
 import hashlib
 import marshal
@@ -25,7 +25,7 @@ _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Parse statements; arguments of calls stay unparsed.
+    """Arguments of calls stay unparsed.
 
     The first syntax error has further ones in `others`, and correct statements in `statements`.
     """
@@ -101,7 +101,7 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """Return the raw arguments of a call; `parts` alternates spans (None: empty) and commas."""
+    """`parts` alternates spans (None: empty) and commas."""
     if parts == [None]:
         return []
     raws = []
@@ -137,9 +137,9 @@ def refused() -> type[Exception]:
 
 @cache
 def parser_of(start: str) -> Any:
-    """Return the parser of statements or of expressions.
+    """Parser of statements or expressions.
 
-    Lark takes 0.06 s for each, 0.01 s from tables cached on disk. Cache errors are ignored.
+    Lark takes 0.06 s for each, 0.01 s from tables cached on disk.
     """
     import lark
     from lark.grammar import Rule
@@ -197,7 +197,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 
 
 class _TreeBuilder:
-    """Builds statement spans and expression trees while Lark parses, by grammar rule."""
+    """Spans and trees by grammar rule, while Lark parses."""
 
     def script(self, parts: list) -> list:
         return [item for item in parts if isinstance(item, tuple)]

@@ -14,7 +14,7 @@ _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
 class Source:
-    """The text of a script file; converts offsets to marks."""
+    """Converts offsets to marks."""
 
     def __init__(self, text: str, file: str):
         self.text = text
@@ -34,7 +34,7 @@ class Source:
         return Mark(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Return characters from `start` to before `end`, comments and line ends blanked."""
+        """Characters, with comments and line ends blanked."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -45,7 +45,7 @@ class Source:
 
 @dataclass(eq=False)
 class Mistake(Exception):
-    """A syntax error at offsets of a text that has no file yet."""
+    """A syntax error at offsets of a text."""
 
     message: str
     start: int
@@ -89,7 +89,7 @@ class UnaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """`left` `operator` `right`; operators are always spelled ``^ && ||``."""
+    """Operators are always spelled ``^ && ||``."""
 
     operator: str
     left: Node
@@ -125,7 +125,7 @@ class Statement:
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """Return the statement without blanks, comments, line ends and the keywords `without`."""
+        """Without blanks, comments, line ends and keywords `without`."""
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

@@ -1,4 +1,4 @@
-"""Trees of formulas (numbers, names, operations): order, value, text and program."""
+"""Trees of formulas: order, value, text and program."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -31,7 +31,7 @@ _PRECEDENCE = {
 
 
 class Term(Protocol):
-    """A number, a seed's name, or an operation on terms (:class:`expressions.Expression`)."""
+    """A number, a seed's name, or an operation (:class:`expressions.Expression`)."""
 
     operation: str
     value: Any
@@ -95,7 +95,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Return True if a term can be written out with its common subterms repeated."""
+    """Whether a term can be written with subterms repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -137,12 +137,12 @@ _MOST_LEVELS = 60
 
 
 def program(root: Term, push: Callable[[str], tuple[int, int]]) -> formula.Program:
-    """Compile a term to a stack program; `push` returns the instruction and index of a name."""
+    """`push` returns the instruction and index of a name."""
     return _Writer(root, push).program()
 
 
 class _Writer:
-    """Compiles one program; equal terms have the same number."""
+    """Equal terms have the same number."""
 
     def __init__(self, root: Term, push: Callable[[str], tuple[int, int]]):
         self.push = push

@@ -1,4 +1,4 @@
-"""Published values: named numbers that formulas, logs and plots read during a run."""
+"""Published values, by name."""
 
 from collections.abc import Sequence
 
@@ -12,13 +12,12 @@ SUFFIXES = ("x", "y", "z", "s", "")
 
 
 def in_a_row(suffixes: Sequence[str]) -> bool:
-    """Return True if the slots of `suffixes` are consecutive."""
     places = [SUFFIXES.index(suffix) for suffix in suffixes if suffix in SUFFIXES]
     return not places or places == list(range(places[0], places[0] + len(suffixes)))
 
 
 class Values:
-    """Named numbers in one array that kernels read and write.
+    """Named numbers in an array that kernels read and write.
 
     It is never reallocated. Slots 0, 1 and 2 are time, timestep (the number of the step) and dt.
     """
@@ -45,8 +44,8 @@ class Values:
     def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES, *others: str) -> None:
         """Publish ``ID_x`` for "x" and so on, ``ID`` for "".
 
-        ``ID_x``, ``ID_y``, ``ID_z``, ``ID_s`` have consecutive slots, named or not; so do other
-        suffixes. Earlier names of the ID that `suffixes` and `others` lack are removed.
+        Slots of x, y, z, s are consecutive, named or not; so are other suffixes. Earlier names that
+        `suffixes` and `others` lack are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
@@ -68,9 +67,9 @@ class Values:
         self._of[ID] = slots
 
     def publish_torque(self, ID: str) -> None:
-        """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin of ``ID_x``, ...
+        """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin.
 
-        For contact between two solids, ``ID_t2x``, ... is the torque on the second one.
+        ``ID_t2x``, ... act on the second of two solids.
         """
         first = self._first[ID]
         if not self.torques[first]:
@@ -79,7 +78,7 @@ class Values:
             self._slots[f"{ID}_{suffix}"] = int(self.torques[first]) + k
 
     def torque_of(self, ID: str) -> np.ndarray:
-        """Return the torque of ``ID`` to be read or set, (6,), or (0,) if no compute needs it."""
+        """Torque (6,) to be read or set, or (0,) if no compute needs it."""
         slot = int(self.torques[self._first[ID]])
         return self.array[slot : slot + 6 * bool(slot)]
 

@@ -1,4 +1,4 @@
-"""Region styles mesh and stl, solid style mesh: shapes from mesh files."""
+"""Shapes from mesh files."""
 
 from collections import Counter
 from pathlib import Path
@@ -43,7 +43,7 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
 
 
 def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> None:
-    """Warn of a shape much larger or smaller than the domain, probably in other units."""
+    """Warn of a shape probably in other units than the domain."""
     domain, used = hub.require_domain(), slice(len(lo))
     size, room = float((hi - lo).max()), float((domain.hi - domain.lo)[used].max())
     if CELLS * (domain.h or 0.0) < size < OUT * room:
@@ -153,7 +153,7 @@ class MeshRegion(Enclosed):
 
 
 class Near(Region):
-    """All positions whose cell contains part of a set of faces, edges or nodes."""
+    """Positions whose cell contains part of a set of faces, edges or nodes."""
 
     def __init__(self, region: MeshRegion):
         d = region.dimension
@@ -167,7 +167,7 @@ class Near(Region):
 
 
 def near_set(hub: Hub, name: str, file: Path, group: str | int) -> Region:
-    """Return a set of elements, or the positions within half a cell of faces, edges or nodes."""
+    """Elements, or positions within half a cell of faces, edges or nodes."""
     region = MeshRegion(hub, file, group)
     chosen = Near(region) if region.flat else region
     chosen.id = f"{name} ({file.name})"

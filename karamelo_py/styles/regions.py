@@ -1,4 +1,4 @@
-"""Region styles block, cylinder, sphere, plane; union, intersection, difference of regions."""
+"""Region styles block, cylinder, sphere, plane; combinations."""
 
 import math
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of shapes with an exact depth: planes across some axes, round across the others."""
+    """Planes across some axes, round across the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
     across: Sequence[int] = ()  # axes across which it is round
@@ -223,7 +223,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """Return None: the domain cuts off part of a half-space."""
+        """The domain cuts off part of a half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)

@@ -1,4 +1,4 @@
-"""Region style heights: the ground below a raster or a profile."""
+"""Region style heights."""
 
 from typing import Any, Literal
 
@@ -34,7 +34,7 @@ class Heights(Enclosed):
 
     Notes
     -----
-    Heights are those of the centres of cells; between four centres the surface has two triangles,
+    Heights are at the centres of cells; between four centres the surface has two triangles,
     and it is level beyond the outer ones. The raster must cover the domain. A landslide is the
     difference of two such regions, the initial surface and the slip surface. fix contact/surface
     makes the ground a wall with friction.
@@ -125,7 +125,7 @@ class Heights(Enclosed):
 
 
 def _cut(at: np.ndarray, z: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:
-    """Take columns of `z` (m, n) at positions (n,) from lo to hi, and continue level to both."""
+    """Columns of `z` (m, n) at positions (n,) from lo to hi, extended level."""
     first = max(int(np.searchsorted(at, lo)) - 1, 0)
     last = min(int(np.searchsorted(at, hi)) + 1, len(at))
     at, z = at[first:last], z[:, first:last]

@@ -1,1 +1,1 @@
-"""karamelo-py bench: speed of this machine on known scenes."""
+"""karamelo-py bench: speed of this machine."""

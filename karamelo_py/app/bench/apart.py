@@ -1,7 +1,7 @@
-"""Workloads measured in separate processes, whose memory does not affect each other.
+"""Workloads in separate processes, whose memory does not affect each other.
 
-``python -m karamelo_py.app.bench.apart`` takes a `Measurement` in JSON, writes results to a file,
-and ends when its input is closed.
+``python -m karamelo_py.app.bench.apart`` takes a `Measurement` in JSON, and ends when its input is
+closed.
 """
 
 import json

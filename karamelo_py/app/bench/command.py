@@ -1,6 +1,6 @@
-"""karamelo-py bench: speed of this machine on known scenes.
+"""karamelo-py bench: speed of this machine.
 
-Compare speeds within one bench only, since machines are shared and clocks change.
+Compare speeds within one bench only, since clocks change.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Speed of a scene: times of stages, memory traffic, memory bandwidth."""
+"""Speed of a scene, memory traffic and bandwidth."""
 
 import statistics
 import time
@@ -64,7 +64,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Times each sweep, and the same call without points, to be subtracted."""
+    """Times each sweep, and the same call without points."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -102,7 +102,7 @@ class Measured(NamedTuple):
 
     @property
     def rest(self) -> float:
-        """Fraction of the step spent in control and waiting threads."""
+        """Fraction of the step in control and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
@@ -113,10 +113,9 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """The component with at least half of a step: ``overhead``, ``nodes`` or ``memory``.
+        """Component with at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
         Otherwise ``arithmetic`` (instructions or latency), or ``unknown`` if not `told_apart`.
-        Memory is relative to arrays as large as the scene.
         """
         if not self.told_apart:
             return "unknown"
@@ -234,7 +233,7 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Return the steps per repetition, and the seconds taken and waited by each process.
+    Returns the steps per repetition, and seconds taken and waited by each process.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -331,10 +330,10 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Bytes per particle-step without caches, bytes of the scene, and parallel regions.
+    """Bytes per particle-step without caches, bytes of the scene, parallel regions.
 
-    Point fields count per sweep that reads or writes them, node fields in node loops, tile buffers
-    when written and summed.
+    Point fields count per sweep that reads or writes them, node fields in node loops, buffers when
+    written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
@@ -375,7 +374,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes in total."""
+    """Bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)

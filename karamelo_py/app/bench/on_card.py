@@ -1,4 +1,4 @@
-"""karamelo-py bench --gpu: workloads of GPU size, relative to memory bandwidth."""
+"""karamelo-py bench --gpu."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping

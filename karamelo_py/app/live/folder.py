@@ -1,4 +1,4 @@
-"""Live page of a folder: dumps and log of a run that continues elsewhere, or has ended."""
+"""Live page of a folder with dumps and log."""
 
 from __future__ import annotations
 
@@ -23,10 +23,7 @@ WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 
 class FolderPage:
-    """The page of a folder and its updates.
-
-    Raises ScriptError if the folder is missing, or has neither log nor particle dump.
-    """
+    """Raises ScriptError without a log or particle dump."""
 
     def __init__(self, folder: Path):
         if not folder.is_dir():

@@ -1,4 +1,4 @@
-"""States of points for a page: thinned, in single precision, as many as fit."""
+"""States of points for a page, thinned, in single precision."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
 
 
 class KeptFrames:
-    """States by number; if there are too many, every second one is dropped."""
+    """States by number; every second of too many is dropped."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}

@@ -1,4 +1,4 @@
-"""The live page of a run: points, log curves and what limits the step; pause and stop."""
+"""The live page of a run."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class RunPage(Rhythmic, Listener):
         self._paused = False
 
     def write(self) -> None:
-        """Send the state, and wait while the page pauses the run."""
+        """Send the state, and wait during a pause."""
         hub, simulation = self.hub, self.hub.simulation
         self.every = hub.output.log.every  # a run starts with an output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
@@ -79,10 +79,7 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Send the last news and error; wait for open pages to close.
-
-        With `waits`, at a terminal, wait for a first page.
-        """
+        """Send the last news; wait for pages to close, and with `waits` for a first page."""
         server = self.server
         error = sys.exception()
         ended = "stopped" if stopped or error is not None else "finished"
@@ -177,6 +174,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Stop like Ctrl-C: the last state is written."""
+        """As Ctrl-C does: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

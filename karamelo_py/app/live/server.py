@@ -1,4 +1,4 @@
-"""Server of a live page: a secret address, news as server-sent events."""
+"""Server of a live page, with a secret address."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 
 
 class Server:
-    """Serves a page to browsers on this machine, at the URL `address`.
+    """Serves a page on this machine, at the URL `address`.
 
     ``news(seen)`` returns the new `seen` and the news since the old one (0 at first), in server
     threads. `answers` (bytes, JSON or None) and `actions` (POST) are functions of the query, by
@@ -85,7 +85,7 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Wait until pages are closed or give no sign, as writing to a dead page may succeed."""
+        """Wait until pages are closed or give no sign."""
         self.heard = time.monotonic()
         with self._changed:
             while not self.opened or (self._shown and time.monotonic() < self.heard + AWAY):
@@ -124,7 +124,7 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Ignores pages that close while loading; limits connections."""
+    """Limits connections; ignores pages that close while loading."""
 
     daemon_threads = True
 

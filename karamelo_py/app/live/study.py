@@ -1,4 +1,4 @@
-"""The live page of a study: state of its runs, and a chart that fills."""
+"""The live page of a study."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """The page of a study; `stopped` is set when a viewer ends it.
+    """`stopped` is set when a viewer ends the study.
 
     `recorded` are recorded values, `axes` initial axes of the chart; folders are relative to
     `base`.
@@ -56,7 +56,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """Colour runs: ``judged(row)`` adds class and reason, `colours` maps classes."""
+        """``judged(row)`` adds class and reason, `colours` maps classes."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(

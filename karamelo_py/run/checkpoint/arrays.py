@@ -1,4 +1,4 @@
-"""The state of a simulation as named arrays, to restore, write and read."""
+"""The state of a simulation as named arrays."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
 def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the used part of every array that a step changes and the next one needs."""
+    """Yield the used part of arrays that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
@@ -63,7 +63,7 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Nodes with recent contact, and its memory there."""
+    """Nodes with recent contact, and its memory."""
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
         return {}
@@ -84,9 +84,9 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield the content of a restart file for the present state, or the `kept` one.
+    """Yield the content of a restart file for the present or `kept` state.
 
-    Collective: rank 0 gets the arrays, with the order and bits of a serial run.
+    Collective: rank 0 gets the bits of a serial run.
     """
     if not kept:
         simulation.bring()
@@ -119,7 +119,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as files store it, with normalised digits of exact sums."""
+    """Yield a state with normalised digits of exact sums."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -277,7 +277,7 @@ def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
 def rows_at(
     simulation: SceneState, nodes: np.ndarray, gather: Callable
 ) -> dict[str, np.ndarray] | None:
-    """Gather rows of all nodal arrays at ascending `nodes`, 0 if not in use."""
+    """Gather nodal arrays at ascending `nodes`, 0 if not in use."""
     counted, kinds = simulation.domain.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]

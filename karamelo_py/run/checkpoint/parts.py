@@ -192,7 +192,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: object, arrays: list[np.ndarray]) -> Any:
-    """Convert to JSON types; arrays go to `arrays` and become numbers."""
+    """Convert to JSON types; arrays go to `arrays` by number."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -230,7 +230,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Make the present state the last good one; `forget` other steps' parts."""
+        """Store the last good state; `forget` other steps' parts."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -245,7 +245,6 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
-        """Return to that state; with `cut`, outputs continue from there."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:

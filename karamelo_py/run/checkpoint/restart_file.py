@@ -1,4 +1,4 @@
-"""Restart files: the state of a scene at one time, in HDF5.
+"""Restart files: the state of a scene in HDF5.
 
 They contain arrays, states of parts (:mod:`karamelo_py.run.checkpoint.parts`) and the executed
 statements. The script repeats the set-up.
@@ -46,7 +46,7 @@ READ_AT_ONCE = 1 << 22  # bytes
 
 
 class Restarts(Rhythmic):
-    """Writes restart files during a run; the step number replaces the first ``*`` in the name."""
+    """The step number replaces the first ``*`` in the name."""
 
     mark: Mark | None = None
     style = ""
@@ -127,10 +127,7 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Compare checksums of the arrays of points and nodes (`large`), or of the others.
-
-    Raises ScriptError if they differ. Processes divide the arrays.
-    """
+    """Raise ScriptError for altered arrays of points and nodes (`large`), or others."""
     import h5py
 
     with h5py.File(path, "r", locking=False) as root, path.open("rb") as file:
@@ -230,9 +227,8 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the file's state; with `outputs`, their files continue.
-
-        `point` becomes the file's last good state.
+        """Restore the file's state, as last good state of `point`; with `outputs`, their files
+        continue.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content

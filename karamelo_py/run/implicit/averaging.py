@@ -1,4 +1,4 @@
-"""F-bar in the equations of an implicit step."""
+"""F-bar in implicit steps."""
 
 from collections.abc import Iterator
 from typing import Any

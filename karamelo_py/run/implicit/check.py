@@ -1,4 +1,4 @@
-"""Refusal of scenes that implicit schemes do not support."""
+"""Scenes that implicit schemes do not support."""
 
 import importlib.util
 from collections.abc import Iterator

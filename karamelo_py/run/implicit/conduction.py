@@ -1,4 +1,4 @@
-"""Heat conduction in an implicit step, by backward Euler."""
+"""Heat conduction by backward Euler."""
 
 import numpy as np
 import scipy.sparse as sp
@@ -13,11 +13,10 @@ from karamelo_py.scene.modify import Fix
 
 
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
-    """Conduct heat for `dt`, before the points are strained; raises `Singular`.
+    """Conduct heat for `dt`, before points are strained; raises `Singular`.
 
-    Nodal capacities C, conductances K: C (T' - T) / dt = q - K T'. The split from an adiabatic step
-    is of first order in the step (Armero & Simo 1992). In this order a load step ends in
-    equilibrium.
+    C (T' - T) / dt = q - K T'. The split from an adiabatic step is of first order (Armero & Simo
+    1992); in this order a load step ends in equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)

@@ -1,9 +1,9 @@
 """Contact between solids with separate fields, within Newton's method.
 
-Where bodies meet at a node, the relative displacement u may close the gap g along the normal N,
-with penalty pressure p = max(0, k (N u - g)). The tangential spring sticks while |k s| <= mu p for
-the slip s of the step, and then slides at mu p (Wriggers 2006, "Computational Contact Mechanics",
-chapter 10). Derivatives are exact; normals and gaps are from the beginning of the step.
+At a common node, the relative displacement u may close the gap g along the normal N, with penalty
+pressure p = max(0, k (N u - g)). The tangential spring sticks while |k s| <= mu p for the slip s of
+the step, and slides at mu p (Wriggers 2006, "Computational Contact Mechanics", chapter 10). Normals
+and gaps are from the beginning of the step.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ CLOSE = 1e-4  # gap in cells below which contact is first assumed
 
 
 class Contact:
-    """Pairs (c) of nodes where bodies meet, and their forces.
+    """Pairs (c) of nodes where bodies meet.
 
     `first`, `second` (c,) are unknown nodes, `normal` (c, d) points to the second body, `close`
     (c,) masks pairs in contact before the step, `push` (c,) and `drag` (c, d) act on the second
@@ -80,14 +80,14 @@ class Contact:
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Mask (c,) of pairs in contact at the last step; with -1, of sticking pairs."""
+        """Mask (c,) of pairs touching in the last step; with -1, of sticking ones."""
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
         return (last > 0) & (last >= step)
 
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
-        """Compute forces after nodal displacements (m, d), and their derivatives.
+        """Compute forces and derivatives after displacements (m, d).
 
         With `supposed`, contact and sticking are from the last step.
         """
@@ -103,8 +103,8 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Return mapping on Coulomb's cone (Simo & Laursen 1992, "An augmented Lagrangian treatment
-        of contact problems involving friction").
+        """Coulomb's return mapping (Simo & Laursen 1992, "An augmented Lagrangian treatment of
+        contact problems involving friction").
         """
         k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
         glued = np.isinf(self.mu)
@@ -147,14 +147,11 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Remove the normal approach velocity of pressed pairs from `v` (m, d).
-
-        Conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
-        """
+        """Remove normal approach velocities from `v` (m, d), by `inverse` masses (m, d)."""
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Add the effect of contact at the beginning of the step to accelerations (m, d).
+        """Add the effect of initial contact to accelerations (m, d).
 
         Pairs that approach or stuck are stopped; others slide with velocities `v` (m, d).
         """

@@ -55,12 +55,12 @@ class Moduli(NamedTuple):
 
 
 class Equations:
-    """Forces at the nodes of a step, and their derivatives.
+    """Forces at the nodes of a step, and derivatives.
 
-    `nodes` (m,) are in stencils of points. There, `mass` (m,) is 0 with gradients only, `places`
-    (m, d) are grid indices, `per_node` is the number of unknowns (d, and an angle about the axis),
-    `deforming` (m,) masks nodes of deforming points (`blocks` with stencils `parts`), and `led`
-    (m,) nodes of rigid points with `velocity_of_rigid` (m, d). `cached` is from the last step.
+    At `nodes` (m,) in stencils, `mass` (m,) is 0 with gradients only, `places` (m, d) are grid
+    indices, `per_node` is the number of unknowns (d, and an angle about the axis), `deforming` (m,)
+    masks nodes of deforming points (`blocks` with stencils `parts`), `led` (m,) nodes of rigid
+    points with `velocity_of_rigid` (m, d). `cached` is from the last step.
     """
 
     def __init__(self, s: Setup, mode: Tag, cached: dict[str, np.ndarray], stabilised: bool):
@@ -178,7 +178,7 @@ class Equations:
         return connected_components(graph, directed=False)[1]
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
-        """Return nodal forces (m, d) after displacements (m, d); not finite if a point fails."""
+        """Nodal forces (m, d) after displacements (m, d); not finite if a point fails."""
         s = self.s
         for seen, response in self.parts:
             loops.strain(self.mode, loops.PARTS, s.kin, seen, u, response)
@@ -199,10 +199,9 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
-        """Return the largest move, in cells, of a node towards others.
+        """Largest move, in cells, of a node towards others.
 
-        Counted are nodes that move differently by more than rotation or strain, and `fixed` (nodes,
-        d) ones without points.
+        Those move differently by more than rotation or strain, or are `fixed` (nodes, d).
         """
         cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -325,7 +324,7 @@ class Equations:
         return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
-        """Return the ghost penalty (m, m) on gradient jumps at the border of bodies.
+        """Ghost penalty (m, m) on gradient jumps at the border of bodies.
 
         Unit: the mean modulus. Nodes have volume means of their points, differences the smallest of
         their nodes.
@@ -350,8 +349,8 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        With a linear basis, these are gradient jumps across faces of border cells (Coombs 2023).
-        With splines they still hold the border nodes.
+        With a linear basis, these are gradient jumps across faces of border cells (Coombs 2023);
+        with splines they hold border nodes.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)

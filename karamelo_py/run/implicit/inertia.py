@@ -1,4 +1,4 @@
-"""Inertia in the balance of an implicit step, and the velocities after it."""
+"""Inertia of an implicit step."""
 
 import numpy as np
 
@@ -39,9 +39,9 @@ class Motion:
     """Inertia by the Newmark rules and generalized-alpha.
 
     With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points store a
-    minus the acceleration of the forces, initially 0, which is stable with the losses of the
-    transfer. `before` (m, d) are the initial residual forces; `fixed` and `prescribed` (m, d) mask
-    held components and give their velocities.
+    minus the acceleration of the forces, which is stable with the losses of the transfer. `before`
+    (m, d) are the initial residual forces; `fixed` and `prescribed` (m, d) mask held components and
+    give their velocities.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Motion:
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Forces per mass (m, d) that balance accelerations `a`."""
+        """Forces per mass (m, d) for accelerations `a`."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 
@@ -100,10 +100,7 @@ class Motion:
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Work at held nodes, by the mean of their forces (m, d) in the step.
-
-        The trapezoidal rule adds this work to a linear body's energy.
-        """
+        """Work at held nodes by mean forces (m, d), as the trapezoidal rule requires."""
         old, new, fixed = self.v, self.prescribed, self.fixed
         after = self.mass * self.acceleration(u) - reaction
         moving = 0.5 * self.mass * (new - old) * (new + old)

@@ -47,7 +47,7 @@ class PointsWrong(Exception):
 
 
 class NoEquilibrium(Exception):
-    """A load step has no equilibrium; some substeps may have been taken."""
+    """Some substeps may have been taken."""
 
 
 class LoadSteps:
@@ -174,7 +174,7 @@ class LoadSteps:
         return time
 
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
-        """Take a substep; return corrections and residual. Raises `Failed` before points move."""
+        """Return corrections and residual; raises `Failed` before points move."""
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])
@@ -252,8 +252,8 @@ class LoadSteps:
     ) -> "Equilibrium":
         """Find the displacements in equilibrium.
 
-        `before` (None without inertia) and `after` are nodal forces of the present stress, with the
-        loads at the beginning and the end.
+        `before` (None without inertia), `after`: forces of the present stress and loads at
+        beginning and end.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -332,7 +332,7 @@ class LoadSteps:
             raise self._error(trouble.message, trouble.fix, trouble.mark)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
-        """Publish reactions and set nodal velocities; rigid solids take the remaining forces."""
+        """Publish reactions; set nodal velocities and forces on rigid solids."""
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
         mass = result.equations.mass[:, None]

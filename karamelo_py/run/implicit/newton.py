@@ -1,4 +1,4 @@
-"""Newton's method for the nodal displacements of an implicit step."""
+"""Newton's method for nodal displacements."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -38,7 +38,7 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would move `at` times as far as allowed at once."""
+    """Points would move `at` times as far as allowed."""
 
 
 class Loose(Failed):
@@ -54,7 +54,7 @@ class Broken(Failed):
 
 
 class Newton:
-    """The balance of forces after displacements, and its solution.
+    """The balance of forces, and its solution.
 
     `free` (m, d) masks unknowns, `external` (m, d) are all but internal forces, `pushing` are
     contact and tools; `fixed` returns the held components (nodes, d).
@@ -94,8 +94,8 @@ class Newton:
     ) -> tuple[np.ndarray, int, float]:
         """Return displacements (m, d), the number of corrections and the residual.
 
-        `jump` (m, d) has the prescribed components. Raises `Failed` without convergence, `Broken`
-        if `interrupted(corrections, residual)` returns True.
+        `jump` (m, d): prescribed components. Raises `Failed` without convergence, `Broken` if
+        `interrupted(corrections, residual)`.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -137,7 +137,7 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
-        """Norm of forces, and of torques over the largest radius."""
+        """Torques count over the largest radius."""
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
@@ -145,8 +145,8 @@ class Newton:
         return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
-        """Solve for the change of displacements (m, d), as accurately as quadratic convergence
-        requires (Eisenstat & Walker 1996).
+        """Change of displacements (m, d), as accurate as quadratic convergence requires (Eisenstat
+        & Walker 1996).
         """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):

@@ -1,13 +1,13 @@
-"""Displacements of the soil and nodal pore pressures of a load step (u-p).
+"""Displacements of soil and nodal pore pressures of a load step (u-p).
 
 Balance of water at node i, with content w, volume V and Darcy's flux q of the points: sum N_i V0
 (w' - w) - dt sum V grad N_i . q = 0, q = -k (grad p - rho g). The pressure loads the soil with sum
 V p grad N_i. Time integration is backward Euler.
 
-Equal bases for displacement and pressure oscillate without drainage. Hence the difference of a
-pressure increment from its cell mean gets a compliance per volume, max(0, 3 / M - 12 k dt / h^2)
-(Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for coupled
-solid-deformation/fluid-diffusion"; Zhao & Choo 2020). It sums to 0 and conserves water.
+Equal bases for displacement and pressure oscillate without drainage. Hence deviations of pressure
+increments from cell means get a compliance per volume, max(0, 3 / M - 12 k dt / h^2) (Bochev &
+Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for coupled
+solid-deformation/fluid-diffusion"; Zhao & Choo 2020), which conserves water.
 """
 
 from collections.abc import Iterable
@@ -43,9 +43,9 @@ def is_wet(equations: Equations) -> bool:
 
 
 class Seepage:
-    """Nodal pressures `p` (m,) of a step, and their equations.
+    """Nodal pressures `p` (m,), and their equations.
 
-    Point arrays have an entry per wet point, in the order of `wet`: blocks and their stencils.
+    Point arrays have an entry per wet point, in the order of `wet`.
     """
 
     def __init__(self, equations: Equations, hooks: Tag, dt: float):
@@ -141,7 +141,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Return the volume (m,) supplied to nodes; store the mass rate, as `MakeFlux` does."""
+        """Volume (m,) supplied to nodes; stores the mass rate, as `MakeFlux` does."""
         given = field(self.equations.s.nodes.fields, GivenFlux)
         if given is None:
             return np.zeros(self.m)
@@ -157,7 +157,7 @@ class Seepage:
         return np.where(p < 0, self.suction, self.K)
 
     def respond(self, u: np.ndarray) -> None:
-        """Update forces and balances after displacements (m, d) and pressures."""
+        """Update forces and balances after displacements (m, d)."""
         at = self.N @ self.p
         self._strain(u)
         self.lift = self.volume * (1 + self.growth)
@@ -233,7 +233,7 @@ class Seepage:
         return x[: len(b)]
 
     def _change(self, step: np.ndarray) -> None:
-        """Change pressures by `step`; where pores empty, through the saturation exp(p/a)."""
+        """Add `step` to pressures, through the saturation exp(p/a) where pores empty."""
         a, whole = self.softest, self.p + step
         S = np.exp(np.minimum(self.p, 0) / a)
         left = np.where(self.p < 0, S * (1 + step / a), 1 + whole / a)
@@ -241,7 +241,7 @@ class Seepage:
         self.p = np.where((a < np.inf) & (left < 1), dried, whole)
 
     def cavitates(self) -> bool:
-        """Return True if water in full pores is below -1 bar."""
+        """True if water in full pores is below -1 bar."""
         return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:

@@ -16,11 +16,11 @@ MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
 
 
 class Singular(Exception):
-    """Something is not held, or a limit load is reached."""
+    """Something is loose, or a limit load is reached."""
 
 
 class Unconverged(Exception):
-    """Multigrid leaves more than 1 % of the residual."""
+    """1 % or more of the residual remains."""
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:

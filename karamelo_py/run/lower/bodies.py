@@ -107,7 +107,7 @@ def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
-    """Refuse bodies displaced from the state of the fix; warn of rotation without a fix."""
+    """Refuse displaced bodies; warn of rotation without a fix."""
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     x, v = np.full((2, count, d), np.nan)
     for block in blocks:

@@ -58,7 +58,7 @@ SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
 
 
 class State(NamedTuple):
-    """All points after a run, by id; arrays (components, N)."""
+    """All points after a run, by id: (components, N)."""
 
     count: int  # type: ignore[assignment]  # number of points, N
     present: np.ndarray  # (N,) bool, False for deleted points
@@ -211,9 +211,9 @@ def lower(
     hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
-    """Make the arrays of a run from the scene, and continue the state of earlier points.
+    """Make the arrays of a run, continuing the state of earlier points.
 
-    With `ids` (first, end): only those points, with the tiles of a process of `comm`.
+    With `ids` (first, end), only those points, with the tiles of a process.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -288,10 +288,10 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 
 
 def returns_loss(hub: Hub) -> bool:
-    """Return True if kinetic energy that the transfer dissipates heats points.
+    """True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 without moments dissipates only energy that vanishes with the step. See
-    `kernels.equations.loss.reflect` for XPIC.
+    FLIP 1 without moments only dissipates energy that vanishes with the step. For XPIC, see
+    `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer
     keeps_all = flip_coefficient(transfer) == 1 and not stores_moment(transfer)
@@ -344,7 +344,7 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[arrays.Points]:
-    """Return points `ids` (ascending) in their initial state, by block."""
+    """Points `ids` (ascending) in their initial state, by block."""
     span = int(ids[0]), int(ids[-1]) + 1
     real = PRECISIONS[hub.settings.precision]
     kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")
@@ -375,7 +375,7 @@ def lower_points(
     count = int(ends[-1])
 
     def joined(values: Iterable, dtype: type) -> np.ndarray:
-        """Join a number or column per solid, or a value per point: (n,) or (k, n)."""
+        """Numbers or columns per solid, or values per point, as (n,) or (k, n)."""
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
             if not array.size:

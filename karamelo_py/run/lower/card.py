@@ -1,4 +1,4 @@
-"""Scenes on a GPU: choice of the card, refusals, memory."""
+"""Scenes on a GPU."""
 
 from __future__ import annotations
 
@@ -81,10 +81,7 @@ def memory_there(simulation: SceneState) -> int:
 
 
 def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
-    """Yield an error for everything in a scene that no GPU supports.
-
-    Without `setup`, checks that need arrays are skipped.
-    """
+    """Yield errors for everything that no GPU supports, without `setup` only some."""
     scheme = hub.update.scheme
     from karamelo_py.run.gpu import Card  # registers its rows
 

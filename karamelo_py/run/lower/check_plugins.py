@@ -1,4 +1,4 @@
-"""Trial calls of plug-ins in plain Python, before compilation."""
+"""Trial calls of plug-ins in plain Python."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -105,7 +105,7 @@ def _one(setup: Setup) -> Number:
 
 @contextmanager
 def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
-    """Report faults, except invalid numbers of sample points."""
+    """Ignore invalid numbers of sample points."""
     with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield
@@ -142,7 +142,7 @@ def _numbers(plugin: PartInUse, name: str, values: Iterable, one: Number) -> Non
 def try_law(
     hub: Hub, material: Material, kin: Tag = None, law: Tag = None, one: Number = 1.0
 ) -> None:
-    """Try a plug-in's law, as in its solid or in a cell of size 1 at 293 K."""
+    """Try a plug-in's law in its solid, or in a unit cell at 293 K."""
     kinds = laws.law_kind(material.law)
     if not any(map(registry.is_foreign, kinds)):
         return

@@ -1,4 +1,4 @@
-"""Hooks of fixes: compiled ones in tables, and those in Python."""
+"""Hooks of fixes, compiled and in Python."""
 
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
@@ -213,7 +213,7 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Call a hook; check that processes agree, since collective calls would deadlock."""
+    """Check that processes agree, since collective calls would deadlock."""
     try:
         hook(view)
         if fix.point_by_point:

@@ -145,10 +145,10 @@ def _is_ball(shape: Tag) -> bool:
 
 
 def balls_of(region: Region, h: float) -> np.ndarray:
-    """Return balls (n, 4) with radii that touch the surface of `region` from inside.
+    """Balls (n, 4) with radii that touch the surface of `region` from inside.
 
-    A disk or sphere is one ball. Other shapes have small balls, a cell apart, in convex corners and
-    in 3D along edges and on round faces.
+    A disk or sphere is one ball. Others have small balls in convex corners, and in 3D, a cell
+    apart, along edges and on round faces.
     """
     d, shape = region.dimension, region.outline()
     if _is_ball(shape):
@@ -246,7 +246,7 @@ def _faces(shape: Tag) -> Iterator[np.ndarray]:
 
 
 def _in_corners_of(faces: np.ndarray, radius: float, h: float) -> np.ndarray:
-    """Positions below corners of `faces` (m, d, d), and in 3D below their sharp edges."""
+    """Positions below corners of `faces` (m, d, d), in 3D below sharp edges."""
     m, d = len(faces), faces.shape[2]
     side = faces[:, 1:] - faces[:, :1]
     normals = (

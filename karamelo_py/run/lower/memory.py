@@ -62,7 +62,7 @@ def _held(item: object, seen: set[int]) -> int:
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     """Bytes of array rows in ascending spans (k, 2).
 
-    Linux uses pages of 2 MiB for large arrays, with gaps between used nodes.
+    Linux uses pages of 2 MiB for large arrays.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row

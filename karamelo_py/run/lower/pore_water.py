@@ -1,4 +1,4 @@
-"""Pore water of a material: its constants, and unsupported combinations."""
+"""Pore water of a material, and unsupported combinations."""
 
 from typing import NamedTuple
 
@@ -54,7 +54,6 @@ class PoreWater(NamedTuple):
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
-        """Describe the drainage of a solid in a time, across its shortest side."""
         law, kin = solid.material.whole, Space()
         M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag

@@ -1,4 +1,4 @@
-"""Held nodes, and walls inside the grid: faces of cells with all nodes held."""
+"""Held nodes, and faces of cells with all nodes held."""
 
 import math
 from collections.abc import Iterator
@@ -44,10 +44,9 @@ def with_walls(fixes: list[Fix], lattices: list[Lattice], basis: NamedTuple) -> 
 
 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield the direction of walls, and the cells (n, d) above them.
+    """Yield direction and upper cells (n, d) of walls.
 
-    A face with held nodes is no wall within a block of held nodes, where the next faces are held,
-    too.
+    Held faces are no walls within a block of held nodes.
     """
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]
@@ -69,7 +68,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
 
 
 def mark_sides(hub: Hub, s: Setup) -> None:
-    """Mark nodes at edges of grids and nodes held by fixes."""
+    """Mark nodes at edges of grids and held ones."""
     sides = field(s.nodes.fields, Sides)[:, 0]
     if sides.any():  # pages that are never written take no memory
         sides[:] = 0

@@ -1,6 +1,6 @@
 """Tiles divided among processes, and their messages.
 
-A node in reach of several processes is summed by each of them, in the same order.
+Nodes in reach of several processes are summed by each, in the same order.
 """
 
 from collections.abc import Sequence
@@ -31,11 +31,11 @@ from karamelo_py.scene.lattice import Lattice
 
 
 def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
-    """Divide tiles by recursive bisection across the longest direction; return the part (T,).
+    """Recursive bisection across the longest direction; returns the part (T,).
 
     Berger & Bokhari (1987), "A partitioning strategy for nonuniform problems on multiprocessors",
     IEEE Transactions on Computers C-36, 570-580. `places` (T, d) are lower corners, `work` (T,)
-    integers. The last direction is cut only if `rows` times as long as the others.
+    integers. The last direction is cut only if `rows` times as long as others.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -72,7 +72,7 @@ class Needs(NamedTuple):
     hi: np.ndarray  # (k, d)
 
     def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Intersect boxes (m, d) in tiles (m,) with these; return indices, first, last."""
+        """Intersect boxes (m, d) in tiles (m,) with these: indices, first, last."""
         at = np.minimum(np.searchsorted(self.tile, tile), len(self.tile) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.tile[at] == tile) & (low <= high).all(axis=1))
@@ -422,7 +422,6 @@ def share_of(s: Setup, mine: np.ndarray) -> dict[str, np.ndarray]:
 def share_of_tiling(
     k: int, tiling: Tiling, mine: np.ndarray
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the points in the tiles marked in `mine`, and these tiles."""
     which = np.flatnonzero(mine[occupied(tiling)[0]])
     ranges = tiling.range[which]
     points = between(*ranges.T)

@@ -1,4 +1,4 @@
-"""Predicted division of a scene among processes: memory, messages per step."""
+"""Predicted division of a scene among processes."""
 
 from typing import NamedTuple
 

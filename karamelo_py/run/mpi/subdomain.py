@@ -1,4 +1,4 @@
-"""The part of a scene on one process, and its measured work."""
+"""The part of a scene on one process."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -25,7 +25,7 @@ LEARN_EVERY = 100  # steps between checks of the balance
 
 
 class Load:
-    """Time spent on each block's points, and on everything else but waiting."""
+    """Time spent on each block's points, and on the rest but waiting."""
 
     def __init__(self, blocks: int):
         # Per step, of a point of each block and of a node in reach.
@@ -59,10 +59,7 @@ class Load:
 
 
 class Subdomain(WholeDomain):
-    """The part of a scene on one of several processes.
-
-    Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
-    """
+    """Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`)."""
 
     parted = True
 

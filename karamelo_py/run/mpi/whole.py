@@ -1,4 +1,4 @@
-"""A whole scene gathered at the first process, for functions of all points."""
+"""A whole scene gathered at the first process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A Python fix moved points to other processes: begin the step again."""
+    """A Python fix moved points to other processes."""
 
 
 class Whole:
@@ -33,9 +33,9 @@ class Whole:
         self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
 
     def act(self, function: Callable[[Setup], None]) -> None:
-        """Call a function of the whole scene on rank 0, and send its changes to all ranks.
+        """Call a function of the whole scene on rank 0, and send its changes.
 
-        Raises `PointsMoved` if it moved points.
+        Raises `PointsMoved`, after which the step begins again.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()

@@ -1,4 +1,4 @@
-"""Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
+"""Meshes in Abaqus or CalculiX decks.
 
 Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX CrunchiX
 manual).
@@ -79,7 +79,7 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
     """Elements (n, count) over continued lines.
 
-    Extra numbers at the end, such as inner nodes of C3D8I, are ignored, as in CalculiX.
+    Extra numbers, such as inner nodes of C3D8I, are ignored, as in CalculiX.
     """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):

@@ -1,4 +1,4 @@
-"""Mesh data, as every reader returns it: nodes, cells by type, named sets."""
+"""Mesh data of all readers."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import NamedTuple, TypeVar
@@ -60,7 +60,7 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # number of other elements by type, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of an element set, outer faces of a node set, or all; ScriptError without any."""
+        """Cells of an element set, outer faces of a node set, or all; raises ScriptError."""
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:

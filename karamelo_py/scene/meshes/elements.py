@@ -87,10 +87,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Elements of `dimension` in a mesh or its `group`, one item per type.
+    """Elements of `dimension` in a mesh or its `group`, by type.
 
-    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError without
-    elements, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
+    `lower` accepts groups of lower dimension. Raises ScriptError without elements, for unsupported
+    types, and off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -195,7 +195,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements, as older formats have for elements of two groups."""
+    """Older formats repeat elements of two groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -216,10 +216,10 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Orient elements; return them with volumes (n,) and centroids (n, d).
+    """Orient elements; return them, volumes (n,) and centroids (n, d).
 
-    Integrals of det J and x det J are exact, also with curved edges and warped faces. Raises
-    ScriptError for flat or twisted elements; a few curved ones may be twisted near an edge.
+    Integrals of det J and x det J are exact. Raises ScriptError for flat or twisted elements; a few
+    curved ones may be twisted near an edge.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes

@@ -1,4 +1,4 @@
-"""Read Exodus II files of Cubit, MOOSE and Sierra (Schoof & Yarberry 1994)."""
+"""Exodus II files of Cubit, MOOSE and Sierra (Schoof & Yarberry 1994)."""
 
 import re
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""Accept only Gmsh geometries that describe a shape, by a list of allowed commands."""
+"""Accept Gmsh geometries that only describe a shape, by a list of commands."""
 
 import re
 import tomllib
@@ -62,7 +62,7 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that does more than describe a shape, or if trusted, ends the program."""
+    """Also geometries that end the program, if trusted."""
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
     if not trusted:

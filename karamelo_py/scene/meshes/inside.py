@@ -1,4 +1,4 @@
-"""Skins of bodies: shells of triangles, and outer faces of meshes."""
+"""Shells of triangles, and outer faces of meshes."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ _SETS = 8  # sets of shells that do not overlap
 class Skin:
     """Sets of `faces` (m, d, d), each closed.
 
-    A position is inside if a set encloses it, or within `tolerance` of a face; never if `open`.
+    Inside is what a set encloses, or within `tolerance` of a face; nothing if `open`.
     """
 
     def __init__(
@@ -49,9 +49,9 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Outer faces (m, d, d), oriented outwards; in 1D in pairs, the lower one first.
+    """Outer faces (m, d, d), oriented outwards; in 1D pairs, the lower one first.
 
-    Quadrilaterals are split along the diagonal from the lowest node number.
+    Quadrilaterals are split from the lowest node number.
     """
     triangles: list[np.ndarray] = []
     for elements in parts:
@@ -72,7 +72,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Make simplices (m, d, d); in 3D, lines and nodes are triangles with equal corners."""
+    """Simplices (m, d, d); in 3D, lines and nodes are triangles with equal corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -113,8 +113,8 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
     """Closed shells of `points` (n, 3), `triangles` (m, 3).
 
-    Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
-    Raises ScriptError for an edge with an odd number of triangles.
+    Shells inside others are cavities; overlapping shells form one body. Raises ScriptError for an
+    edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
     for sided in (True, False):  # oriented as in the file; else reoriented
@@ -184,7 +184,7 @@ def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (3 m,) of edges, equal ones alike, and directions (1 or -1)."""
+    """Numbers (3 m,) of edges, and directions (1 or -1)."""
     low, high, way = _ends(triangles)
     return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
 
@@ -202,7 +202,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Orient triangles so that two at an edge run through it in opposite directions."""
+    """Triangles at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -218,7 +218,7 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
 
 
 def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    """Return the lowest node of each node's component, with links from nodes `a` to `b`."""
+    """Lowest node of each node's component, with links from `a` to `b`."""
     lowest = np.arange(count)
     while (apart := lowest[a] != lowest[b]).any():
         ends = np.sort([lowest[a[apart]], lowest[b[apart]]], axis=0)

@@ -1,7 +1,4 @@
-"""Meshes in LS-DYNA keyword decks: nodes, solids, shells, parts and sets.
-
-In columns, long columns or with commas (LS-DYNA Keyword User's Manual, volume I).
-"""
+"""Meshes in LS-DYNA keyword decks (LS-DYNA Keyword User's Manual, volume I)."""
 
 import re
 from collections.abc import Iterator
@@ -62,7 +59,7 @@ def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[DeckKeyword]
 
 
 def _table(keyword: DeckKeyword, count: int, width: int = 10, ids: int = 1) -> np.ndarray:
-    """Numbers (n, count): `ids` columns of 8 or 10, others of `width`; all of 20 if long."""
+    """Numbers (n, count): `ids` columns of 8 or 10, then `width`; 20 if long."""
     is_long = "LONG" in keyword.options
     widths = [20] * count if is_long else [*[8 if width != 10 else 10] * ids, *[width] * count]
     lines = [line for line in keyword.lines if line.strip()]

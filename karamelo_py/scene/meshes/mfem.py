@@ -34,10 +34,7 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Numbers of second-order nodes, from `first` on, by their corners.
-
-    Edges come before quadrilateral faces and elements, each in the order of appearance.
-    """
+    """Numbers of second-order nodes by corners: edges, faces, elements, as they appear."""
     numbers: dict[frozenset[int], int] = {}
     faces = {**FACES, "triangle": (), "quad": (), "line": ()}
     bottom, top, *others = FACES["hexahedron"]

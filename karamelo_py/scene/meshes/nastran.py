@@ -1,7 +1,4 @@
-"""Meshes in Nastran bulk data: nodes in any coordinate system, solids, properties as groups.
-
-Entries in small or large fields or with commas (MSC Nastran Quick Reference Guide).
-"""
+"""Meshes in Nastran bulk data (MSC Nastran Quick Reference Guide)."""
 
 import re
 from collections import defaultdict
@@ -58,7 +55,7 @@ class _Entry(NamedTuple):
             raise self.wrong(f"has '{self.fields[k]}' instead of a whole number") from None
 
     def wholes(self, count: int) -> list[int]:
-        """Fields from the first on; an omitted second one equals the first."""
+        """An omitted second field equals the first."""
         try:
             numbers = list(map(int, self.fields[:count]))
         except ValueError:

@@ -1,4 +1,4 @@
-"""Reader of Wavefront .obj: polygons, with or without textures."""
+"""Wavefront .obj files."""
 
 from pathlib import Path
 

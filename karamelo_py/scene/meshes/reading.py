@@ -1,4 +1,4 @@
-"""Entry point for mesh files: chooses the reader.
+"""Entry point for mesh files.
 
 Gmsh reads its own formats, MED, UNV and CGNS, and meshes geometries; meshio reads formats without a
 reader here.
@@ -59,7 +59,7 @@ class MeshFile(InputFile):
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
-    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`.
+    """Geometries are meshed up to `dimension`, CAD files with edges of `size`.
 
     A `trusted` geometry may run system commands and write files.
     """
@@ -166,7 +166,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _read_all(path: Path) -> None:
-    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries print or crash."""
+    """Gmsh's libraries crash on damaged HDF5 files."""
     import h5py
 
     def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -233,7 +233,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
-    """Sets of SU2's markers by name; meshio counts those whose names are words."""
+    """meshio counts SU2's markers whose names are words."""
     number, named = 0, {}
     for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
         number = int(name) if name.isdigit() else number + 1

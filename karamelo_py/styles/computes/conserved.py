@@ -1,4 +1,4 @@
-"""Computes of conserved quantities: energies, momenta, and their drift."""
+"""Computes of energies, momenta, and their drift."""
 
 import numpy as np
 
@@ -169,7 +169,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """Base of computes of a momentum, whose `terms` are its components and its magnitude."""
+    """`terms` are components and magnitude."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)

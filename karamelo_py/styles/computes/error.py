@@ -1,4 +1,4 @@
-"""Computes error and reference: compare values or fields with formulas or curves."""
+"""Computes error and reference."""
 
 from math import inf
 from typing import Any, Literal
@@ -48,7 +48,7 @@ class PointField:
 
 
 class Norm:
-    """Norm L1, L2 or max, absolute or relative to the norm of the exact values.
+    """Norm L1, L2 or max, absolute or relative.
 
     Histories weight differences by the time since the last output.
     """
@@ -109,10 +109,10 @@ class Norm:
 
 
 class Compared:
-    """Mix-in for computes with `sizes(points)` and a `norm`."""
+    """For computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return norms (2,) of differences and exact values now, and the remaining sums."""
+        """Norms (2,) of differences and exact values, and the remaining sums."""
         sums = self.hub.fields.added_up(self)
         largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
         return self.norm.moment(sums, largest), sums[3:]
@@ -144,8 +144,8 @@ class Error(Compared, Compute):
     expression
         The exact value, a function of x, y, z (present position), x0, y0, z0 (initial position),
         time, and published values. For a whole field: one per component, in the order x, y, z or
-        11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2`` (default)
-        or ``max``, and ``absolute`` (default) or ``relative``.
+        11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2``
+        (default) or ``max``, and ``absolute`` (default) or ``relative``.
 
     Example
     -------
@@ -207,8 +207,6 @@ class Error(Compared, Compute):
 
 
 class GroupOrValue:
-    """Script argument: a group of points, or a value that changes over time."""
-
     script_kind = "a group of points, or a value"
 
     @staticmethod
@@ -311,7 +309,7 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Return magnitudes (2, n) of differences and curve, weights, the curve, and ones."""
+        """Magnitudes (2, n) of differences and curve, weights, the curve, and ones."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])

@@ -1,4 +1,4 @@
-"""Compute force_on: force, torque and point of action, on a solid or of fixes."""
+"""Compute force_on."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -44,7 +44,7 @@ class Acting(NamedTuple):
 
 
 class Summand(NamedTuple):
-    """A published force, and the names of its torque about the origin."""
+    """A published force, and names of its torque."""
 
     force: str  # ID of ID_x, ID_y, ID_z
     sign: float = 1.0

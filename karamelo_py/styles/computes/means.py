@@ -1,4 +1,4 @@
-"""Computes of means, extremes and quantiles over points, and of a column at a position."""
+"""Computes of means, extremes, quantiles, and values at a position."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -261,7 +261,7 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Map floating-point numbers to integers in the same order."""
+    """Integers in the order of floating-point numbers."""
     bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
@@ -331,7 +331,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Return distance, id and columns of the point with the given id, or of the nearest one."""
+        """Distance, id and columns of the given or nearest point."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

@@ -1,4 +1,4 @@
-"""Base of dumps: interval, file name, checked columns; tables of points and of nodes."""
+"""Base of dumps; tables of points and of nodes."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -50,7 +50,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Take part in the exchange without writing: only rank 0 writes."""
+        """Only rank 0 writes."""
         with discarded():
             self.write()
 

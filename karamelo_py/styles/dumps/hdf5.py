@@ -1,4 +1,4 @@
-"""dump hdf5 and grid/hdf5: one binary file, as arrays over time and id."""
+"""dump hdf5 and grid/hdf5: arrays over time and id."""
 
 import os
 import re
@@ -82,9 +82,9 @@ class Hdf5Dump(TableDump):
             raise ScriptError(f"cannot write {path}: {message}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
-        """Refuse a disk without space for an uncompressed snapshot.
+        """Refuse a disk without space for a snapshot.
 
-        HDF5 may write at any time, and neither report nor survive a failure.
+        HDF5 neither reports nor survives a failure to write.
         """
         if not hasattr(os, "posix_fallocate"):
             return
@@ -100,9 +100,9 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Continue with the snapshots of an earlier run, rewritten for equal bytes.
+        """Continue a file, rewritten for equal bytes.
 
-        A file that a killed program was writing can be read but not written.
+        A file that a killed program was writing can only be read.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -207,10 +207,10 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Open a file so that its content stays readable if the program dies.
+    """Keep the content readable if the program dies.
 
     h5py's swmr=True also opens a file left by a killed program if it was opened that way from the
-    start (`h5py.File.swmr_mode` sets it a moment later).
+    start (`h5py.File.swmr_mode` is too late).
     """
     import h5py
 

@@ -1,4 +1,4 @@
-"""dump particle, dump grid and variants: the formats of LAMMPS, which OVITO opens."""
+"""dump particle, grid and variants: formats of LAMMPS."""
 
 import gzip
 import struct
@@ -29,7 +29,7 @@ SHRUNK, AT_LEAST = 2, 3
 
 
 class Plain:
-    """Passes text through, with the interface of ``zlib.compressobj``."""
+    """The interface of ``zlib.compressobj`` without compression."""
 
     def compress(self, data: bytes) -> bytes:
         return data
@@ -121,9 +121,9 @@ class LammpsDump(TableDump):
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
-    """Return the ends of the domain along the three axes.
+    """Ends of the domain along the three axes.
 
-    OVITO treats a box of zero thickness as degenerate; one cell about zero suits unit width.
+    OVITO treats a box of zero thickness as degenerate.
     """
     domain = hub.domain
     used = slice(domain.dimension)

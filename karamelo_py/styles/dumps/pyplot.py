@@ -1,4 +1,4 @@
-"""dump pyplot and movie: pictures of the points, drawn with Matplotlib."""
+"""dump pyplot and movie."""
 
 import re
 from collections.abc import Iterable
@@ -280,7 +280,7 @@ def look_of(
     outlines: bool,
     **look: Any,
 ) -> dict[str, Any]:
-    """Check the keywords of a script or a command line, and return the settings of a picture."""
+    """Check keywords, and return the settings of a picture."""
     ranges = ((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)
     for (first, last), low, high in ranges:
         if first is not None and last is not None and first >= last:

@@ -1,4 +1,4 @@
-"""Dump surface/vtk: surfaces from files that move, as a series of files for ParaView."""
+"""Dump surface/vtk: moving surfaces, for ParaView."""
 
 from collections.abc import Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""dump vtk and grid/vtk: points, or cells of the grids, as a series of files for ParaView."""
+"""dump vtk and grid/vtk: points or cells, for ParaView."""
 
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -74,7 +74,7 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add the cells of the last points, or store their data in `kept`."""
+        """Add the cells of the last points, or their data to `kept`."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
         """Add the cells between all points."""

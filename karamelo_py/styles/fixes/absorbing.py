@@ -23,14 +23,14 @@ LAYERS = 3.5  # largest extent of the nodes of an edge along its normal, in cell
 
 
 class Support(Field):
-    """Force that balances the initial force on a node; NaN before the first step."""
+    """Balances the initial force on a node; NaN before the first step."""
 
     shape = vector
     start = float("nan")
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """Add dashpots rho c A; of `normal` (rho A), only the component `axis` is used."""
+    """Dashpots rho c A; only the component `axis` of `normal` (rho A) counts."""
     axis, along, across = values
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
@@ -44,7 +44,7 @@ def absorb(mass, v, force, normal, support, values, dt):
 
 
 def dashpot(rate, mass, v, force, dt):
-    """Return -rate m (v + v')/2, where v' is the velocity after this force and `force`."""
+    """-rate m (v + v')/2, with the velocity v' after this force and `force`."""
     half = 0.5 * dt * rate
     return (-1 / (1 + half)) * (rate * mass * v + half * force)
 
@@ -132,7 +132,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return P and S wave speeds; in saturated soil, rho c of soil and water over its density."""
+    """P and S wave speeds; in saturated soil, rho c over its density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

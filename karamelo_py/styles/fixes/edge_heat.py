@@ -1,4 +1,4 @@
-"""Fixes for heat flow through the edge of a region, by the area of its surface."""
+"""Fixes for heat flow through the edge of a region."""
 
 import numpy as np
 
@@ -23,12 +23,12 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the region's surface; None for meshes, which use the boxes of points."""
+        """Faces on the surface; None for meshes, with boxes of points."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Return the heat per time (n,) into the points from `values` at the faces (m,)."""
+        """Heat per time (n,) into the points from `values` at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:

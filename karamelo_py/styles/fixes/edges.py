@@ -1,4 +1,4 @@
-"""Fixes that load the edge of a region, through the faces of points there."""
+"""Fixes that load the edge of a region, by faces of points."""
 
 import itertools
 from collections.abc import Sequence
@@ -36,10 +36,10 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """Return outer faces of the points `ids` inside a region.
+    """Outer faces of the points `ids` inside a region.
 
-    Points are boxes; a face is outer if the centre of the adjacent box of the same size is outside.
-    `faces_cut` does the same for boxes cut by a region.
+    Points are boxes; outside an outer face, the centre of the next box is outside. `faces_cut` does
+    the same for boxes cut by a region.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -76,9 +76,9 @@ def joined(tables: Sequence[Columns]) -> Columns:
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
-    """Return the surface at the points `ids` of a solid that fills `region`.
+    """The surface at the points `ids` of a solid that fills `region`.
 
-    The surface in a sub-box belongs to the nearest point in this box or an adjacent one.
+    In a sub-box, it belongs to the nearest point in this box or an adjacent one.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -137,7 +137,7 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Return faces of cut boxes: projections of the surface across the axes (see `surface_at`).
+    """Faces of cut boxes: projections of the surface across the axes.
 
     At an edge within a sub-box, only the difference of opposite projections remains.
     """
@@ -162,7 +162,7 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
-    """Divide simplices (m, d, d) of a set of faces into pieces, for the nearest points."""
+    """Pieces of simplices (m, d, d), with the nearest points."""
     none = np.zeros(0, np.int64)
     if not len(ids) or not len(sheet):
         return Faces(ids[:0], none, none, np.empty(0), np.empty((0, d)))
@@ -186,7 +186,7 @@ def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Face
 
 
 def _parts_of_simplex(d: int, count: int) -> np.ndarray:
-    """Return the centres (n, d - 1) of `count`^(d - 1) equal pieces, in fractions of the edges."""
+    """Centres (n, d - 1) of `count`^(d - 1) equal pieces, in fractions of the edges."""
     if d < 3:
         return ((np.arange(count) + 0.5) / count)[:, None] if d == 2 else np.zeros((1, 0))
     i, j = np.divmod(np.arange(count * count), count)
@@ -219,7 +219,6 @@ class OnEdge(Fix):
                 )
 
     def faces_at(self, ids: np.ndarray) -> Faces:
-        """Return faces by rows in the view (cached)."""
         before, faces = self._seen or (ids[:0], self._find(ids[:0]))
         if self._seen is None or not np.array_equal(before, ids):
             new = self._find(np.setdiff1d(ids, before, assume_unique=True))
@@ -234,12 +233,11 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the surface of the region; None to find them from the boxes."""
+        """Faces on the surface; None to find them from boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
     def _cut(self) -> dict[str, tuple[Solid, Faces]]:
-        """Return all faces of the solids whose faces come from the surface."""
         members = np.concatenate([*self.group.pieces(), np.empty(0, np.int64)])
         by_solid = {}
         for solid in self.hub.solids.values():

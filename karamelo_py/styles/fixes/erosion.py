@@ -1,4 +1,4 @@
-"""Erosion: points that meet a condition are deleted."""
+"""Erosion of points that meet a condition."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Fixes for forces on nodes and points, and for the initial stress of points."""
+"""Fixes for forces on nodes and points, and initial stress."""
 
 import re
 from typing import Annotated, Any
@@ -184,7 +184,7 @@ class ForceNodes(Fix):
 
 
 def torques(x: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the torques (n, 3) about the origin of forces (n, d) at `x` (n, d)."""
+    """Torques (n, 3) about the origin of forces (n, d) at `x` (n, d)."""
     arm, push = np.zeros((2, len(x), 3))
     arm[:, : x.shape[1]], push[:, : x.shape[1]] = x, force
     return np.cross(arm, push)
@@ -208,7 +208,7 @@ class PointForces(Fix):
         raise NotImplementedError
 
     def publish_load(self, points: PointsView, force: np.ndarray) -> None:
-        """Publish the sum of forces (n, d) on points, and their torque if requested.
+        """Publish the sum of forces (n, d), and their torque if requested.
 
         With twist, forces (n, 3) have the torque about the axis as their third sum.
         """
@@ -267,9 +267,9 @@ class ForceParticles(PointForces):
 
 
 def brake(node):
-    """Reduce the change of v* by forces, opposite to v, by a fraction; the total is the force.
+    """Reduce the change of v* by forces by a fraction; the total is the force.
 
-    No effect if the step reverses the node's motion, or a wall has stopped it.
+    No effect if the motion is reversed, or a wall has stopped it.
     """
     against = 0.0
     if node.v * node.v_star > 0:
@@ -425,7 +425,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Return bodies with a tension that they cannot sustain, in 10 % of their points."""
+    """Bodies with a tension that 10 % of their points cannot sustain."""
     cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

@@ -1,4 +1,4 @@
-"""Fix geostatic_stress: the stress of ground under its weight."""
+"""Fix geostatic_stress."""
 
 from itertools import product
 from typing import Annotated
@@ -82,10 +82,9 @@ class GeostaticStress(Fix):
 
 
 def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return steps (n, d) from the points of one solid to the centres of their boxes.
+    """Steps (n, d) from points of a solid to the centres of their boxes.
 
-    Gauss points (and Karamelo's three per cell) are not at the centres of their boxes, which fill
-    the cells. Other points do not move.
+    Gauss points (and Karamelo's three per cell) are not at these centres.
     """
     step = np.zeros_like(x)
     for along, length, out in zip(x.T, size.T, step.T, strict=True):
@@ -104,11 +103,11 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the weight per area (n, k) above the centres of points that are boxes.
+    """Weight per area (n, k) above the centres of points that are boxes.
 
-    `x`, `size` (n, d): centres and sizes of the boxes; the last direction is up. `weights` (n, k)
-    are per volume. Each box loads the columns that it overlaps, at least as wide as the widest box,
-    and takes the mean of their loads.
+    `x`, `size` (n, d): centres and sizes; the last direction is up. `weights` (n, k) are per
+    volume. A box loads the columns that it overlaps, at least as wide as the widest box, and takes
+    the mean of their loads.
     """
     flat, half = x[:, :-1], size[:, :-1] / 2
     begin = (flat - half).min(axis=0)

@@ -1,4 +1,4 @@
-"""State of friction at points, for fixes: see `points.bodies.rub`."""
+"""State of friction at points, see `points.bodies.rub`."""
 
 from karamelo_py.compiler import importable
 from karamelo_py.compiler.fields import Field, field
@@ -8,19 +8,19 @@ from karamelo_py.styles.fixes.formulas import judge_friction
 
 
 class Grip(Field):
-    """Spring force that holds a point (d), its mean load, and its unused friction."""
+    """Spring force (d), mean load, unused friction."""
 
     shape = staticmethod(lambda kin: kin.dimension + 2)
 
 
 class GripOfTool(Grip):
-    """`Grip` with the last position (d) of the point at the tool."""
+    """`Grip`, and the last position (d) at the tool."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
 
 
 def memory_for(hub: Hub, kind: type) -> type:
-    """Return a class of `kind` that no other fix of the scene uses."""
+    """A class of `kind` that no other fix uses."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:

@@ -1,4 +1,4 @@
-"""Fix ground_motion: a record of acceleration at the base of the ground."""
+"""Fix ground_motion."""
 
 from math import isnan, nan
 
@@ -34,7 +34,7 @@ def push_z(normal, force, values, dt):
 
 
 def pushed(axis, normal, force, values):
-    """Add forces (rho A) c v at a surface across `axis`; `values` are c v."""
+    """Add forces (rho A) c v across `axis`; `values` are c v."""
     added = type(force)(*[abs(normal[axis]) * values[k] for k in range(len(force))])
     return force + added, added
 
@@ -71,9 +71,7 @@ class BaseAcceleration:
         """Choose the column of a direction."""
 
     def motion(self, time: float, step: float, before: tuple[float, float]) -> tuple:
-        """Return velocity, acceleration, and its rate in the next `step`; `before`: a time, the
-        velocity then.
-        """
+        """Velocity, acceleration, and its rate in `step`; `before`: a time, its velocity."""
         since, speed = before
         at = np.array([since, (since + time) / 2, time, time + step])
         a = self.formula.evaluate_columns(self.hub.values, {"time": at})
@@ -82,7 +80,7 @@ class BaseAcceleration:
 
 
 class RecordedAcceleration(BaseAcceleration):
-    """A record in a file, linear between its times."""
+    """A file, linear between its times."""
 
     is_constant, constant = False, nan
 
@@ -203,7 +201,7 @@ class GroundMotion(VelocityNodes):
         self.between_steps()
 
     def _velocity(self, axis: str) -> Expression:
-        """Return v + s (a + s j/2), s = time - since."""
+        """v + s (a + s j/2), s = time - since"""
         v, a, j, since = (Expression.seed(f"{self.id}_{x}") for x in
                           (f"v{axis}", f"a{axis}", f"j{axis}", "since"))  # fmt: skip
         gone = Expression.seed("time").minus(since)

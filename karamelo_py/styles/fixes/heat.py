@@ -59,7 +59,7 @@ MANY = 1_000_000  # points of a solid; larger ones skip the check
 
 
 def hold_node(node):
-    """Set T to the value; the total is the heat per time needed."""
+    """The total is the heat per time needed."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
@@ -101,7 +101,6 @@ class TemperatureNodes(HeatFix):
 
 
 def hold_point(pt):
-    """Set T to the value, whatever the heat flow."""
     return 0.0, pt.supply, pt.value
 
 
@@ -196,9 +195,9 @@ class HeatFluxParticles(FacesOfPoints):
 
 
 def exchange(pt):
-    """Apply Newton's law of cooling through one face, at the point's temperature after the step.
+    """Newton's law of cooling, at the point's temperature after the step.
 
-    With the temperature before, a large coefficient would cool the point below the fluid.
+    Otherwise a large coefficient would cool the point below the fluid.
     """
     if not pt.capacity > 0:
         return 1.0, pt.supply, pt.T

@@ -1,4 +1,4 @@
-"""Fixes inflow and outflow: material that enters and leaves a scene."""
+"""Fixes inflow and outflow."""
 
 from math import floor, fsum
 from typing import Annotated
@@ -106,7 +106,7 @@ class Inflow(VelocityNodes):
         self.held_directions = ()  # no wall: splines reach past it
 
     def _inlet(self, hub: Hub) -> Inlet:
-        """Return the cells of the solid, and upstream cells whose nodes its points reach."""
+        """Cells of the solid, and upstream cells whose nodes its points reach."""
         solid, lattice = self.solid, hub.lattices[0]
         d, h, far = hub.domain.dimension, lattice.h, hub.update.method.basis.traits.cells // 2
         corner = lattice.lo[:d]

@@ -1,4 +1,4 @@
-"""Fix mass_damping: forces against the velocity of nodes, in proportion to mass."""
+"""Fix mass_damping."""
 
 from typing import Annotated
 

@@ -29,7 +29,7 @@ COME_FIRST = ("internal_force", "momentum_before")
 
 
 class Measuring(Fix):
-    """Sum one of `HOOKS`, or the ``external_force`` that fixes put on points, over a group."""
+    """Sum one of `HOOKS`, or the ``external_force`` of fixes on points."""
 
     published = ("x", "y", "z")
 

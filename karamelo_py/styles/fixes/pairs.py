@@ -34,7 +34,7 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 
 
 class PairContact(Gripping):
-    """Contact between the points of two solids; rank 0 searches for pairs."""
+    """Rank 0 searches for pairs of points."""
 
     by_sizes = True
 
@@ -65,7 +65,7 @@ class PairContact(Gripping):
     def law(self) -> NamedTuple:
         """Tag of :mod:`karamelo_py.points.bodies` for the force between two points.
 
-        Read in each step, as constants of materials may change between runs.
+        Read in each step, as constants may change between runs.
         """
         raise NotImplementedError
 
@@ -96,14 +96,11 @@ class PairContact(Gripping):
         torque[:] = turning[: len(torque)]
 
     def sent(self, simulation: Any) -> int:
-        """Number of points that may touch others now, searched by one process."""
+        """Number of points that may touch."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Rows of the points of each block in the overlap of the solids' boxes, or None.
-
-        Boxes are extended by the contact distance of two points.
-        """
+        """Rows of points in the overlap of the solids' extended boxes, or None."""
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
@@ -132,7 +129,7 @@ class PairContact(Gripping):
     def _push(
         self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
     ) -> list[tuple]:
-        """Forces and grips of the points of each process, the sum of forces, and the torques."""
+        """Forces and grips of the points of each process, their sum, and torques."""
         of_all, d = np.concatenate(tables), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
@@ -228,7 +225,7 @@ class ContactMinimizePenetration(PairContact):
 
 
 def plane_modulus(solid: Solid, argument: str) -> float:
-    """Return E / (1 - nu^2) of a solid's material: 4 G (lambda + G) / (lambda + 2 G)."""
+    """E / (1 - nu^2) = 4 G (lambda + G) / (lambda + 2 G)"""
     law = elastic_law(solid.material.whole)
     G, lam = parameter(law, "G", None), parameter(law, "lam", None)
     if G is None or lam is None or not G > 0:

@@ -15,7 +15,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Return the pressure; publish the mass of water per time that left in the last step."""
+    """Return the pressure; publish the mass of water per time that left."""
     return (values[0], 0 * values[0]), flux[-3]
 
 
@@ -24,7 +24,7 @@ def give_one_way(flux, values, dt):
 
 
 def supply(given, values, dt):
-    """Return the given flux; publish minus the mass per time that it gave in the last step."""
+    """Return the flux; publish minus the mass per time that entered."""
     q, way, rho = values
     ways = range(len(given))
     gave = total([where(way == k, given[k], 0) for k in ways])

@@ -1,4 +1,4 @@
-"""fix python: call a Python function on points or nodes."""
+"""fix python."""
 
 import inspect
 import pickle
@@ -29,13 +29,13 @@ DATA = (
 
 
 class PythonFunction:
-    """Script argument: a function of a module, or one passed to the scene from Python."""
+    """Script argument: a function of a module, or one passed from Python."""
 
     script_kind = "the name of a function: module.function"
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Import the function; modules next to the script come first."""
+        """Modules next to the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -153,7 +153,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of changed values that restart files lack."""
+        """Warn once of values that restart files lack."""
         keeper = self.keeper
         forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
@@ -205,7 +205,7 @@ class Python(Fix):
 
 
 class Keeper:
-    """The object or module of a function, with the values that it stores between steps.
+    """Object or module of a function, and its stored values.
 
     `names` are the names in ``remembers``; `title` names the object.
     """

@@ -1,4 +1,4 @@
-"""Rigid bodies that move by the forces on them, and their contact with points."""
+"""Rigid bodies, and their contact with points."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any
@@ -27,7 +27,7 @@ NOT_ROUND = 1e-9  # relative tolerance of moments of inertia
 
 
 class Components:
-    """Script argument: a formula, or several in parentheses; NULL leaves a component free."""
+    """Script argument: formulas in parentheses; NULL leaves a component free."""
 
     script_kind = "formulas: a, or (a, b)"
 
@@ -194,7 +194,6 @@ class RigidBody(Fix):
     def _refuse_another_start(
         self, given: tuple[Components | None, Components | None], start: list, fixed: Any
     ) -> None:
-        """Refuse initial velocities in directions with prescribed motion."""
         for k, (item, formula) in enumerate(zip(start, self.led, strict=True)):
             components = given[k // 3]
             if item is None or formula is None or components is None or self.hub.rehearsing:
@@ -273,7 +272,7 @@ class RigidBody(Fix):
         return self._moved(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
 
     def _moved(self, x0: np.ndarray) -> np.ndarray:
-        """Return present positions (n, d) of initial ones."""
+        """Present positions (n, d) of initial ones."""
         d, arm = self.hub.domain.dimension, np.zeros((len(x0), 3))
         arm[:, :d] = x0
         arm -= self.constants.start
@@ -301,7 +300,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Return formulas by axis, None if missing; `ways` from 3 on are rotations."""
+        """Formulas by axis, or None; `ways` from 3 on are rotations."""
         items: list[Expression | None] = [None] * size
         if components is None:
             return items
@@ -333,7 +332,7 @@ class RigidBody(Fix):
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
-        """Return the pivot (3,) of the body and fix its directions; [] if it moves freely."""
+        """Pivot (3,) of the body; [] without one."""
         if pivot is None:
             return []
         if max(self.ways) < 3:
@@ -410,7 +409,7 @@ class RigidBody(Fix):
 
 
 def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments and axes (by columns); x, y, z if principal."""
+    """Principal moments and axes (by columns)."""
     off = np.abs(tensor - np.diag(np.diag(tensor))).max()
     if off <= NOT_ROUND * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)
@@ -499,7 +498,7 @@ class ContactRigidBody(Fix):
                 raise error
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Return the number of points in the body before the first step, and the largest depth."""
+        """Number of points in the body before the first step, and largest depth."""
         depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
         index = points.numbers - self.touches.first_id
         depth = depth[(index < 0) | (index >= self.touches.count)]

@@ -30,7 +30,7 @@ def _require_rigid(solid: Solid, mark: Mark | None) -> None:
 
 
 class Party(NamedTuple):
-    """Script argument: a rigid solid, or a region that does not move."""
+    """Script argument: a rigid solid, or a fixed region."""
 
     ID: str
     mark: Mark | None
@@ -273,7 +273,6 @@ def joints(hub: Hub) -> list[Joint]:
 
 
 def _passed(fix: RigidBody, scene: Any) -> dict[str, str] | None:
-    """Return the rigid solids that a body passes through."""
     linked = {fix.body.id}
     for contact in contacts(fix.hub):
         names = [part.ID for part in contact.parts]

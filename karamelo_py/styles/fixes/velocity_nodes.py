@@ -1,4 +1,4 @@
-"""Fixes that set node velocities, and compute reaction."""
+"""Fixes of node velocities, and compute reaction."""
 
 import re
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, unlike
 
 
 def prescribe(node):
-    """Set v to the value one step earlier, as at a symmetry plane; the total is the reaction."""
+    """Set v to the value one step earlier, as at a symmetry plane."""
     return node.before, node.value, node.force, node.mass * (node.value - node.v_star) / node.kick
 
 
@@ -29,19 +29,19 @@ def prescribe_mapped(node):
 
 
 def prescribe_at_most(node):
-    """Bound v* from above; the total is the reaction, which pushes backwards."""
+    """The total is the reaction, which pushes backwards."""
     allowed = min(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
 
 def prescribe_mapped_at_most(node):
-    """Bound v, too: otherwise stress does spurious work, and a rebound gains half of the energy."""
+    """Without a bound of v, stress does spurious work, and a rebound gains half of the energy."""
     allowed = node.value if node.v_star == node.value else min(node.v, node.value)
     return allowed, allowed, node.force, 0.0
 
 
 def prescribe_at_least(node):
-    """Bound v* from below; the total is the reaction, which pushes forwards."""
+    """The total is the reaction, which pushes forwards."""
     allowed = max(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
@@ -64,7 +64,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """Script argument: a number or a formula, after the word leq or geq if it is a `bound`."""
+    """Script argument: a formula, after leq or geq for a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""

@@ -1,4 +1,4 @@
-"""Fixes that set point velocities, with a warning of conflicts before the run."""
+"""Fixes of point velocities."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -125,7 +125,7 @@ class InitialVelocityParticles(VelocityOfPoints):
 def gradient(
     evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Differentiate (n, d) by x (`moves`) or x0, by central differences over `step`.
+    """Derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
 
     At the reference position, x and x0 are the same coordinate.
     """

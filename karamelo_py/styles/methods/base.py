@@ -1,4 +1,4 @@
-"""Base of methods: grids, point data, parts of a step."""
+"""Base of methods."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -40,15 +40,13 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """Return True if the yield surface uses part of the averaged pressure (F-bar)."""
+    """True if the yield surface uses the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
 
 
 class NoContact(NamedTuple):
-    """Solids interact through common nodes, or not at all."""
-
     rows = rows_before = rows_after = ()
 
 
@@ -98,22 +96,22 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """Return True if the basis needs points equally spaced in a cell, whose domains tile it."""
+        """True if the basis has domains that tile a cell."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Tag of contact between solids with separate velocity fields."""
+        """Tag of contact between solids."""
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Update the result of `contact_between` from the fixes, before every run."""
+        """Update the tag from the fixes, before every run."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Views of the state of `contact` for the next step, in node ranges `spans` (k, 2)."""
+        """State for the next step, in node ranges `spans` (k, 2)."""
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Copy the state of the contact `before` this lowering of the scene."""
+        """Copy the state of the contact `before` lowering."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Register a new solid."""
@@ -124,21 +122,21 @@ class Method:
         return [self._lattice(domain.dimension, *ends, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Mask (F,) of fields of rigid solids; (0,) if none is."""
+        """Mask (F,) of fields of rigid solids, or (0,)."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """Nodes to hold where a fix gives all components of the velocity of `nodes`."""
+        """Nodes to hold where a fix gives the whole velocity of `nodes`."""
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:
         return hub.domain.kin
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """Tag of averaging: `FBar` if volume changes are averaged."""
+        """`FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
         laws = [solid.material.law for solid in hub.solids.values()]
@@ -191,7 +189,7 @@ class Method:
 
 
 def _corners(element: Element, solid: Solid) -> np.ndarray:
-    """Corners (n, c, d) of the elements of a mesh, else of the boxes, with volumes >= 0."""
+    """Corners (n, c, d) of elements or boxes, with volumes >= 0."""
     corners = solid.corners
     if corners is None:
         corners = solid.x0[:, None, :] + np.array(element.box) * solid.half_size[:, None, :]

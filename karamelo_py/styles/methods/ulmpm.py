@@ -1,4 +1,4 @@
-"""Methods ulmpm and tlmpm: one grid for the whole domain, or one for each solid."""
+"""Methods ulmpm and tlmpm."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

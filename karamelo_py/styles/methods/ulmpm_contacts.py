@@ -1,4 +1,4 @@
-"""method ulmpm/contacts: a velocity field for each solid, and contact on the grid."""
+"""method ulmpm/contacts."""
 
 from collections.abc import Iterator, Sequence
 from math import prod
@@ -41,7 +41,7 @@ def flows(law: NamedTuple) -> bool:
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
-    """Fraction (F, F) of frictional heat that the first of two solids takes.
+    """Fraction (F, F) of frictional heat for the first of two solids.
 
     With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces (Carslaw & Jaeger
     1959, section 2.15); otherwise half each, none without a temperature.
@@ -129,7 +129,7 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """`nodes`, and nodes around points of a body in cells with all corners in `nodes`.
+        """`nodes`, and nodes around points in cells with all corners in `nodes`.
 
         Otherwise the contact normal would rotate, as splines and domains reach further nodes.
         """
@@ -215,11 +215,11 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Views of `touched`, which usf and usavg read at the start of a step."""
+        """`touched`, which usf and usavg read at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Continue from the contact `before`; new fields come after the old ones."""
+        """New fields come after the old ones."""
         if contact.stride == before.stride:
             fields = before.touched.shape[1]
             touched = np.flatnonzero(before.touched.any(axis=1))

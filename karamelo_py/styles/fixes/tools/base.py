@@ -1,4 +1,4 @@
-"""Bases of walls and rigid tools that push points: planes, balls, their force."""
+"""Bases of walls and rigid tools that push points."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -19,7 +19,7 @@ from karamelo_py.styles.fixes.forces import PointForces
 
 
 class ToolFix(PointForces):
-    """Base of fixes that push points, taken as small cubes (in 2D squares)."""
+    """Points are small cubes (in 2D squares)."""
 
     follows_points = presses = True
     needs_stiffness = False  # the force scales with the point's shear modulus
@@ -57,7 +57,7 @@ class ToolFix(PointForces):
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
     def face(self, points: PointsView) -> np.ndarray:
-        """Face areas (n,) of these cubes, per radian in axisymmetry."""
+        """Areas (n,), per radian in axisymmetry."""
         domain = self.hub.domain
         return self.side(points) ** (domain.dimension - 1) * domain.depth(points.position)
 
@@ -89,7 +89,7 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """Base of walls: a plane that may move, with points on the side of its normal."""
+    """A plane that may move, with points on the side of its normal."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)
@@ -98,7 +98,7 @@ class PlaneTool(ToolFix):
             unit(self.now(*self.towards))
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Depth (n,) of points past the plane, and its normal (d,)."""
+        """Depth (n,) of points, and the normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_origin(points, self.origin) @ normal), normal
 

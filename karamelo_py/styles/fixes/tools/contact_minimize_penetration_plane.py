@@ -1,4 +1,4 @@
-"""Contact of a solid with a plane, as stiff as the step allows."""
+"""Contact of a solid with a plane."""
 
 from typing import Annotated
 

@@ -118,7 +118,7 @@ class ContactSurface(StiffTool):
             self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (d,) of the region so far, and its mean velocity (d,) in the next step."""
+        """Displacement (d,) so far, and mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):

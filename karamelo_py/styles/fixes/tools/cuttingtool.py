@@ -61,7 +61,7 @@ class CuttingTool(ToolFix):
             self._faces()
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Outward unit normals (2, 2) of the faces to A and to B, and the tip."""
+        """Outward normals (2, 2) of the faces, and the tip."""
         tip = self.now(*self.tip)
         a, b = (self.now(*end) - tip for end in self.ends)
         turn = a[0] * b[1] - a[1] * b[0]

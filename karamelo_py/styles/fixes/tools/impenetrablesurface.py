@@ -1,4 +1,4 @@
-"""A plane that pushes points back with a force proportional to their shear modulus."""
+"""Planes with a force proportional to the shear modulus."""
 
 from typing import Annotated
 

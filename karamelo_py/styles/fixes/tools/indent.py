@@ -1,4 +1,4 @@
-"""A ball that pushes points with a force of depth squared."""
+"""Balls with a force of depth squared."""
 
 from typing import Annotated, Literal, Self
 
@@ -15,7 +15,7 @@ from karamelo_py.styles.fixes.tools.base import BallTool
 
 
 class Radius(Expression):
-    """Script argument: a radius above 0, which came after the centre in Karamelo in 2020."""
+    """Script argument: a radius, in 2020 after the centre."""
 
     script_kind = "a number or a formula above 0"
 

@@ -1,4 +1,4 @@
-"""A rigid ball, as stiff as the step allows."""
+"""A rigid ball in contact."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""Loads on the surface of a body: a force per area on the outer points."""
+"""A force per area on the outer points."""
 
 import numpy as np
 

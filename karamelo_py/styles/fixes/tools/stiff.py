@@ -1,4 +1,4 @@
-"""Tools as stiff as a step allows, with friction that stores its grip."""
+"""Tools as stiff as a step allows, with friction."""
 
 from typing import Any
 
@@ -31,12 +31,10 @@ class StiffTool(Gripping, ToolFix):
         seen: np.ndarray,
         led: Any = 0.0,
     ) -> np.ndarray:
-        """Return forces (n, d) that move points by `push` (n,) along `normal` in a step, m push /
-        dt^2.
+        """Forces m push / dt^2 (n, d) that move points by `push` (n,) along `normal` in a step.
 
         Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops and reverses the
-        slip on a tool of this `velocity`: of the positions `seen` (n, d) minus the displacement
-        `led` by the tool.
+        slip of positions `seen` (n, d) on a tool of this `velocity`, displaced by `led`.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
         load = stiffness * np.maximum(push, 0)
