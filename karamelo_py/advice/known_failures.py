@@ -83,11 +83,11 @@ def warn_about_weightless_water(hub: Hub, simulation: Simulation) -> None:
     wet = [solid.material for solid in hub.solids.values() if solid.material.fluid]
     still = all(map(_is_water_at_rest, hub.fixes.values())) and simulation.fastest() == 0
     if wet and still and hub.update.first_time(REST):
-        given = [fix.mark for fix in hub.fixes.values() if fix.water_only and not _is_zero(fix)]
+        marks = [fix.mark for fix in hub.fixes.values() if fix.water_only and not _is_zero(fix)]
         g = ", ".join([*["0"] * (hub.domain.dimension - 1), "-9.81"])
         hub.warn(
             f"the water in the pores of '{wet[0].id}' has no weight, and nothing loads the ground",
-            mark=[*given, wet[0].mark][0],
+            mark=[*marks, wet[0].mark][0],
             hint=f"fix(weight, body_force, all, {g}), which acts on soil and water, or a load",
             code="weightless-water",
         )

@@ -118,11 +118,11 @@ class Argument:
             return script.evaluate(parse_expression(self._raw), self._raw)
         except ScriptError as error:
             if error.code == "unknown-name":
-                name, known = error.name or "", [*self.numbers(), *numbers]
-                others = ", ".join(known) or "none so far"
+                name, names = error.name or "", [*self.numbers(), *numbers]
+                others = ", ".join(names) or "none so far"
                 few = one_of(name, seeds)
                 choices = f"{few}, or a number that the script has set ({others})"
-                hint = meant(name, [*seeds, *known]) or f"{name}=..., after the formula"
+                hint = meant(name, [*seeds, *names]) or f"{name}=..., after the formula"
                 error.expected, error.hint = choices, hint
             raise
 

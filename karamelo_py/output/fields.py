@@ -158,15 +158,15 @@ class Fields(PointTable):
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
         """Points within `half` (n, d) of one of `x` (n, d) along all axes."""
-        size, found = half.min(axis=0), []
+        size, numbers = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
         for some in self.some(None):
-            place = some.position / size
-            around = np.flatnonzero(((place > lo) & (place < hi)).all(axis=1))
-            hit = [k for k in around if (np.abs(x - place[k]) < 1).all(axis=1).any()]
-            found.append(some.numbers[hit])
-        of_all = self.comm.allgather(np.concatenate([np.empty(0, np.int64), *found]))
+            scaled = some.position / size
+            around = np.flatnonzero(((scaled > lo) & (scaled < hi)).all(axis=1))
+            hit = [k for k in around if (np.abs(x - scaled[k]) < 1).all(axis=1).any()]
+            numbers.append(some.numbers[hit])
+        of_all = self.comm.allgather(np.concatenate([np.empty(0, np.int64), *numbers]))
         return np.sort(np.concatenate(of_all))
 
     def seen(self, say: Callable, *arguments: object) -> list:

@@ -47,10 +47,10 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 def there(s: arrays.Setup) -> arrays.Setup:
     """Remove what a GPU does not use."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
-    buffers, own = s.buffers._replace(nodes=s.nodes), s.heat
-    if isinstance(own, heat.Conducting):
-        own = own._replace(buffers=buffers._replace(nodes=own.nodes))
-    return s._replace(blocks=blocks, buffers=buffers, heat=own)
+    buffers, conduction = s.buffers._replace(nodes=s.nodes), s.heat
+    if isinstance(conduction, heat.Conducting):
+        conduction = conduction._replace(buffers=buffers._replace(nodes=conduction.nodes))
+    return s._replace(blocks=blocks, buffers=buffers, heat=conduction)
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
@@ -105,10 +105,10 @@ class StepsOnCard:
 
     def _steps(self, rows: list) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         begin, end = self._clear(*self._slots()), [self.launch(gpu.finish_step, 1, self.s)]
-        own = self._launches(rows)
-        last = [launch for launch in own if launch not in self._ahead]
+        launches = self._launches(rows)
+        last = [launch for launch in launches if launch not in self._ahead]
         return (
-            [*begin, *own, *end, *self._publish(last=False)],
+            [*begin, *launches, *end, *self._publish(last=False)],
             [*begin, *last, *end, *self._publish(last=True)],
         )
 
@@ -205,9 +205,9 @@ class StepsOnCard:
             if room.nbytes < most:  # cell sums are free meanwhile
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
-                own = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
-                yield self.launch(gpu.take_rows, size, rows, come_from, own)
-                yield self.launch(gpu.put_rows, size, rows, own)
+                target = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
+                yield self.launch(gpu.take_rows, size, rows, come_from, target)
+                yield self.launch(gpu.put_rows, size, rows, target)
 
     def _hook(self, h: int) -> tuple[fixes.Act, dict]:
         called = dict.fromkeys((NODE_FUNCTION, POINT_FUNCTION, HEAT_FUNCTION), self.functions[h])
@@ -229,12 +229,12 @@ class StepsOnCard:
         self, stage: int, target: int, at: Callable | None = None
     ) -> Iterator[KernelLaunch]:
         s, of_heat = at(self.s) if at else self.s, at is heat.at_its_nodes
-        own = [h for h, row in enumerate(self.table) if row.stage == stage]
-        yield from self._clear_again(stage, own)
-        if own and target == arrays.ON_UPDATE and self.hooks.holders.size:
+        rows = [h for h, row in enumerate(self.table) if row.stage == stage]
+        yield from self._clear_again(stage, rows)
+        if rows and target == arrays.ON_UPDATE and self.hooks.holders.size:
             yield self.launch(fixes.clear_held, self.nodes, self.hooks.holders)
         nodes_of, length = fixes.hooked_nodes(target, of_heat), step_size if of_heat else kick
-        for h in own:
+        for h in rows:
             row = self.table[h]
             if row.uses_share:
                 yield self.launch(gpu.clear, 1, self.heavy, h)
@@ -245,7 +245,7 @@ class StepsOnCard:
                 act = fixes.on_node(fixes.whole_nodes(target, stage), ACT)
                 yield self._act(act, h, s, *self._whole(h))
             yield from self._publish_at_once(h)
-        for h in own:
+        for h in rows:
             if self.hooks.programs[h][FRICTION].begin >= 0:
                 yield self._act(fixes.on_node(nodes_of, RUB), h, s)
                 yield from self._publish_at_once(h)
@@ -259,19 +259,19 @@ class StepsOnCard:
         return self.launch(function, count, s, about, *tag, called=called)
 
     def hooks_on_points(self, stage: int, then: int) -> Iterator[KernelLaunch]:
-        own = [h for h, row in enumerate(self.table) if row.stage == stage]
+        rows = [h for h, row in enumerate(self.table) if row.stage == stage]
         heats = stage == arrays.SUPPLY_HEAT
         points_of = heat.heated if heats else moving_points
-        yield from self._clear_again(stage, own)
+        yield from self._clear_again(stage, rows)
         for block in self.s.blocks:
             if stage == arrays.INITIAL_INTEGRATE and len(self.table) and self.hooks.whole:
                 yield self.of_points(fixes.clear_force, block)
-            for h in own:
+            for h in rows:
                 (about, called), whole = self._hook(h), self._whole(h)
                 points = fixes.whole_points(heats) if whole else points_of
                 act = fixes.on_point(points, then, self._values(h))
                 yield self.of_points(act, block, about, *whole, called=called)
-        for h in own:
+        for h in rows:
             yield from self._publish_at_once(h)
 
     def work_of_loads(self, target: int) -> Iterator[KernelLaunch]:
@@ -288,10 +288,10 @@ class StepsOnCard:
         rows = [self._rows_of(h) for h, row in enumerate(self.table) if row.slot >= 0]
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
-    def _clear_again(self, stage: int, own: list[int]) -> Iterator[KernelLaunch]:
+    def _clear_again(self, stage: int, rows: list[int]) -> Iterator[KernelLaunch]:
         """Clear totals of hooks whose stage repeats within a step."""
         if stage in self._acted:
-            for h in own:
+            for h in rows:
                 if self.table[h].slot >= 0:
                     yield from self._clear(*self._rows_of(h))
         self._acted.add(stage)
@@ -329,20 +329,20 @@ class StepsOnCard:
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         s, sums = self.s, self.s.control.totals
         copies, solids = self.copies, (len(s.control.values), len(sums))
-        found = [*self._clear(0, WORK), *self._clear(*solids)]
+        launches = [*self._clear(0, WORK), *self._clear(*solids)]
         for block in s.blocks:
             if not is_rigid(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
-                found.append(self.launch(fixes.add_energies, threads, s, block, copies))
+                launches.append(self.launch(fixes.add_energies, threads, s, block, copies))
             if any(field(block.points.fields, kind) is not None for kind in fixes.ADDED):
-                found.append(self.of_points(fixes.add_work, block, copies))
+                launches.append(self.of_points(fixes.add_work, block, copies))
         if field(s.nodes.fields, WorkAtNodes) is not None:
-            found.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
-        found += [*self.collect(0, WORK + 1), *self.collect(*solids)]
+            launches.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
+        launches += [*self.collect(0, WORK + 1), *self.collect(*solids)]
         before, behind = (
             self.launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
         )
-        return [*found, before], [*found, behind]
+        return [*launches, before], [*launches, behind]
 
     def send(self) -> None:
         self.use[:] = 2  # nodes may hold values of any step

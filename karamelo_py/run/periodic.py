@@ -50,8 +50,8 @@ def mark_nodes(s: Setup, domain: Domain) -> None:
         return
     n, home = np.arange(len(used)), np.ones(len(used), bool)
     for axis in s.control.ranks.axes:
-        place = (n - axis.first) // axis.stride % axis.count - GHOSTS
-        home &= (place >= 0) & (place < axis.period)
+        node = (n - axis.first) // axis.stride % axis.count - GHOSTS
+        home &= (node >= 0) & (node < axis.period)
     if not used[home, 0].all():
         raise ScriptError(
             "a sheared cell has empty places",

@@ -76,14 +76,17 @@ def _of_geotiff(path: Path) -> Raster:
         ) from None
     try:
         with rasterio.open(path) as file:
-            heights, place = file.read(1, masked=True).astype(float).filled(np.nan), file.transform
+            heights, transform = (
+                file.read(1, masked=True).astype(float).filled(np.nan),
+                file.transform,
+            )
     except rasterio.errors.RasterioError as error:
         raise ScriptError(f"{path} cannot be read: {error}", argument="file") from None
-    if place.b or place.d or not np.isclose(place.a, -place.e):
-        message = f"{path} has cells of {place.a:g} by {-place.e:g}, or is rotated"
+    if transform.b or transform.d or not np.isclose(transform.a, -transform.e):
+        message = f"{path} has cells of {transform.a:g} by {-transform.e:g}, or is rotated"
         raise ScriptError(message, argument="file", expected="square cells along the axes")
-    corner = np.array([place.c, place.f + heights.shape[0] * place.e])
-    return Raster(corner, place.a, heights[::-1])
+    corner = np.array([transform.c, transform.f + heights.shape[0] * transform.e])
+    return Raster(corner, transform.a, heights[::-1])
 
 
 def read_profile(path: Path) -> np.ndarray:

@@ -40,8 +40,8 @@ class Expression:
         self.operation: str = operation
         self.operands: tuple[Expression, ...] = operands
         self.value: Any = float(value) if operation == "number" else value
-        own = {value} if operation == "name" else ()
-        self.names: frozenset[str] = frozenset(own).union(*(one.names for one in operands))
+        seeds = {value} if operation == "name" else ()
+        self.names: frozenset[str] = frozenset(seeds).union(*(one.names for one in operands))
         # Counts common operations repeatedly.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:

@@ -396,8 +396,8 @@ class LoadSteps:
             if np.linalg.matrix_rank(rows) == motions.shape[2]:
                 continue
             free = free_from(s.kin)
-            held = fixed[nodes].any(0)[free : s.kin.dimension]
-            loose = [x for x, h in zip("xyz"[free:], held, strict=False) if not h]
+            constrained = fixed[nodes].any(0)[free : s.kin.dimension]
+            loose = [x for x, h in zip("xyz"[free:], constrained, strict=False) if not h]
             how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(rows) else "is held by nothing"
             raise self._loose(self._solid_at(equations, nodes), how)

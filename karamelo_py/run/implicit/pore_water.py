@@ -73,9 +73,9 @@ class Seepage:
         self.density = self.N.T @ (self.volume * density) / volumes
         every = self.N.T @ (self.volume * ~self.drains) == 0
         self.softest = np.where(every, self.N.T @ (self.volume * self.suction) / volumes, np.inf)
-        given = field(s.nodes.fields, GivenPressure)[equations.nodes].astype(float)
-        self.given = given[:, 0]
-        faces = self.present & (given[:, 1] == 1)
+        prescribed = field(s.nodes.fields, GivenPressure)[equations.nodes].astype(float)
+        self.given = prescribed[:, 0]
+        faces = self.present & (prescribed[:, 1] == 1)
         self.open = self.present & ~np.isnan(self.given) & ~faces
         self._lay_out_flow()
         self.outlet = np.where(faces, OUTLET * self.L.diagonal(), 0.0)
@@ -142,15 +142,15 @@ class Seepage:
 
     def _flux(self) -> np.ndarray:
         """Volume (m,) supplied to nodes; stores the mass rate, as `MakeFlux` does."""
-        given = field(self.equations.s.nodes.fields, GivenFlux)
-        if given is None:
+        flux = field(self.equations.s.nodes.fields, GivenFlux)
+        if flux is None:
             return np.zeros(self.m)
         areas = [g.T @ self.volume for g in self.G]
         sides = [np.maximum(sign * area, 0) for area in areas for sign in (-1, 1)]
         surface = np.sqrt(sum(area * area for area in areas))
         amounts = np.stack([*sides, surface, self.N.T @ self.volume], 1)
-        amounts *= given[self.equations.nodes, : amounts.shape[1]]
-        given[self.equations.nodes, : amounts.shape[1]] = amounts
+        amounts *= flux[self.equations.nodes, : amounts.shape[1]]
+        flux[self.equations.nodes, : amounts.shape[1]] = amounts
         return self.dt * amounts.sum(1) / self.rho[0]
 
     def _scale(self, p: np.ndarray) -> np.ndarray:
@@ -177,11 +177,11 @@ class Seepage:
         self.capacity = self.V0 * ratio * self.pores_after * (1 + rise) / scale
         departs = at - self.before
         damped = self.D.T @ (self.volume * self.compliance * (departs - self.mean @ departs))
-        held, moved = self.N.T @ (self.V0 * self.gain), self.L @ self.p
+        stored, moved = self.N.T @ (self.V0 * self.gain), self.L @ self.p
         above = np.where(self.outlet > 0, self.p - self.given, 0.0)
         self.seeps, self.lets = self.outlet * np.maximum(above, 0), self.outlet * (above > 0)
-        self.rest = held + moved - self.pull + damped + self.seeps
-        self.size = max(float(np.linalg.norm(one)) for one in (held, moved, damped))
+        self.rest = stored + moved - self.pull + damped + self.seeps
+        self.size = max(float(np.linalg.norm(one)) for one in (stored, moved, damped))
 
     def _strain(self, u: np.ndarray) -> None:
         d = self.d

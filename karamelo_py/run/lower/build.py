@@ -348,12 +348,12 @@ def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[array
     span = int(ids[0]), int(ids[-1]) + 1
     real = PRECISIONS[hub.settings.precision]
     kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")
-    found = []
+    by_block = []
     for solids, block in zip(solids_alike(hub, span), setup.blocks, strict=True):
         points, _ = lower_points(hub, solids, setup.kin, kinds, real)
         rows = np.flatnonzero(np.isin(points.id, ids))
-        found.append(arrays.some_of(block._replace(points=points), rows).points)
-    return found
+        by_block.append(arrays.some_of(block._replace(points=points), rows).points)
+    return by_block
 
 
 def point_kinds(hub: Hub) -> tuple[type, ...]:

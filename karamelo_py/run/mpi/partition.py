@@ -331,9 +331,9 @@ class SharedTiles(Tiles):
                     nodes.append(between(*rows_of(self._parts(grid[which], low, high, 0, 0))))
         if self._margin and me in self._uses:
             which, low, high = self._uses[me].among(self._tile_of_domain(tiles), begin, end)
-            own = between(*rows_of(self._parts(grid[which], low, high, 0, 0)))
+            local = between(*rows_of(self._parts(grid[which], low, high, 0, 0)))
             every = between(*rows_of(self._parts(grid, begin, end, 0, 0)))
-            nodes.append(every[~np.isin(every, own)])
+            nodes.append(every[~np.isin(every, local)])
         self._marked = np.concatenate(nodes)
         self.foreign[self._marked] = 1
 

@@ -300,12 +300,12 @@ class _Deck:
             merged.add(body)
         for is_nodes, name, instance, items in self.assembly:
             sets = merged.nodes if is_nodes else merged.elements
-            known = instance if instance in sets.numbering else bodies[-1].name
+            owner = instance if instance in sets.numbering else bodies[-1].name
             for item in items:
                 if isinstance(item, str):
                     sets.extend(name, f"{instance}.{item}")
                 else:
-                    sets.add(name, known, item)
+                    sets.add(name, owner, item)
         if self.instances:  # assembly sets made of INSTANCE.SET and of each other
             pairs = (self.whole.nodes, merged.nodes), (self.whole.groups, merged.elements)
             for of_deck, sets in pairs:

@@ -82,8 +82,8 @@ class Mesh(NamedTuple):
         if name is None:
             # Gmsh numbers its groups and may name them. A number used in only one dimension needs
             # no dimension as a prefix.
-            known = {*names}
-            once = [n for n in names if n.rpartition(":")[2] not in known or ":" not in n]
+            taken = {*names}
+            once = [n for n in names if n.rpartition(":")[2] not in taken or ":" not in n]
             named = [name for name in once if not name.isdigit()] or once
             error = unknown(message, group, named[:_MANY], argument="group")
             error.expected = error.expected if named else "no group: the whole mesh"

@@ -44,9 +44,9 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
              for family, nodes in elements]  # fmt: skip
     for kinds in ([_EDGES.get(family, ()) for family, _ in elements], of_faces, inner):
         for (_, nodes), places in zip(elements, kinds, strict=True):
-            for place in places:
-                if len(place) != 3:
-                    key = frozenset(nodes[k] for k in place)
+            for corners in places:
+                if len(corners) != 3:
+                    key = frozenset(nodes[k] for k in corners)
                     numbers.setdefault(key, first + len(numbers))
     return numbers
 

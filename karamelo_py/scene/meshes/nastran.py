@@ -184,8 +184,8 @@ def read_nastran(path: Path) -> Mesh:
             raise entry.wrong("is not read", "CORD1 or CORD2")
         elif name in _TYPES:
             family, corners, most = _TYPES[name]
-            given = entry.fields[2 : 2 + most]
-            count = most if len(given) == most and all(given) and "0" not in given else corners
+            nodes = entry.fields[2 : 2 + most]
+            count = most if len(nodes) == most and all(nodes) and "0" not in nodes else corners
             of_mesh = family if count == corners else f"{family}{count}"
             elements[of_mesh, name].append(entry.wholes(2 + count))
         elif _NO_SOLIDS.fullmatch(name):

@@ -31,9 +31,9 @@ class Acting(NamedTuple):
             message = f"'{ID}' is a solid (line {solid.mark.line}) and a fix (line {fix.mark.line})"
             raise ScriptError(message, mark=argument.mark, expected="another ID for the fix")
         if fix is None and solid is None:
-            known = ", ".join([*hub.solids, *(f for f in hub.fixes if hub.fixes[f].exerts)])
+            candidates = ", ".join([*hub.solids, *(f for f in hub.fixes if hub.fixes[f].exerts)])
             message = f"there is no solid and no fix '{ID}'"
-            raise ScriptError(message, mark=argument.mark, expected=known or cls.script_kind)
+            raise ScriptError(message, mark=argument.mark, expected=candidates or cls.script_kind)
         if fix is not None and not fix.exerts:
             raise ScriptError(
                 f"fix '{ID}' ({fix.style}) publishes no force with a torque",

@@ -144,14 +144,14 @@ class Inflow(VelocityNodes):
                 f"no layer enters by then: the first one enters at {self.distance / self.speed:g}"
             )
             raise ScriptError(message, argument="until", expected="a later time")
-        own = solid.count
+        initial = solid.count
         entering = [rows[k % len(rows)] for k in range(self.layers)]
-        self.ends = own + np.cumsum([0, *map(len, entering)])
+        self.ends = initial + np.cumsum([0, *map(len, entering)])
         self.masses = [fsum(solid.mass[some].tolist()) for some in entering[: len(rows)]]
-        made = chosen_of(solid, np.concatenate([np.arange(own), *entering]))
-        made.x0[own:, axis] = solid.x0[rows[-1][0], axis]
+        made = chosen_of(solid, np.concatenate([np.arange(initial), *entering]))
+        made.x0[initial:, axis] = solid.x0[rows[-1][0], axis]
         replace_points(hub, solid, made)
-        hub.waiting = np.union1d(hub.waiting, solid.first_id + np.arange(own, self.ends[-1]))
+        hub.waiting = np.union1d(hub.waiting, solid.first_id + np.arange(initial, self.ends[-1]))
         columns = zip(("vx", "vy", "vz"), self.velocity, strict=False)
         solid.initial |= {name: np.full(solid.count, v) for name, v in columns}
 

@@ -192,16 +192,16 @@ class RigidBody(Fix):
             self._begin_points(solid)
 
     def _refuse_another_start(
-        self, given: tuple[Components | None, Components | None], start: list, fixed: Any
+        self, initial: tuple[Components | None, Components | None], start: list, fixed: Any
     ) -> None:
         for k, (item, formula) in enumerate(zip(start, self.led, strict=True)):
-            components = given[k // 3]
+            components = initial[k // 3]
             if item is None or formula is None or components is None or self.hub.rehearsing:
                 continue
             wanted, value = item.evaluate(self.hub.values), formula.evaluate(self.hub.values)
             if wanted != value:
-                held = fixed is not None and WAYS[k] in [part.text for part in fixed.listed()]
-                name = "fixed" if held else ("motion", "turning")[k // 3]
+                is_fixed = fixed is not None and WAYS[k] in [part.text for part in fixed.listed()]
+                name = "fixed" if is_fixed else ("motion", "turning")[k // 3]
                 message = f"it begins with {wanted:g} for {WAYS[k]}, and {name} says {value:g}"
                 raise _wrong(components.argument, message, f"NULL or {value:g} for {WAYS[k]}")
 
@@ -305,8 +305,8 @@ class RigidBody(Fix):
         if components is None:
             return items
         if len(components.items) != len(ways):
-            what = "formulas" if len(ways) != 1 else "formula"
-            expected = f"{len(ways)} {what}" if ways else "nothing: it does not rotate here"
+            noun = "formulas" if len(ways) != 1 else "formula"
+            expected = f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here"
             raise _wrong(components.argument, f"{len(components.items)} components", expected)
         parts = components.argument.listed()
         for way, item, part in zip(ways, components.items, parts, strict=True):
@@ -320,11 +320,11 @@ class RigidBody(Fix):
         return items
 
     def _hold(self, fixed: Argument | None) -> None:
-        known = [WAYS[k] for k in self.ways]
+        allowed = [WAYS[k] for k in self.ways]
         for part in fixed.listed() if fixed else ():
             name = part.text
-            if name not in known:
-                expected = "some of " + ", ".join(known)
+            if name not in allowed:
+                expected = "some of " + ", ".join(allowed)
                 raise _wrong(part, f"the body has no direction '{name}'", expected)
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"

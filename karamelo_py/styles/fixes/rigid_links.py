@@ -44,9 +44,9 @@ class Party(NamedTuple):
         ID, mark = argument.word() or argument.text, argument.mark
         solid = hub.solids.get(ID)
         if solid is None and ID not in hub.regions:
-            known = ", ".join([*(s.id for s in hub.solids.values() if s.rigid), *hub.regions])
+            candidates = ", ".join([*(s.id for s in hub.solids.values() if s.rigid), *hub.regions])
             message = f"there is no solid and no region '{ID}'"
-            raise ScriptError(message, mark=mark, expected=known or cls.script_kind)
+            raise ScriptError(message, mark=mark, expected=candidates or cls.script_kind)
         region = look_up(hub.regions, argument) if solid is None else solid.region
         if solid is not None:
             _require_rigid(solid, mark)
@@ -231,10 +231,10 @@ class Joint(Fix):
         needed = {"hinge": "axis" if d == 3 else "", "slider": "axis", "spring": "stiffness"}
         further = {"spring": ("end", "damping", "length")}
         takes = (needed.get(kind), *further.get(kind, ()))
-        given = {
+        options = {
             "axis": axis, "end": end, "stiffness": stiffness, "damping": damping, "length": length
         }  # fmt: skip
-        for name, value in given.items():
+        for name, value in options.items():
             if name == needed.get(kind) and value is None:
                 examples = {"axis": f"axis=({', '.join('001'[-d:])})", "stiffness": "stiffness=k"}
                 message = f"a {kind} needs its {name}"
