@@ -151,7 +151,7 @@ class Scouted(SceneFacts):
 
 
 def is_round(solid: Solid) -> bool:
-    """No point is further out than 1.1 radii of a ball of equal volume."""
+    """True if no point is further out than 1.1 radii of a ball of equal volume."""
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)

@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Gases and liquids have separate rules."""
+    """True if stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -66,7 +66,7 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Speed and duration of each solid that meets others.
+    """Speed and duration of the longest path of each solid that meets others.
 
     With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
     returned through the thinner solid.

@@ -54,7 +54,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Plug-ins count as motion."""
+    """True if nothing can move; plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -157,7 +157,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn once (or `again`), also for later runs."""
+    """Warn once (or `again`) of a step above the limit, also in later runs."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -271,7 +271,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:
-    """Constant loads act in the first load step only."""
+    """Warn once if constant loads act in the first load step only."""
     acting = [fix for fix in hub.fixes.values() if fix.hooks() and not fix.first_step_only]
     formulas_by_fix = {fix: fix.all_formulas for fix in acting}
     change = any(

@@ -32,7 +32,7 @@ def _acting(hub: Hub) -> list[Fix]:
 
 
 def _given(fix: Fix) -> tuple:
-    """NaN without formulas, as the effect is unknown."""
+    """Formulas of a fix; NaN without any, as its effect is unknown."""
     return tuple(fix.formulas) or fix.components or (np.nan,) * 3
 
 
@@ -239,7 +239,7 @@ def _line_of_rotation(fix: Fix, omega: str) -> str:
 
 
 def _angular_velocity(hub: Hub, fix: Fix, across: list[int], centre: np.ndarray) -> str | None:
-    """None if the velocities are not a rotation."""
+    """Angular velocity of a fix; None if its velocities are not a rotation."""
     formulas = [fix.formulas[axis] for axis in across]
     if fix.style not in ROTATING or any(one is None for one in formulas):
         return None

@@ -150,7 +150,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Nodes couple if they are in the stencil of one point."""
+    """Print unknowns and memory; nodes in the stencil of one point are coupled."""
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
     size = nodes * (2 * reach + 1) ** d * d * d * 8

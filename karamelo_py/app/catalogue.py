@@ -71,7 +71,7 @@ def print_help(
     commands: Iterable[str] = (),
     manuals: Callable[[], Mapping[str, tuple[str, str]]] = dict,
 ) -> int:
-    """`manuals`: summary and help by subcommand."""
+    """Explain a command, style, argument or topic; `manuals`: summary and help by subcommand."""
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path()):

@@ -64,7 +64,7 @@ class Quiet(Console):
         super().__init__(quiet=True)
 
     def warn(self, text: str) -> None:
-        """At the line outside the package that called it."""
+        """Warn at the line outside the package that called it."""
         level, frame = 1, sys._getframe()
         while frame.f_back and frame.f_globals.get("__name__", "").startswith("karamelo_py."):
             level, frame = level + 1, frame.f_back
@@ -161,7 +161,7 @@ class PointColumns(Columns):
 
 
 class Variables(MutableMapping):
-    """Numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
+    """Script variables, numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
 
     def __init__(self, sim: Simulation):
         self._sim = sim

@@ -137,7 +137,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Names missing in dumps come from logs or the script."""
+    """Add hints to errors: names missing in dumps come from logs or the script."""
     try:
         yield
     except ScriptError as error:

@@ -421,7 +421,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """Ignores variables with the name of an option."""
+    """The option, if it is one of `words`; a variable of that name is ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

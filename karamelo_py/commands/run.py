@@ -130,9 +130,9 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
         Exact number of steps.
     on_trouble
         ``stop``, or ``halve``: when a point fails, energy appears that no load supplied (otherwise
-        a warning), or the step becomes unstable, the run returns to its last good state, with log,
-        dumps, curves and computes, and halves the step, at most five times. Points that leave the
-        domain without an energy gain stop the run (see `boundary`).
+        a warning), or the step becomes unstable, the run returns to its last good state and halves
+        the step, at most five times. Log, dumps, curves and computes return, too. Points that leave
+        the domain without an energy gain stop the run (see `boundary`).
 
     Example
     -------

@@ -117,7 +117,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """A finite constant; NaN as result of a run in a rehearsal."""
+    """A finite constant; in a rehearsal, NaN is the result of a run."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

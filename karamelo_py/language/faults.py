@@ -53,7 +53,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
 
 
 def cause_of(error: BaseException) -> str:
-    """One line, with the user's line if it does not compile."""
+    """Describe an error in one line, with the user's line if it does not compile."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -69,7 +69,7 @@ def _others() -> tuple[str, ...]:
 
 
 def steps_to(error: BaseException) -> list[str]:
-    """Lines such as ``ropes.py:12 in pull: inner(points)``."""
+    """List the user's lines: ``ropes.py:12 in pull: inner(points)``."""
     others = _others()
     return [
         f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}: {frame.line}".rstrip(": ")

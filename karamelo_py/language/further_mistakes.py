@@ -40,7 +40,7 @@ class Dependents:
         self.lacks_columns = False
 
     def note(self, statement: Statement) -> bool:
-        """False if nothing else can be checked."""
+        """Record what a statement defines; False if nothing else can be checked."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
         if not isinstance(statement, CommandCall):

@@ -23,7 +23,7 @@ _LARGEST_INTEGER = 2**53  # above, floats skip integers
 
 
 def _rounding(value: float) -> float:
-    """For results such as 0.3/0.1."""
+    """Tolerance for results such as 0.3/0.1 to be integers."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
@@ -53,7 +53,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """`open` names the excluded ends (True: both)."""
+    """Constrain a number; `open` names the excluded ends (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -293,7 +293,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Raises TypeError for an unsupported annotation."""
+    """Kind of an annotation; raises TypeError if it is not supported."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:

@@ -17,7 +17,7 @@ _WORD = r"[^\W\d]\w*"
 
 
 class Presets(dict[str, str]):
-    """Texts by name."""
+    """Command-line variables, texts by name."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)

@@ -105,7 +105,7 @@ class Advice(NamedTuple):
 
 
 def code_of(name: str) -> str:
-    """``shocks of material 'm'`` is shocks-of-material."""
+    """Convert a name: ``shocks of material 'm'`` is shocks-of-material."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 

@@ -213,7 +213,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """As `call`, from values; faults are the author's."""
+    """Make a style from values, as `call` does; faults are the author's."""
     is_class = inspect.isclass(target)
     try:
         if not is_record(target):

@@ -261,7 +261,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
+    """Write ``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None

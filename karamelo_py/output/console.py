@@ -123,7 +123,9 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """`within`: activity in a step; `fraction` is None if the end is unknown."""
+        """Show progress, and the activity `within` a step; `fraction` is None if the end is
+        unknown.
+        """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
         if now - self._shown < pause or not self._running:
@@ -203,7 +205,7 @@ def show(value: object) -> str:
 
 
 def duration(seconds: float) -> str:
-    """42 s, 3 min 20 s, 2 h 5 min."""
+    """Format a duration: 42 s, 3 min 20 s, 2 h 5 min."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

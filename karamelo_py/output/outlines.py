@@ -69,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Linear weights; `at` is in cells."""
+    """Scatter with linear weights; `at` is in cells."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))

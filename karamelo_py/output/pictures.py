@@ -533,7 +533,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """A surface faces the side with fewer points."""
+        """Light on `some` points; a surface faces the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

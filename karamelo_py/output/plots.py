@@ -109,7 +109,7 @@ def in_mathtext(lead: str, exponent: int) -> str:
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Alike on an axis: 0.02, 500, or 10^-7, 3·10^-7."""
+    """Format numbers of an axis alike: 0.02, 500, or 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 

@@ -88,7 +88,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """The script may redefine a variable between runs."""
+        """Look up the source again, as a script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula

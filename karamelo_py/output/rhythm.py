@@ -15,7 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """`passed` counts multiples of `span`."""
+    """An interval in time; `passed` counts multiples of `span`."""
 
     def __init__(self, span: float):
         self.span = span
@@ -40,7 +40,7 @@ class Rhythmic:
         self.write()
 
     def finish(self) -> None:
-        """At the end of each run, also of a failed one."""
+        """Complete the files at the end of each run, also of a failed one."""
 
     @property
     def passed(self) -> int | None:

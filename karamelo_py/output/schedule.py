@@ -116,7 +116,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Errors become warnings."""
+        """Complete the outputs of an aborted run; errors become warnings."""
         if self.hub.rehearsing:
             return
         try:
@@ -165,7 +165,7 @@ def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Whether `path`, whose first ``*`` becomes a number, can name `other`."""
+    """True if `path`, whose first ``*`` becomes a number, can name `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

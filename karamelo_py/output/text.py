@@ -107,7 +107,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Return the end of nine digits, or `at` if undecided."""
+    """Write nine digits and return their end, or `at` if undecided."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)

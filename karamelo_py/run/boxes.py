@@ -149,7 +149,7 @@ def give_up(array: np.ndarray) -> None:
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """In place, since setups hold the array."""
+    """Resize in place, since setups hold the array."""
     if len(array) < rows:
         forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

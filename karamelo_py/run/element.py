@@ -25,7 +25,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Final values; other strains stay constant."""
+    """Final strains and stresses of a load path; other strains stay constant."""
 
     increments: int
     duration: float

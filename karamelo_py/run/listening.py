@@ -40,7 +40,7 @@ class Listener:
         """Explain `status` (DONE: energy gain)."""
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """Steps from `first_step` on took `wall` seconds."""
+        """The run is over: steps from `first_step` on took `wall` seconds."""
 
     def signalled(self, number: int) -> None:
-        """The run ends after the present steps."""
+        """A signal ends the run after the present steps."""

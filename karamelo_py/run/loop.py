@@ -24,7 +24,7 @@ SECONDS_PER_CHUNK = 0.3  # for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
-    """Outputs are complete."""
+    """A signal ended the run; outputs are complete."""
 
 
 @dataclass(eq=False)

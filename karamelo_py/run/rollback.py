@@ -20,7 +20,7 @@ RETURNS = 2  # per state before an energy gain; two halvings without effect are 
 
 
 class Stopped(ScriptError):
-    """The last good state of the failed run is written."""
+    """A run failed, and its last good state is written."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
@@ -61,7 +61,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Return False if the run went back."""
+        """Handle the `status` of steps; return False if the run went back."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, self._repeat):
             self._keep()

@@ -231,7 +231,7 @@ class SceneArrays:
             self.sort()
 
     def show_on_nodes(self) -> None:
-        """Unless a step has mapped the present state."""
+        """Map the present state to the nodes, unless a step has."""
         if self.mapped:
             return
         self.sort_if_due()

@@ -219,7 +219,7 @@ class Simulation(SceneArrays):
         return self.fixes.first is not None
 
     def refuse(self) -> None:
-        """The CPU runs all scenes."""
+        """Refuse nothing: the CPU runs all scenes."""
 
     def compile(self) -> None:
         hooks = self._acting

@@ -110,11 +110,7 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """True if drift costs neither stability nor energy.
-
-    Cubic splines, and usavg with a smooth basis (50 periods at 0.05 to 0.5 of the wave speed, in
-    2D). Colliding disks fracture sooner.
-    """
+    """True if drift costs neither stability nor energy."""
     basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
     return (
@@ -214,10 +210,7 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 
 
 def stable_conduction(hub: Hub) -> float:
-    """h^2 / (4 d) capacity / conductivity of undeformed bodies.
-
-    Half the bound of lumped finite elements, since points are anywhere in a cell.
-    """
+    """Smallest stable step of conduction: h^2 / (4 d) capacity / conductivity."""
     if not hub.update.thermal:
         return inf
     limits = [inf]

@@ -79,7 +79,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Only this code writes steps to the clock."""
+    """Chooses the steps; only this code writes them to the clock."""
 
     policy: StepPolicy
 
@@ -96,7 +96,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose again after initial values are set."""
+        """Choose the first step again, after initial values are set."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
@@ -206,7 +206,7 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """The step exceeded the stability limit from the start."""
+        """True if the step exceeded the stability limit from the start."""
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:

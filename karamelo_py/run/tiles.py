@@ -233,7 +233,6 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """As `_parts_to_sum`, for few points."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)

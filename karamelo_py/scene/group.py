@@ -148,7 +148,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by definition: later grids have members, too."""
+    """Nodes by position, stored as a definition for later grids."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
@@ -181,7 +181,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """A wall past an upper edge would have no effect."""
+        """Refuse a group that looks like a wall past an upper edge."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return

@@ -233,7 +233,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """Also before runs that will begin, in a rehearsal."""
+        """True after the first run; in a rehearsal also before runs that will begin."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -252,7 +252,7 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """Of the method or domain; a new list only if they change."""
+        """Grids of the method, or of the domain."""
         key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
             self._lattices = key, method.lattices(self) if method else [self.domain.lattice]

@@ -29,7 +29,7 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes, swap included."""
+    """Memory in bytes, swap included."""
 
     free: float
     whole: float

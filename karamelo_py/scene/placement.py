@@ -24,7 +24,7 @@ _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Values equal for all points may be scalars."""
+    """Points and initial domains; values equal for all points may be scalars."""
 
     x0: Any  # (n, d) positions: array or Filled
     volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D); without the radius
@@ -158,7 +158,7 @@ def fill(
     rule: str | None = None,
     room: Callable[[], Room] | None = None,
 ) -> Placement:
-    """Chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
+    """Fill a region in chunks of cells, x outermost; ScriptError beyond the numbers or `room`."""
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
     placed = Placement(

@@ -113,7 +113,7 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Raises ScriptError for no or too many points, or left of the axis."""
+        """Store the points; raises ScriptError for none, too many, or left of the axis."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -226,7 +226,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Large solids are sampled."""
+    """True if points coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():

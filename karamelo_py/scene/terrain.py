@@ -35,7 +35,7 @@ class Raster(NamedTuple):
 
 
 def read_raster(path: Path) -> Raster:
-    """Raises ScriptError for a wrong header, size or number."""
+    """Read a raster; raises ScriptError for a wrong header, size or number."""
     if path.suffix.lower() in GEOTIFF:
         return _of_geotiff(path)
     words, head = read_text(path).split(), {}

@@ -437,7 +437,7 @@ class PointsView(View):
         self.impose(impose_temperature, values)
 
     def ignite(self, since: np.ndarray) -> None:
-        """Times (n,) ago; below 0 later."""
+        """Light explosives, times (n,) ago; below 0 later."""
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:

@@ -14,7 +14,7 @@ _WIDEST_LINE = 160
 
 
 class Mark(NamedTuple):
-    """`line` and `column` count from 1; `text` is the source line."""
+    """A place in a script: `line` and `column` count from 1; `text` is the source line."""
 
     file: str
     line: int
@@ -24,7 +24,7 @@ class Mark(NamedTuple):
 
 
 class NoItem(KeyError):
-    """Its text is the whole message."""
+    """A missing item, whose text is the whole message."""
 
     def __str__(self) -> str:
         return self.args[0]
@@ -151,14 +151,14 @@ def _width(character: str) -> int:
 
 
 def meant(name: str, names: Iterable[str]) -> str | None:
-    """``did you mean '...'?`` with the most similar names."""
+    """Suggest ``did you mean '...'?`` with the most similar names."""
     ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
     close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """``one of a, b, c``; of many, the nearest and where to find all."""
+    """List ``one of a, b, c``; of many, the nearest and where to find all."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):

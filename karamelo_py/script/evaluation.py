@@ -72,7 +72,7 @@ def _inverse_normal(p: Expression) -> Expression:
 
 
 class NameScope(Protocol):
-    """A variable `hides` a function of its name."""
+    """Names and commands of a script; a variable `hides` a function of its name."""
 
     def name(self, name: str, node: syntax.Name, raw: syntax.Raw) -> Value: ...
 

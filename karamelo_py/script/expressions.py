@@ -88,7 +88,7 @@ class Expression:
         return terms.alike(self, other)
 
     def evaluate(self, values: Values) -> float:
-        """Raises ScriptError for a formula of positions."""
+        """Present number; raises ScriptError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"

@@ -75,7 +75,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """As `_power`, for `n` numbers of `a`; branch-free if exponents agree."""
+    """Raise `n` numbers of `a` as `_power` does, branch-free if exponents agree."""
     power = b[0]
     same = True
     for i in range(n):

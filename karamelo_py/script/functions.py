@@ -55,7 +55,7 @@ FUNCTIONS: dict[str, Signature] = {
 
 
 def compute(name: str, *numbers: float) -> float:
-    """NaN propagates, errors are as in `math`."""
+    """Compute a function; NaN propagates, errors are as in `math`."""
     if any(map(math.isnan, numbers)):
         return math.nan
     result = _COMPUTED[name](*numbers)

@@ -51,7 +51,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Products: pow costs ten multiplications."""
+    """Use products for small exponents: pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
@@ -116,7 +116,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """As hardware does: inf or NaN, no exceptions."""
+    """Apply an operation as hardware does: inf or NaN, no exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))

@@ -25,7 +25,7 @@ _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 
 
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
-    """Arguments of calls stay unparsed.
+    """Parse statements; arguments of calls stay unparsed.
 
     The first syntax error has further ones in `others`, and correct statements in `statements`.
     """
@@ -101,7 +101,7 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """`parts` alternates spans (None: empty) and commas."""
+    """Raw arguments of a call; `parts` alternates spans (None: empty) and commas."""
     if parts == [None]:
         return []
     raws = []
@@ -197,7 +197,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 
 
 class _TreeBuilder:
-    """Spans and trees by grammar rule, while Lark parses."""
+    """Builds spans and trees by grammar rule, while Lark parses."""
 
     def script(self, parts: list) -> list:
         return [item for item in parts if isinstance(item, tuple)]

@@ -23,7 +23,7 @@ _WRITTEN = (
 
 
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
-    """At most `largest` bytes; raises OSError."""
+    """Read at most `largest` bytes; raises OSError."""
     piped = _PIPED.fullmatch(str(path)) is not None
     # Opening a pipe without a writer would block; Windows has no such flag.
     more = 0 if piped else vars(os).get("O_NONBLOCK", 0)
@@ -40,7 +40,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Raises OSError, or ValueError if it is no text."""
+    """Read a text; raises OSError, or ValueError for other data."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):

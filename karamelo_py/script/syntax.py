@@ -14,7 +14,7 @@ _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
 
 class Source:
-    """Converts offsets to marks."""
+    """The text of a script; converts offsets to marks."""
 
     def __init__(self, text: str, file: str):
         self.text = text
@@ -89,7 +89,7 @@ class UnaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """Operators are always spelled ``^ && ||``."""
+    """`left` `operator` `right`; operators are always spelled ``^ && ||``."""
 
     operator: str
     left: Node
@@ -119,13 +119,13 @@ class Raw:
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """`mark` is the location of its first word."""
+    """A statement; `mark` is the location of its first word."""
 
     mark: Mark
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """Without blanks, comments, line ends and keywords `without`."""
+        """The statement without blanks, comments, line ends and keywords `without`."""
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

@@ -95,7 +95,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Whether a term can be written with subterms repeated."""
+    """True if a term can be written with subterms repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -137,12 +137,12 @@ _MOST_LEVELS = 60
 
 
 def program(root: Term, push: Callable[[str], tuple[int, int]]) -> formula.Program:
-    """`push` returns the instruction and index of a name."""
+    """Compile a term; `push` returns the instruction and index of a name."""
     return _Writer(root, push).program()
 
 
 class _Writer:
-    """Equal terms have the same number."""
+    """Compiles a program; equal terms have the same number."""
 
     def __init__(self, root: Term, push: Callable[[str], tuple[int, int]]):
         self.push = push

@@ -16,7 +16,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Planes across some axes, round across the others."""
+    """Base of shapes with planes across some axes, round across the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
     across: Sequence[int] = ()  # axes across which it is round
@@ -223,7 +223,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """The domain cuts off part of a half-space."""
+        """Unknown, since the domain cuts off part of a half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)

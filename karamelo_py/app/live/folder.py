@@ -23,7 +23,7 @@ WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
 
 
 class FolderPage:
-    """Raises ScriptError without a log or particle dump."""
+    """The page of a folder; raises ScriptError without a log or particle dump."""
 
     def __init__(self, folder: Path):
         if not folder.is_dir():

@@ -174,6 +174,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """As Ctrl-C does: the last state is written."""
+        """Stop as Ctrl-C does: the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """`stopped` is set when a viewer ends the study.
+    """The page of a study; `stopped` is set when a viewer ends it.
 
     `recorded` are recorded values, `axes` initial axes of the chart; folders are relative to
     `base`.
@@ -56,7 +56,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """``judged(row)`` adds class and reason, `colours` maps classes."""
+        """Colour runs: ``judged(row)`` adds class and reason, `colours` maps classes."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(

@@ -46,7 +46,7 @@ READ_AT_ONCE = 1 << 22  # bytes
 
 
 class Restarts(Rhythmic):
-    """The step number replaces the first ``*`` in the name."""
+    """Writes restart files; the step number replaces the first ``*`` in the name."""
 
     mark: Mark | None = None
     style = ""
@@ -127,7 +127,7 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Raise ScriptError for altered arrays of points and nodes (`large`), or others."""
+    """Raise ScriptError if the arrays of points and nodes (`large`), or others, are altered."""
     import h5py
 
     with h5py.File(path, "r", locking=False) as root, path.open("rb") as file:
@@ -227,7 +227,7 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the file's state, as last good state of `point`; with `outputs`, their files
+        """Restore a file's state, also as last good state of `point`; with `outputs`, files
         continue.
         """
         check(hub, self)

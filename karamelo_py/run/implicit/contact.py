@@ -103,8 +103,8 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Coulomb's return mapping (Simo & Laursen 1992, "An augmented Lagrangian treatment of
-        contact problems involving friction").
+        """Return mapping on Coulomb's cone (Simo & Laursen 1992, "An augmented Lagrangian treatment
+        of contact problems involving friction").
         """
         k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
         glued = np.isinf(self.mu)

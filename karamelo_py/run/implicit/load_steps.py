@@ -47,7 +47,7 @@ class PointsWrong(Exception):
 
 
 class NoEquilibrium(Exception):
-    """Some substeps may have been taken."""
+    """A load step has no equilibrium; some substeps may have been taken."""
 
 
 class LoadSteps:
@@ -174,7 +174,7 @@ class LoadSteps:
         return time
 
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
-        """Return corrections and residual; raises `Failed` before points move."""
+        """Take a substep; return corrections and residual. Raises `Failed` before points move."""
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])

@@ -137,7 +137,7 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
-        """Torques count over the largest radius."""
+        """Norm of forces, and of torques over the largest radius."""
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:

@@ -107,7 +107,7 @@ def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
-    """Refuse displaced bodies; warn of rotation without a fix."""
+    """Refuse bodies displaced from their state; warn of rotation without a fix."""
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     x, v = np.full((2, count, d), np.nan)
     for block in blocks:

@@ -105,7 +105,7 @@ def _one(setup: Setup) -> Number:
 
 @contextmanager
 def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
-    """Ignore invalid numbers of sample points."""
+    """Report faults, but not invalid numbers of sample points."""
     with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield

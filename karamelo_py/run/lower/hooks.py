@@ -213,7 +213,7 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Check that processes agree, since collective calls would deadlock."""
+    """Call a hook; check that processes agree, since collective calls would deadlock."""
     try:
         hook(view)
         if fix.point_by_point:

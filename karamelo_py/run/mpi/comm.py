@@ -37,7 +37,7 @@ def launched() -> tuple[int, int]:
 
 
 class MpiComm(SerialComm):
-    """`ends` reports an error and ends all processes."""
+    """The processes of a run; `ends` reports an error and ends them."""
 
     parted = False
     _ends: Callable[[BaseException], None] | None = None
@@ -154,7 +154,7 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """One process reports a difference, the others quit."""
+    """Check that processes begin the same run; one reports a difference, the others quit."""
     comm = hub.settings.comm
     present = [hub.mark and (hub.mark.file, hub.mark.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))

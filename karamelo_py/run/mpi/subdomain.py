@@ -59,7 +59,10 @@ class Load:
 
 
 class Subdomain(WholeDomain):
-    """Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`)."""
+    """The part of a scene on one process.
+
+    Kernels call `answer` where they need other processes (:mod:`karamelo_py.kernels.ranks`).
+    """
 
     parted = True
 

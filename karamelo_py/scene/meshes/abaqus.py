@@ -77,10 +77,7 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 
 
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
-    """Elements (n, count) over continued lines.
-
-    Extra numbers, such as inner nodes of C3D8I, are ignored, as in CalculiX.
-    """
+    """Elements (n, count), with continued lines."""
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
         return flat.reshape(-1, count)
@@ -326,5 +323,5 @@ _READ: dict[str, Callable[[_Deck, DeckKeyword], None]] = {
 
 
 def read_deck(path: Path) -> Mesh:
-    """Raises ScriptError with the line that cannot be read."""
+    """Read a deck; raises ScriptError with the line that cannot be read."""
     return _Deck(path).mesh()

@@ -45,7 +45,7 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Without Gmsh's reset of SIGPIPE, which would end programs."""
+    """Initialize Gmsh without its reset of SIGPIPE, which would end programs."""
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
@@ -55,7 +55,7 @@ def begin(gmsh: ModuleType) -> None:
 
 @contextlib.contextmanager
 def alone(path: Path, ending: str = "") -> Iterator[Path]:
-    """Gmsh also reads FILE.opt, which may run commands."""
+    """Link a file in an empty folder, since Gmsh also reads FILE.opt, which may run commands."""
     with tempfile.TemporaryDirectory() as folder:
         link = Path(folder) / (path.name + ending)
         try:
@@ -115,7 +115,7 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """What Gmsh's library drops: names of empty groups; groups by element.
+    """Content that Gmsh's library drops: names of empty groups; groups by element.
 
     In versions 1 and 2 all elements of an entity get its groups.
     """

@@ -172,7 +172,7 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets as functions that list numbers of the mesh."""
+    """Sets by name, as functions that list numbers of the mesh."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)

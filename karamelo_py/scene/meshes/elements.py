@@ -195,7 +195,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Older formats repeat elements of two groups."""
+    """Drop repeated elements, as older formats have for two groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 

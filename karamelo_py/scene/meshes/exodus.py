@@ -62,7 +62,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Raises KeyError or OSError for other files."""
+    """Read a file; raises KeyError or OSError for others."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

@@ -62,7 +62,7 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Also geometries that end the program, if trusted."""
+    """Refuse a geometry that does more than describe a shape, or if trusted, ends the program."""
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
     if not trusted:

@@ -202,7 +202,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Triangles at an edge run through it in opposite directions."""
+    """Orient triangles so that two at an edge run through it in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -229,7 +229,7 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number shells by edges of two triangles, if `sided` of any."""
+    """Number shells by common edges, or if not `sided`, by edges of two triangles."""
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

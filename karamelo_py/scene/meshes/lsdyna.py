@@ -145,7 +145,7 @@ def _set(part: DeckPart, keyword: DeckKeyword, match: re.Match) -> None:
 
 
 def read_lsdyna(path: Path) -> Mesh:
-    """Raises ScriptError with the line that cannot be read."""
+    """Read a deck; raises ScriptError with the line that cannot be read."""
     part, titles = DeckPart(), dict[str, str]()
     for keyword in _keywords(path):
         match = _SET.fullmatch(keyword.name)

@@ -52,7 +52,7 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Attributes become groups; raises ValueError for unsupported content."""
+    """Read a mesh, with attributes as groups; raises ValueError."""
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
         head = text.strip().splitlines()[0]

@@ -55,7 +55,7 @@ class _Entry(NamedTuple):
             raise self.wrong(f"has '{self.fields[k]}' instead of a whole number") from None
 
     def wholes(self, count: int) -> list[int]:
-        """An omitted second field equals the first."""
+        """Fields from the first on; an omitted second one equals the first."""
         try:
             numbers = list(map(int, self.fields[:count]))
         except ValueError:
@@ -166,7 +166,7 @@ class _Systems:
 
 
 def read_nastran(path: Path) -> Mesh:
-    """Raises ScriptError with the line that cannot be read."""
+    """Read bulk data; raises ScriptError with the line that cannot be read."""
     part, systems = DeckPart(), _Systems()
     elements: dict[tuple[str, str], list[list[int]]] = defaultdict(list)
     for entry in _entries(path):

@@ -9,7 +9,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Polygons become triangles; objects and groups become sets."""
+    """Read polygons as triangles, objects and groups as sets."""
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}

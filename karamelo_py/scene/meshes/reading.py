@@ -59,7 +59,7 @@ class MeshFile(InputFile):
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
-    """Geometries are meshed up to `dimension`, CAD files with edges of `size`.
+    """Read a mesh; geometries are meshed up to `dimension`, CAD files with edges of `size`.
 
     A `trusted` geometry may run system commands and write files.
     """
@@ -166,7 +166,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _read_all(path: Path) -> None:
-    """Gmsh's libraries crash on damaged HDF5 files."""
+    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries crash."""
     import h5py
 
     def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -192,7 +192,7 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _skip_close(file: Any, depth: int) -> None:
-    """meshio's function never ends without a bracket."""
+    """Skip to the closing bracket; meshio's function never ends without one."""
     while depth > 0:
         letter = file.read(1)
         if not letter:
@@ -233,7 +233,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
-    """meshio counts SU2's markers whose names are words."""
+    """Sets of SU2's markers by name; meshio counts those whose names are words."""
     number, named = 0, {}
     for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
         number = int(name) if name.isdigit() else number + 1

@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
 
 
 class Drift:
-    """value - first value|, relative to the largest scale so far."""
+    """Change of a value since the first, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -169,7 +169,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """`terms` are components and magnitude."""
+    """Base of momenta; `terms` are components and magnitude."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)

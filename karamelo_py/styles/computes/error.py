@@ -109,7 +109,7 @@ class Norm:
 
 
 class Compared:
-    """For computes with `sizes(points)` and a `norm`."""
+    """Mix-in for computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
         """Norms (2,) of differences and exact values, and the remaining sums."""

@@ -50,7 +50,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Only rank 0 writes."""
+        """Take part in the exchange; only rank 0 writes."""
         with discarded():
             self.write()
 

@@ -207,7 +207,7 @@ class Hdf5Dump(TableDump):
 
 
 def _opened_to_append(path: Path) -> Any:
-    """Keep the content readable if the program dies.
+    """Open a file that stays readable if the program dies.
 
     h5py's swmr=True also opens a file left by a killed program if it was opened that way from the
     start (`h5py.File.swmr_mode` is too late).

@@ -44,7 +44,7 @@ def absorb(mass, v, force, normal, support, values, dt):
 
 
 def dashpot(rate, mass, v, force, dt):
-    """-rate m (v + v')/2, with the velocity v' after this force and `force`."""
+    """Force -rate m (v + v')/2, with the velocity v' after this force and `force`."""
     half = 0.5 * dt * rate
     return (-1 / (1 + half)) * (rate * mass * v + half * force)
 

@@ -80,7 +80,7 @@ class BaseAcceleration:
 
 
 class RecordedAcceleration(BaseAcceleration):
-    """A file, linear between its times."""
+    """A record in a file, linear between its times."""
 
     is_constant, constant = False, nan
 
@@ -201,7 +201,7 @@ class GroundMotion(VelocityNodes):
         self.between_steps()
 
     def _velocity(self, axis: str) -> Expression:
-        """v + s (a + s j/2), s = time - since"""
+        """Velocity v + s (a + s j/2), s = time - since."""
         v, a, j, since = (Expression.seed(f"{self.id}_{x}") for x in
                           (f"v{axis}", f"a{axis}", f"j{axis}", "since"))  # fmt: skip
         gone = Expression.seed("time").minus(since)

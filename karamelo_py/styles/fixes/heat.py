@@ -59,7 +59,7 @@ MANY = 1_000_000  # points of a solid; larger ones skip the check
 
 
 def hold_node(node):
-    """The total is the heat per time needed."""
+    """Set T to the value; the total is the heat per time needed."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 

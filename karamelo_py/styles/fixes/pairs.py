@@ -34,7 +34,7 @@ def check_pair(solid1: Solid, solid2: Solid) -> None:
 
 
 class PairContact(Gripping):
-    """Rank 0 searches for pairs of points."""
+    """Contact between points of two solids; rank 0 searches for pairs."""
 
     by_sizes = True
 
@@ -225,7 +225,7 @@ class ContactMinimizePenetration(PairContact):
 
 
 def plane_modulus(solid: Solid, argument: str) -> float:
-    """E / (1 - nu^2) = 4 G (lambda + G) / (lambda + 2 G)"""
+    """Return E / (1 - nu^2) = 4 G (lambda + G) / (lambda + 2 G)."""
     law = elastic_law(solid.material.whole)
     G, lam = parameter(law, "G", None), parameter(law, "lam", None)
     if G is None or lam is None or not G > 0:

@@ -35,7 +35,7 @@ class PythonFunction:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Modules next to the script come first."""
+        """Import the function; modules next to the script come first."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -68,7 +68,7 @@ class PythonFunction:
 
 
 class Python(Fix):
-    """Call a Python function on points or nodes in every step.
+    """Call a Python function on points or nodes in every step: write your own fix.
 
     Parameters
     ----------

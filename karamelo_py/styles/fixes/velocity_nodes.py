@@ -29,19 +29,19 @@ def prescribe_mapped(node):
 
 
 def prescribe_at_most(node):
-    """The total is the reaction, which pushes backwards."""
+    """Bound v* from above; the total is the reaction, which pushes backwards."""
     allowed = min(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
 
 def prescribe_mapped_at_most(node):
-    """Without a bound of v, stress does spurious work, and a rebound gains half of the energy."""
+    """Bound v, too: otherwise stress does spurious work, and a rebound gains half of the energy."""
     allowed = node.value if node.v_star == node.value else min(node.v, node.value)
     return allowed, allowed, node.force, 0.0
 
 
 def prescribe_at_least(node):
-    """The total is the reaction, which pushes forwards."""
+    """Bound v* from below; the total is the reaction, which pushes forwards."""
     allowed = max(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 

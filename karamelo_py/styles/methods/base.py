@@ -107,7 +107,7 @@ class Method:
         """Update the tag from the fixes, before every run."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """State for the next step, in node ranges `spans` (k, 2)."""
+        """State of contact for the next step, in node ranges `spans` (k, 2)."""
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
@@ -136,7 +136,7 @@ class Method:
         return hub.domain.kin
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """`FBar` if volume changes are averaged."""
+        """Tag of averaging: `FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
         laws = [solid.material.law for solid in hub.solids.values()]

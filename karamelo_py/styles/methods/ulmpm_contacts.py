@@ -215,11 +215,11 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """`touched`, which usf and usavg read at the start of a step."""
+        """Views of `touched`, which usf and usavg read at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """New fields come after the old ones."""
+        """Continue from the contact `before`; new fields come after the old ones."""
         if contact.stride == before.stride:
             fields = before.touched.shape[1]
             touched = np.flatnonzero(before.touched.any(axis=1))

@@ -19,7 +19,7 @@ from karamelo_py.styles.fixes.forces import PointForces
 
 
 class ToolFix(PointForces):
-    """Points are small cubes (in 2D squares)."""
+    """Base of fixes that push points, taken as small cubes (in 2D squares)."""
 
     follows_points = presses = True
     needs_stiffness = False  # the force scales with the point's shear modulus
@@ -89,7 +89,7 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """A plane that may move, with points on the side of its normal."""
+    """Base of planes that may move, with points on the side of the normal."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)
