@@ -61,7 +61,7 @@ def vector(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """The hoop component counts."""
+    """Count the hoop component too."""
     return kin.tensor_size
 
 

@@ -689,7 +689,7 @@ def list_pairs(bodies, grids, spans, pairs):
 
 @noinline
 def _stay_pair(bodies, i, j, pair, sticks):
-    """Remove a pair's normal velocity: all of it if they stick, all across v* in a hollow."""
+    """Remove a pair's normal velocity, all of it if they stick, all but along v* in a hollow."""
     contact, kin, nodes = bodies
     share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:

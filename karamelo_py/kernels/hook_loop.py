@@ -194,7 +194,7 @@ def _act_on_all(members, task, call):
 
 
 def directions(hooks):
-    """Return the dimension as a run-time value, so that loops are not unrolled."""
+    """Return the dimension as a run-time value, to leave loops rolled."""
     return hooks.x0.shape[1]
 
 

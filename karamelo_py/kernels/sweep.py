@@ -168,7 +168,7 @@ def _without_gather(tile, p, moved):
 
 
 def is_good(stride, moved, rate):
-    """False also for NaN."""
+    """Return False if a point failed, also for NaN."""
     return (moved <= stride) & (rate < 1e300)
 
 

@@ -281,7 +281,7 @@ def growth(first, later, unit):
 
 
 def keeps(first, later, unit, within=WITHIN):
-    """False for NaN."""
+    """Return False for NaN too."""
     return later - first <= within * unit
 
 

@@ -27,8 +27,8 @@ class Newmark(NamedTuple):
     """Implicit time steps with inertia, longer than waves allow (Newmark 1959).
 
     `set_dt` sets the step. Unresolved vibrations are undamped unless `gamma` is above 1/2, `rho`
-    below 1, or the rule euler. The initial acceleration of a step comes from the forces, with `rho`
-    from the rule.
+    below 1, or the rule euler. The initial acceleration of a step follows from the forces, with
+    `rho` from the rule.
 
     Parameters
     ----------

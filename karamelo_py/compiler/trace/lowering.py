@@ -35,7 +35,7 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Faster than Numba's abstract classes."""
+    """Replace Numba's abstract classes, which are slow."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 

@@ -212,7 +212,7 @@ def is_apart(w):
 
 @reads("mass")
 def mass(pt):
-    """0 for rigid points with separate sums."""
+    """Return the mass, 0 for rigid points with separate sums."""
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 

@@ -305,7 +305,7 @@ class Tensor(Matrix):
 
 
 def further_terms(squared):
-    """tan(x) / x - 1 - x^2 / 3, with error x^8/46."""
+    """Return tan(x) / x - 1 - x^2 / 3, with error x^8/46."""
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 

@@ -3,13 +3,13 @@
 A law is a NamedTuple of parameters, some of them NamedTuples (parts, as in `eos_strength`). Its
 state is a NamedTuple of numbers and tensors in the kinematics `kin`; `j` = det F.
 
-The class docstring is the manual. The arguments of the style are the annotated fields, or the
-parameters of a classmethod `given` that returns the law. `checked` refuses values that annotations
-cannot, and returns the law or an equivalent simpler one. ``traits`` (:class:`LawTraits`) is a class
-attribute; `column` declares output columns.
+The class docstring is the manual. A style's arguments are the annotated fields, or the parameters
+of a classmethod `given` that returns the law. `checked` refuses values that annotations cannot, and
+returns the law or an equivalent simpler one. ``traits`` (:class:`LawTraits`) is a class attribute;
+`column` declares output columns.
 
-If a law and all its parts have ``in_lanes``, several points are computed at once: point functions
-branch only with `where`, except those in ``scalarised``.
+If a law and all its parts have ``in_lanes``, several points are computed at once; point functions
+then branch only with `where`, except those in ``scalarised``.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ class LawTraits(NamedTuple):
     flows: bool = False  # holds no shape: liquids, soils
     rings: bool = True  # vibrates if it has a shear modulus
     any_speed: bool = False  # may move many times faster than its waves: gases
-    hypoelastic: bool = False  # never yields, although it does not return all work
-    of_solids: bool = False  # an equation of state that holds solids together
+    hypoelastic: bool = False  # never yields, but does not return all work
+    of_solids: bool = False  # eos that holds solids together
     burns: bool = False  # products of an explosive
-    least_density: float = 10.0  # kg/m^3; a lower density suggests wrong units
+    least_density: float = 10.0  # kg/m^3; less suggests wrong units
 
 
 def law_traits(component: Any) -> LawTraits:
@@ -46,7 +46,7 @@ class Absent(NamedTuple):
 
 
 def law_kind(law: NamedTuple) -> tuple[type, ...]:
-    """Return the classes of a law (or table of laws) and its parts; kernels depend on them."""
+    """Return the classes of a law (or table of laws) and its parts, on which kernels depend."""
     parts = [law_kind(component) for component in law if isinstance(component, tuple)]
     return type(law), *(kind for component in parts for kind in component)
 
@@ -59,7 +59,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the law or a part has the point function itself, not from a wrapped law."""
+    """Return True if the law or a part has the point function itself, not by a wrapped law."""
     kinds = (kind for kind in law_kind(law) if function.defined(kind))
     return any(function.find((kind,)) not in _handing_on for kind in kinds)
 
@@ -69,7 +69,7 @@ _handing_on: set[Callable] = set()
 
 @point_function(otherwise=True)
 def elastic_law(law):
-    """Return the stress law of a law that adds a temperature or relaxation, else the law."""
+    """Return the stress law inside a law that adds temperature or relaxation, else the law."""
     return law
 
 
@@ -78,9 +78,10 @@ def _elastic_law_within(law):
 
 
 def answers(law: type, values: dict[Callable, Any]) -> None:
-    """Answer point functions of a law by a field of their last argument, its state, or a constant.
+    """Answer point functions of a law by a field of their last argument, its state, or by a
+    constant.
 
-    A text names the field: ``answers(CamClay, {elastic_strain: "e", by_rates: False})``.
+    A string names the field: ``answers(CamClay, {elastic_strain: "e", by_rates: False})``.
     """
     for function, value in values.items():
         function.on(law)(_by_field(value) if isinstance(value, str) else _by_constant(value))
@@ -111,7 +112,7 @@ def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
 
 
 def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Let the law in the field `component` of `outer`, with the state `kept`, answer `functions`.
+    """Let the law in field `component` of `outer`, with the state `kept`, answer `functions`.
 
     These take (law), (law, template), or law, kinematics (replaced by `kin`), state and more.
     """
@@ -134,7 +135,7 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Do as `hand_on`, and show the columns of the law within."""
+    """Do as `hand_on`, and show the columns of the inner law."""
     hand_on(outer, component, kept, functions, kin)
 
     @within.on(outer)
@@ -149,7 +150,7 @@ _columns: dict[type, dict[str, NamedTuple]] = {}
 def column(component: type, name: str, source: Callable | NamedTuple | None = None) -> None:
     """Declare an output column by a `number` or a tag of `shown`; by default, a field of the state.
 
-    Derived classes have it, unless they declare columns themselves.
+    Derived classes inherit it unless they declare columns.
     """
     if source is None:
         source = _by_field(name)
@@ -164,7 +165,7 @@ def no_columns(component: type) -> None:
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
-    """Map names of columns, the parts' first, to tags for `shown`."""
+    """Map column names, parts first, to tags for `shown`."""
     tags: dict[str, NamedTuple] = {}
     for part in reversed([part for part in law if isinstance(part, tuple)]):
         tags |= columns_of(part)
@@ -176,13 +177,13 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def law_here(law, within, state):
-    """Return the law `within` another, with numbers that differ from point to point."""
+    """Return the inner law with the numbers of this point."""
     return within
 
 
 @point_function()
 def within(law, kin, state):
-    """Return the law that a law wraps, with its kinematics and state."""
+    """Return the inner law of a wrapping law, with its kinematics and state."""
 
 
 @point_function()
@@ -202,7 +203,7 @@ def _shown_within(tag, law, kin, state):
 def number(function: Callable) -> Callable:
     """Make a point function of (law, kin, state) an output column.
 
-    The tag's class goes into its module, because cached kernels import it.
+    Cached kernels import the tag's class from its module.
     """
     name = f"{function.__name__}_tag"
     tag_class = namedtuple(name, (), module=function.__module__)
@@ -288,7 +289,7 @@ def is_round(law):
 
 @point_function(otherwise=True)
 def shear_part(law, kin, state):
-    """Return the part 2 G / rho of `wave_speed_squared`, or more: thin bodies have slower waves."""
+    """Return the part 2 G / rho of `wave_speed_squared`, or more; thin bodies have slower waves."""
     return wave_speed_squared(law, kin, state)
 
 
@@ -324,7 +325,7 @@ def damage(law, kin, state):
 @number
 @point_function()
 def damage_initiation(law, kin, state):
-    """Return the damage initiation, which grows from 0; damage begins at 1."""
+    """Return the damage initiation, growing from 0; damage begins at 1."""
 
 
 @number
@@ -346,13 +347,13 @@ def heat_capacity(law, template):
 
 @point_function(otherwise=True)
 def lit(law, kin, state, since):
-    """Return the state of an explosive a time `since` after lighting."""
+    """Return an explosive's state a time `since` after lighting."""
     return state
 
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """Return the state with `heat` more internal energy per reference volume, if it stores any."""
+    """Return the state with `heat` added to its internal energy per reference volume, if any."""
     return state
 
 

@@ -1,7 +1,7 @@
-"""Laws of generalised plane strain: the stretch F_zz across the plane is prescribed.
+"""Laws of generalised plane strain, with a prescribed stretch F_zz across the plane.
 
-Before each step `impose_stretch` gives points the stretch at its end. The wrapped law has tensors
-of `Axisymmetric`.
+Before each step `impose_stretch` sets the stretch at its end. The inner law has tensors of
+`Axisymmetric`.
 """
 
 from typing import Any, NamedTuple
@@ -11,16 +11,16 @@ from karamelo_py.points.laws.thin import WHOLE, Thin, with_strain_across
 
 
 class Across(Thin):
-    """The three-dimensional `law` with a prescribed stretch across."""
+    """The 3D `law` with a prescribed stretch across."""
 
     __slots__ = ()
 
 
 class State(NamedTuple):
-    whole: Any  # state of the wrapped law
+    whole: Any  # of the inner law
     across: Any  # present F_zz
     target: Any  # F_zz at the end of the step
-    work: Any  # done across per reference volume, since it was last counted
+    work: Any  # done across per reference volume, since last counted
 
 
 @laws.initial_state.on(Across)

@@ -1,4 +1,4 @@
-"""Hyperelastic laws from a formula of the stored energy, differentiated when the law is defined.
+"""Hyperelastic laws from a stored energy, differentiated when the law is defined.
 
 Formulas of invariants are computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by
 point (`karamelo_py.points.laws.formulas`).
@@ -85,10 +85,10 @@ def law_of(
 ) -> NamedTuple:
     """Build the law with this stored energy per reference volume.
 
-    `directions` are :class:`~karamelo_py.points.laws.fibres.Fibres` if the formula contains I4 or
-    I6, `T` the temperature at rest; `kind` is the class of a law of invariants. Raise ScriptError
-    for operations without a derivative, stress or no stiffness at rest, and formulas that
-    distinguish principal directions.
+    `directions` are :class:`~karamelo_py.points.laws.fibres.Fibres` if the formula has I4 or I6,
+    `T` is the temperature at rest, `kind` the class of a law of invariants. Raise ScriptError for
+    operations without a derivative, for stress or no stiffness at rest, and for anisotropic
+    formulas.
     """
     term = replaced(energy, {"I3": to_power(Expression.seed("J"), 2)})
     check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
@@ -238,7 +238,7 @@ def _fibre_paths(law: NamedTuple) -> list[tuple[int, str]]:
 def stiffness_along_fibre(law: NamedTuple, family: int, path: str, x: float) -> float:
     """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
 
-    At constant volume it is the curvature by ln l; it is NaN where the energy has no value.
+    At constant volume it is the curvature by ln l. NaN where the energy has no value.
     """
     a, b = law.directions[:3], law.directions[3:]
     aligned = sum(p * q for p, q in zip(a, b, strict=True)) ** 2
@@ -269,9 +269,9 @@ def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
 
 @lru_cache(typed=True)
 def first_instability(law: NamedTuple) -> tuple[str, float] | None:
-    """Return path and stretch nearest to rest where a direction or a path loses its stiffness.
+    """Return path and stretch nearest to rest where a direction or path loses its stiffness.
 
-    The path ends where the energy does, such as at the limit of chains.
+    A path ends where the energy does, as at the limit of chains.
     """
     unstable = []
     judged = [(path, partial(least_stiffness, law, path), x) for path in PATHS for x in (0.5, 3.0)]
@@ -343,8 +343,8 @@ def _wave_speed_squared_of_invariants(law, kin, state):
 
 
 def stiffness_of_matrix(law, b, at):
-    # Bounds of l^2 d2W/dl^2 (`along_direction`) and of shear, 2 x_a (W_1 + x_c W_2), term by term:
-    # squared principal stretches x lie between Gershgorin's bounds, and above J^2/I2.
+    # Bounds of l^2 d2W/dl^2 (`along_direction`) and of shear, 2 x_a (W_1 + x_c W_2), term by term,
+    # as squared principal stretches x lie between Gershgorin's bounds, and above J^2/I2.
     I1, I2, J, *_ = at
     high = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
@@ -366,7 +366,7 @@ def stiffness_of_matrix(law, b, at):
 
 
 def along_direction(law, at, x, rest):
-    """Return l^2 d2W/dl^2 of a stretch l = sqrt(x); the other two squares sum to `rest`."""
+    """Return l^2 d2W/dl^2 for a stretch l = sqrt(x); the other two squares sum to `rest`."""
     J, at = at[2], (*at, 1, 1)
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]
     W11, W12, W1J, W22, W2J, WJJ = [evaluated(code, law, at) for code in law.second]

@@ -188,10 +188,10 @@ _NEWTON = 4
 
 @shared
 def plastic_flow(law, q, p, pc):
-    """Return the y and w that bring a trial with q and p back to the surface; 0 inside it.
+    """Return the y and w that return a trial with q and p to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains, with its solution
-    between y = 0 (p = pc, if the trial has more) and the critical state 2 p = pc.
+    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
+    between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
@@ -222,7 +222,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # One Newton correction carries the slopes of the residual.
+    # one Newton correction carries the residual's derivatives
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0

@@ -1,7 +1,7 @@
 """Damages: the lost fraction D of a point's strength, a part of `eos_strength`.
 
-A damage is a NamedTuple of parameters; its memory is a tuple. Stress and tension, not compression,
-are scaled by 1 - D; equation of state and strength do not depend on it.
+A damage is a NamedTuple of parameters; its memory is a tuple. Stress, except pressure, is scaled by
+1 - D; equation of state and strength do not depend on it.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ class FlowStep(NamedTuple):
     triaxiality: Any  # mean stress over von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
-    stress: Any  # Cauchy stress of intact material
+    stress: Any  # Cauchy, of intact material
     expansion: Any  # relative change of volume
 
 
@@ -40,10 +40,10 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """Return the damage initiation, which grows from 0; damage begins at 1."""
+    """Return the damage initiation, growing from 0; damage begins at 1."""
 
 
-# lower triaxiality: most metals have no finite failure strain
+# lowest triaxiality: below it most metals have no finite failure strain
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
 # Damage grows from 0 to 1 while sum(strain over failure strain) grows from 1 to 1 + 1/this.

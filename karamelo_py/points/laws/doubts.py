@@ -21,14 +21,14 @@ from karamelo_py.points.laws.strengths.hardening import before_flow, flow_stress
 from karamelo_py.points.laws.temperatures import PlasticWork
 from karamelo_py.points.laws.thermoelastic import Thermoelastic
 
-SLOW = 0.01  # wave speed in m/s or mm/ms if density and modulus are exchanged
-SMALL = 2.0  # degrees; a smaller friction angle is likely in radians
+SLOW = 0.01  # wave speed in m/s or mm/ms, if density and modulus are exchanged
+SMALL = 2.0  # degrees; smaller friction angles are likely in radians
 EXPANSION = 1e-10, 1e-3  # per kelvin, far beyond quartz and polymers
-TOUGH = 50.0  # failure strain in shear; a larger one is likely in percent
-APART = 100.0  # kelvin between reference temperatures on the same scale
+TOUGH = 50.0  # failure strain in shear; larger is likely in percent
+APART = 100.0  # kelvin between reference temperatures on one scale
 MELTS = 0.1  # plastic strain whose heat melts no real metal
 COEFFICIENT = 2.0  # friction between grains; real values are far smaller
-STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; real values are far smaller
+STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; likewise
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
@@ -36,7 +36,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if parameter(parameter(law, "strength"), "cell_size", None) is not None:
-        # The cell size is set later, and viscosity damps waves by it.
+        # Set later; viscosity damps waves by it.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

@@ -250,13 +250,13 @@ FAST = 0.02  # fraction of the wave speed above which impacts make metals yield
 
 
 def _locks(law, scene):
-    """Return True if flow in load steps conserves volume, which linear cells cannot represent."""
+    """Return True if isochoric flow in load steps locks linear cells."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _locks_at_impact(law, scene):
-    """Return True at impact in the total frame, where points never leave their linear cells."""
+    """Return True at impact in the total frame, where points stay in their linear cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"mark": scene.method.mark}
 
@@ -383,7 +383,7 @@ def intact_pressure(law, j, m):
 
 
 def energy_of_swelling(law, j, before, m):
-    """Return the change of elastic energy by a plastic change of volume."""
+    """Return the change of elastic energy by a plastic volume change."""
     ratios = [strengths.inelastic_ratio(law.strength, memory) for memory in (before, m.strength)]
     elastic, energy = strengths.elastic_ratio(law.strength, m.strength, j), 0
     for old, new in zip(*ratios, strict=True):
@@ -404,7 +404,7 @@ def energy_to_unload(law, elastic, m):
     """Return the energy per elastic volume released with the pressure."""
     energy = energy_of_elastic_volume(law, elastic, m)
     if len(m.heat):
-        # without pressure a warm point is larger than at rest
+        # without pressure, a warm point is larger than at rest
         warm = warm_pressure(law, elastic, m)
         K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
         energy += 0.5 * warm * warm * elastic / K
@@ -413,7 +413,7 @@ def energy_to_unload(law, elastic, m):
 
 def warm_pressure(law, elastic, m):
     warm = sum(thermal_pressure(law.temperature, m.heat))
-    if len(m.heat):  # the equation of state's thermal pressure
+    if len(m.heat):  # thermal pressure of the eos
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
     return warm
@@ -441,7 +441,7 @@ def sound(law, j, m):
 def sound_lost_to_damage(law, j, m):
     """Return the squared wave speed lost to damage.
 
-    A broken point in tension has no waves, but may soon close: the waves of rubble at its initial
+    A broken point in tension has no waves, but may soon close, so waves of rubble at its initial
     volume always count.
     """
     if isinstance(law.damage, Absent):
@@ -525,7 +525,7 @@ laws.hand_on(EosStrength, "temperature", "", (laws.heat_capacity, laws.conductiv
 
 @laws.wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
-    # (K + 4/3 G) / rho with elastic moduli; plastic waves are slower
+    # (K + 4/3 G) / rho, elastic; plastic waves are slower
     J, _, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
@@ -557,7 +557,7 @@ def _shear_part_eos_strength(law, kin, state):
 
 @laws.energy_density.on(EosStrength)
 def _energy_density_eos_strength(law, kin, state):
-    """Return the energy that unloading at this temperature releases, without plastic work."""
+    """Return the energy released by unloading at this temperature, without plastic work."""
     J, s, m = state
     volume = volume_energy(law, J, m)
     tension = intact_pressure(law, J, m) < 0

@@ -22,7 +22,7 @@ LEANS = 1e-9
 
 
 class Fibres(NamedTuple):
-    """Components of the unit vectors a0 and b0 of two families at rest."""
+    """Unit vectors a0 and b0 of two families at rest."""
 
     in_lanes = True
 
@@ -35,7 +35,7 @@ class Fibres(NamedTuple):
 
 
 class OfFibres(OfInvariants):
-    """Adds I4 = a0.C a0 and I6 = b0.C b0 for two families, with a field `directions`."""
+    """Adds I4 = a0.C a0 and I6 = b0.C b0 of two families; has a field `directions`."""
 
     __slots__ = ()
     twice_along: ClassVar[tuple[Code, ...]]  # derivatives by I4 I4, I6 I6, I4 I6
@@ -58,7 +58,6 @@ def _lean_somewhere(law: Any, scene: Any) -> bool:
 
 
 def fibre(law, F, family):
-    """Return a0 a0 of a family, with the components of C."""
     a = law.directions[3 * family : 3 * family + 3]
     made = F.symmetric
     return made._make([a[i] * a[j] for i, j in made.places])
@@ -86,7 +85,7 @@ def _kirchhoff_stress_of_fibres(law, kin, state):
 
 def stiffness_of_fibres(law, b, at):
     """Return bounds of the fibres' stiffness; |a n|^2 <= I4 for a unit vector n."""
-    # Slack fibres count with their stiffness at rest: the next step may stretch them.
+    # Slack fibres count with their stiffness at rest, as the next step may stretch them.
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at
     high = b.largest_row_sum()
@@ -118,13 +117,13 @@ def _shear_part_of_fibres(law, kin, state):
 
 
 class PlacedFibre(Placed):
-    """One family by formulas of position."""
+    """One family given by formulas of position."""
 
     __slots__ = ()
 
 
 class PlacedFibres(PlacedFibre):
-    """Two families, at least one of them by formulas of position."""
+    """Two families, at least one given by formulas of position."""
 
     __slots__ = ()
 

@@ -1,8 +1,8 @@
 """Formulas in laws: read from a script, differentiated, and code of a class.
 
-The class of the law holds the structure of a formula, so kernels contain it as code; its numbers
-are parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
-whole exponents.
+The structure of a formula is in the law's class, so kernels contain it as code; its numbers are
+parameters. Laws that differ only in numbers share kernels, unless some are equal or small whole
+exponents.
 """
 
 from collections import namedtuple
@@ -32,7 +32,7 @@ COMPARED = ("<", "<=", ">", ">=")
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min")
 KNOWN = {*OF_ONE, *OF_TWO, *COMPARED, "number", "name", "if"}
 
-Code = tuple[tuple[str, Any], ...]  # a stack program: operation, and operand of pushes
+Code = tuple[tuple[str, Any], ...]  # stack program: operation, and operand of pushes
 
 
 class FormulaOf(WithNumbers):
@@ -73,7 +73,7 @@ class Constants:
 
 
 def with_numbers(formula: str, **numbers: float) -> Expression:
-    """Return a ready formula with its constants; other names stay names."""
+    """Return a formula with its constants; other names stay names."""
     raw, node = parse_text(formula)
     return Expression(evaluation.evaluate(node, raw, Constants(numbers)))
 
@@ -111,7 +111,7 @@ PLAIN: dict[str, Callable] = {
 
 
 def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -> Expression:
-    """Return the formula in operations that laws know; raise ScriptError for others."""
+    """Return the formula in operations known to laws; raise ScriptError for others."""
     results: dict[int, Expression] = {}
     for one in terms.in_order(formula):
         operands = [results[id(operand)] for operand in one.operands]

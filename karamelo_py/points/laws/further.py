@@ -1,6 +1,6 @@
 """Further parts of a composed law, whose kinds plug-ins may define.
 
-A part is a NamedTuple of parameters; it may have a memory and add a pressure. The plastic strain
+A part is a NamedTuple of parameters, with an optional memory and added pressure. The plastic strain
 rate is one, added if an output requests it.
 """
 
@@ -64,7 +64,7 @@ def further_pressure(parts, memory, p):
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.component, first)))
 
 
-# Karamelo smooths the rate over the sound crossing time of this many cells.
+# Karamelo smooths the rate over the time of sound through this many cells.
 CELLS = 1000
 
 

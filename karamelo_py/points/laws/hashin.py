@@ -135,7 +135,7 @@ class BreakingApart(Ply, _Strengths):
 
 class State(NamedTuple):
     F: Any
-    # Largest values of the criteria so far.
+    # largest values of the criteria so far
     fibre_t: Any
     fibre_c: Any
     matrix_t: Any
@@ -176,7 +176,7 @@ def piola_stress(law, kin, state):
 
 @laws.advance.on(BreakingApart)
 def _advance_hashin(law, kin, state, dl, dt):
-    # Broken parts lose their stress in the next step: a load step in which stress jumps has no
+    # Broken parts lose their stress in the next step; a load step in which stress jumps has no
     # equilibrium.
     new = state._replace(
         fibres=where(max(state.fibre_t, state.fibre_c) < 1, 1, law.residual),

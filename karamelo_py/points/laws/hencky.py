@@ -65,7 +65,7 @@ def _kirchhoff_stress_hencky(law, kin, state):
 
 @laws.wave_speed_squared.on(Hencky)
 def _wave_speed_squared_hencky(law, kin, state):
-    # Along a principal direction rho_0 c^2 = lam + 2 G - tau; shear waves, 2 G ln(a/b) a^2 / (a^2 -
+    # Along a principal direction rho_0 c^2 = lam + 2 G - tau. Shear waves, 2 G ln(a/b) a^2 / (a^2 -
     # b^2) for stretches a and b, are slower while a/b is below 4.
     tau = laws.kirchhoff_stress(law, kin, state)
     return (law.lam + 2 * law.G + tau.largest_row_sum()) * law.specific_volume

@@ -50,7 +50,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.script.errors import ScriptError
 
-COUPLED = 1e-9  # out-of-plane part, over the largest, that counts as none
+COUPLED = 1e-9  # relative out-of-plane part that counts as none
 FACTORS = np.array([1.0, 1.0, 1.0, sqrt(2), sqrt(2), sqrt(2)])  # Mandel's notation
 
 
@@ -100,14 +100,14 @@ class YieldRatios(Ratios):
 
 
 def of_lankford(R: tuple[float, ...]) -> tuple[float, ...]:
-    """Return F, G, H, L, M, N of a sheet, with the yield stress of direction 1."""
+    """Return F, G, H, L, M, N of a sheet, relative to the yield stress of direction 1."""
     r0, r45, r90 = R
     shear = (r0 + r90) * (1 + 2 * r45) / (2 * r90 * (1 + r0))
     return r0 / (r90 * (1 + r0)), 1 / (1 + r0), r0 / (1 + r0), 1.5, 1.5, shear
 
 
 def of_ratios(ratios: tuple[float, ...]) -> tuple[float, ...]:
-    """Return F, G, H, L, M, N; the ratios are 1 for an isotropic body."""
+    """Return F, G, H, L, M, N for yield ratios, all 1 if isotropic."""
     r11, r22, r33, r12, r13, r23 = ratios
     a, b, c = 1 / r11**2, 1 / r22**2, 1 / r33**2
     shears = 1.5 / r23**2, 1.5 / r13**2, 1.5 / r12**2
@@ -125,13 +125,13 @@ def surface(constants: tuple[float, ...]) -> np.ndarray:
 
 
 def turned(matrix: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Return a matrix (6, 6) of Mandel's notation in axes that R rotates to the body's."""
+    """Return a matrix (6, 6), in Mandel's notation, of axes that R rotates to the body's."""
     full = rotated(matrix / np.outer(FACTORS, FACTORS), R)
     return np.array([[full[a + b] for b in VOIGT] for a in VOIGT]) * np.outer(FACTORS, FACTORS)
 
 
 def stiffness_of(law: Any) -> np.ndarray:
-    """Return the stiffness (6, 6) of a law in the body's axes, in Mandel's notation."""
+    """Return a law's stiffness (6, 6) in the body's axes, in Mandel's notation."""
     if isinstance(law, Directional):
         C = np.array([[law[STIFFNESS[a][b]] for b in range(6)] for a in range(6)])
         return C * np.outer(FACTORS, FACTORS)
@@ -165,7 +165,7 @@ class YieldingByHill(_Fields):
     """Constants of the law in coordinates z of elastic strain, in which flow is diagonal.
 
     With stiffness C and q^2 = T.P.T: z = V^T C^(1/2) e, where V holds the eigenvectors of C^(1/2) P
-    C^(1/2) and the rates are its eigenvalues. The energy is z.z/2, q^2 the sum of rate z^2, and
+    C^(1/2), and the rates are its eigenvalues. The energy is z.z/2, q^2 the sum of rate z^2, and
     flow by g = dep/q divides each z by 1 + g rate.
     """
 
@@ -183,7 +183,7 @@ class Hill(NamedTuple):
         ID of a material linear, orthotropic or transverse, with the density.
     strength
         ID of a strength with a flow stress: plastic, swift, tabulated, johnson_cook, formula and
-        others. It is the yield stress along axis 1, or with `yields` the reference. Its shear
+        others. It gives the yield stress along axis 1, or the reference of `yields`. Its shear
         modulus is not used.
     angle, tilt, spin
         Rotation of the axes of yielding from x, y, z in degrees: by `angle` about z, by `tilt`
@@ -276,14 +276,12 @@ def built(law: Any, strength: Any, P: np.ndarray) -> YieldingByHill:
 
 
 def matrices(law: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return stiffness and yield surface (6, 6) in Mandel's notation."""
     to = np.reshape(law[TO:FROM], (6, 6))
     back = np.reshape(law[FROM:], (6, 6))
     return to.T @ to, back @ np.diag(law[RATES:TO]) @ back.T
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """Return True if a body in 2D or 1D would shear out of its plane or line."""
     inside, outside = OUT_OF_SCENE[scene.d]
     parts = [np.abs(m[np.ix_(inside, outside)]).max(initial=0) / m.max() for m in matrices(law)]
     return max(parts) > COUPLED
@@ -321,7 +319,7 @@ def _initial_state_hill(law, kin, template):
 
 
 def flow(strength, before, increment, dt):
-    """Return the flow stress and its slope, also of strengths with a closed form."""
+    """Return the flow stress and its slope, also for strengths with a closed form."""
     if isinstance(strength, Plastic | LinearHardening):
         ep = before.memory.ep + increment
         return strength.yield_stress + strength.H * ep, strength.H
@@ -329,7 +327,7 @@ def flow(strength, before, increment, dt):
 
 
 def yield_stress(strength: Any) -> float:
-    """Return the first flow stress, or 0 of a strength without any."""
+    """Return the first flow stress, or 0 for a strength without one."""
     known = flow_stress.defined(type(strength))
     if not known and not isinstance(strength, Plastic | LinearHardening):
         return 0.0
@@ -382,7 +380,7 @@ laws.answers(
 
 
 def stretching(kin, state, dl, U):
-    """Return the strain increment U_m^-1 (C_new - C_old)/2 U_m^-1, with U_m between the stretches.
+    """Return the strain increment U_m^-1 (C_new - C_old)/2 U_m^-1, U_m being the mean stretch.
 
     Its trace is corrected to the logarithm of the volume ratio, so volumes do not drift.
     """
@@ -418,7 +416,7 @@ class Residual(NamedTuple):
 def residual(law, squares, before, x, dt):
     """Return the residual at the increment x, linear in x for an isotropic body.
 
-    For constant or concave flow stress Y it is convex and falls with x: Newton's method from 0
+    For constant or concave flow stress Y it is convex and falls with x, so Newton's method from 0
     never passes the solution.
     """
     rates = law[RATES:TO]
@@ -441,7 +439,7 @@ _MOST = 60
 
 @shared
 def plastic_strain_of(law, squares, memory, dt):
-    """Return the increment of plastic strain with which q is the flow stress; 0 for a smaller q.
+    """Return the increment of plastic strain at which q is the flow stress; 0 for smaller q.
 
     Newton's method, safeguarded by bisection for flow stresses that are not concave.
     """

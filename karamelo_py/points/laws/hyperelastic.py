@@ -135,7 +135,7 @@ def of_energy(
     T: float = 293.0,
     heat: tuple = (None, None, 0.0),
 ) -> Any:
-    """Return a law with the directions of two families of `fibres`, if there are some."""
+    """Return a law with the directions of two families of `fibres`, if any."""
     if not fibres:
         return expanding(law_of(rho, energy, (), T), *heat, T=T)
     law = expanding(law_of(rho, energy, Fibres(*nominal(*fibres)), T, OfFibres), *heat, T=T)
@@ -143,7 +143,7 @@ def of_energy(
 
 
 def ready(formula: str, argument: str | None = None, *, rho: float, **constants: Any) -> Any:
-    """Return the law of a ready formula; `argument` is the one to blame for unstable constants."""
+    """Return the law of a built-in formula; errors blame `argument` for unstable constants."""
     fibres = [constants.pop(name) for name in ("fibre", "fibre2") if name in constants]
     try:
         return of_energy(rho, with_numbers(formula, **constants), fibres)

@@ -38,7 +38,7 @@ PASSES = 2  # iterations of the return to two yield surfaces
 
 
 class RockBetweenJoints(MohrCoulomb):
-    """Strength of the rock between its joints, without a memory."""
+    """Strength of the rock between its joints, without memory."""
 
     __slots__ = ()
 
@@ -75,8 +75,8 @@ class JointedConstants(NamedTuple):
     Notes
     -----
     With traction t_n (tension positive) and shear tau on the joints, tau + t_n tan(phi) <= cohesion
-    and t_n <= tension; both return along the elastic stress of slip and opening. A specimen with
-    joints whose normal is at an angle b to the load fails at s1 - s3 = 2 (c + s3 tan(phi)) / ((1 -
+    and t_n <= tension; beyond them the stress returns by slip and opening. A specimen with joints
+    whose normal is at an angle b to the load fails at s1 - s3 = 2 (c + s3 tan(phi)) / ((1 -
     tan(phi) cot(b)) sin(2 b)) or, if that is more, at the strength of the rock (Jaeger 1960, "Shear
     failure of anisotropic rocks", Geol. Mag. 97). The stress rotates with the point (Jaumann rate).
     The joints are planes of the body, and their normal follows its deformation. A joint that has
@@ -186,7 +186,6 @@ warn_of_locking(Jointed)
 
 
 def leans(law: Any, scene: Any) -> bool:
-    """Return True if a body in 2D or 1D would shear out of its plane or line."""
     parts = [abs(x) > ALIGNED for x in (law.nx, law.ny, law.nz)]
     return {1: sum(parts) > 1, 2: parts[2] and sum(parts) > 1, 3: False}[scene.d]
 
@@ -242,9 +241,9 @@ class OnJoints(NamedTuple):
 
 
 def slipped(law, kin, trial, n):
-    """Return the stress on joints that slip: only the rest of the spin rotates the stress.
+    """Return the stress on slipping joints, rotated only by the rest of the spin.
 
-    The velocity gradient of a slip rate g along m is g m n, whose skew part is no rotation of the
+    The velocity gradient of a slip rate g along m is g m n, whose skew part does not rotate the
     rock (as in crystals: Asaro 1983, "Micromechanics of crystals and polycrystals", Adv. Appl.
     Mech. 23).
     """
@@ -254,10 +253,10 @@ def slipped(law, kin, trial, n):
 
 
 def returned_to_joints(law, sigma, n):
-    """Return the stress that the joints sustain, with the slip and opening of the step.
+    """Return the stress that the joints sustain, with slip and opening of the step.
 
-    With both limits exceeded the traction goes to their corner, where neither multiplier is
-    negative if the return to the limit of slip alone leaves too much tension.
+    If both limits are exceeded, the traction goes to their corner. There no multiplier is negative
+    if the return to the slip limit alone leaves too much tension.
     """
     a, places = sigma.at(), sigma.places
     t = [total([a[i, j] * n[j] for j in range(3) if (i, j) in a]) for i in range(3)]

@@ -9,7 +9,7 @@ from karamelo_py.language.rules import known_failure
 def warn_of_leaning(
     kind: type, of: str, when: Callable[[Any, Any], bool], cure: str, title: str = "directions"
 ) -> None:
-    """Name the scenes in which a law of `kind` would shear out of the plane: `when(law, scene)`."""
+    """Warn of scenes, `when(law, scene)`, in which a law of `kind` would shear out of the plane."""
     known_failure(
         kind,
         f"{title} out of the plane",

@@ -1,4 +1,4 @@
-"""Logarithmic elastic strains, for laws that handle steps of any size and rotation."""
+"""Logarithmic elastic strains, for steps of any size and rotation."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from karamelo_py.points.kinematics.principal import exponential_of, logarithm_of
 
 
 class Logarithmic(NamedTuple):
-    """Tag of the elastic strain ln V, with the left elastic stretch V."""
+    """Tag of the elastic strain ln V, V being the left elastic stretch."""
 
     in_lanes = True
     scalarised = ("elastic_trial",)
@@ -15,7 +15,7 @@ class Logarithmic(NamedTuple):
 
 @point_function()
 def elastic_trial(strain, e, dl):
-    """Return the elastic strain `e` after an elastic increment, exact for steps of any size.
+    """Return the elastic strain `e` after an elastic increment of any size.
 
     V becomes the left stretch of (I + dl) V: 1/2 ln[(I + dl) exp(2 e) (I + dl)^T] (Simo 1992,
     "Algorithms for static and dynamic multiplicative plasticity that preserve the classical return

@@ -40,11 +40,11 @@ class Mullins(NamedTuple):
     elastic
         ID of an isotropic hyperelastic material: the response to the first loading.
     r
-        Limit of the softening: the stress falls at most to 1 - 1/r of the first loading's.
+        Limit of the softening: at least 1 - 1/r of the first loading's stress remains.
     m
         Energy per volume that scales the softening.
     beta
-        Part of the scale that grows with the largest energy.
+        Growth of that scale with the largest energy so far.
 
     Example
     -------

@@ -61,7 +61,7 @@ def _kirchhoff_stress_neo_hookean(law, kin, state):
 
 @laws.wave_speed_squared.on(NeoHookean)
 def _wave_speed_squared_neo_hookean(law, kin, state):
-    # Tangent of P along a principal stretch a: rho c^2 = G (1 + a^2) + lam (1 - ln J); the largest
+    # Tangent of P along a principal stretch a: rho c^2 = G (1 + a^2) + lam (1 - ln J). The largest
     # row sum of b bounds a^2.
     return speed_squared(law, state.F, law.lam * (1 - log(det(state.F))))
 

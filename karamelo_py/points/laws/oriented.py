@@ -1,7 +1,7 @@
-"""Axes of a law by formulas of position: the deformation gradient of a point starts as a rotation.
+"""Axes of a law by formulas of position: a point's deformation gradient starts as a rotation R.
 
-If a law depends on the deformation only through F, its axes are rotated by R if F starts from R:
-F R replaces F, and the axes rotate with the body.
+A law that depends on the deformation through F alone is rotated by R if F R replaces F, and its
+axes then rotate with the body.
 """
 
 from math import sqrt
@@ -20,11 +20,11 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import Values
 
 LEANS = 1e-9
-LEAST = 1e-6  # sine of the angle between two vectors that are not parallel
+LEAST = 1e-6  # sine of the least angle between two vectors that are not parallel
 
 
 class Axes:
-    """Script argument: an angle about z in degrees, or two vectors, numbers or formulas."""
+    """Script argument: an angle about z in degrees, or two vectors; numbers or formulas."""
 
     script_kind: ClassVar[str] = "(angle), or two vectors (x1, y1, z1, x2, y2, z2)"
 
@@ -70,7 +70,7 @@ class Axes:
         return np.stack([first, second, np.cross(first, second)], axis=2)
 
     def rows(self, values: Values, x0: np.ndarray, F: Any) -> np.ndarray:
-        """Return the components (n, k) of the first deformation gradient, a tensor such as F."""
+        """Return the components (n, k) of the initial deformation gradient, a tensor such as F."""
         R = self.rotations(values, x0)
         outside = [
             R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places
@@ -105,7 +105,7 @@ def _initial_state_oriented(law, kin, template):
     return State(laws.initial_state(law.elastic, kin, template), ())
 
 
-# Without laws.deformation: F of the law within is another one.
+# Not laws.deformation: the inner law's F is another one.
 laws.wraps(Oriented, "elastic", "elastic", (*ELASTIC, laws.with_stress))
 
 

@@ -19,12 +19,12 @@ from karamelo_py.script.errors import ScriptError
 
 # Voigt's order
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
-INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # index in Voigt's order
+INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of components in Voigt's order
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
 )
-COUPLED = 1e-9  # out-of-plane shear, over the largest stiffness
+COUPLED = 1e-9  # relative out-of-plane shear that counts as none
 
 _Fields = namedtuple(
     "_Fields", ("specific_volume", "fastest", *(f"c{a + 1}{b + 1}" for a, b in PAIRS))
@@ -119,7 +119,6 @@ class Orthotropic(NamedTuple):
 
 
 def of_stiffness(specific_volume: float, C: np.ndarray) -> Directional:
-    """Return the law with the stiffness C (3, 3, 3, 3)."""
     numbers = [C[VOIGT[a] + VOIGT[b]] for a, b in PAIRS]
     return Directional(specific_volume, fastest(C), *map(float, numbers))
 
@@ -141,7 +140,7 @@ class Transverse(NamedTuple):
         Rotation of the direction from z, in degrees: by `tilt` about x, then by `angle` about z.
         The normal of bedding that dips by 30 degrees about z has angle 30 and tilt 90.
     axes
-        As for orthotropic, which rotate the direction from axis 3.
+        As for orthotropic; the direction is rotated from axis 3.
 
     Example
     -------
@@ -173,7 +172,7 @@ class Transverse(NamedTuple):
                 argument="nu3",
                 expected="nu above -1 and below 1, and nu3^2 < E3/E (1 - nu)/2",
             )
-        across = self.nu3 * self.E / self.E3  # contraction along 3 over the stretch across
+        across = self.nu3 * self.E / self.E3  # contraction along 3 over stretch across
         shear = 0.5 * self.E / (1 + self.nu), self.G3, self.G3
         moduli, ratios = (self.E, self.E, self.E3), (self.nu, across, across)
         turns = self.angle, self.tilt, 0.0
@@ -203,21 +202,20 @@ def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 def fastest(C: np.ndarray) -> float:
-    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l, over all n."""
+    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l over all n."""
     z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
     acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
-    # A factor for directions between those tried, 3 degrees apart.
+    # for directions between those sampled, 3 degrees apart
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 
-# By dimension: components of stress in a body's plane or line, and shears out of it.
+# by dimension: stress components in the plane or line, and shears out of it
 OUT_OF_SCENE = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}
 
 
 def couples(law: Any, scene: Any) -> bool:
-    """Return True if a body in 2D or 1D would shear out of its plane or line."""
     inside, outside = OUT_OF_SCENE[scene.d]
     shears = [abs(law[STIFFNESS[a][b]]) for a in inside for b in outside]
     return max(shears, default=0) > COUPLED * law.fastest

@@ -55,7 +55,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """Return the epsdot0 of 1 + `factor` ln(rate/epsdot0); 0 is allowed if `factor` is 0."""
+    """Return the epsdot0 of 1 + `factor` ln(rate/epsdot0); it may be 0 if `factor` is."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -71,7 +71,7 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    Tables of several laws pad it with its last number, so a law that needs the length stores it.
+    Tables of several laws pad it with its last number, so laws that need the length store it.
     """
 
     values: tuple[float, ...]

@@ -1,8 +1,8 @@
-"""Directions of a law by formulas of position: numbers of each point, stored in its state.
+"""Directions of a law by formulas of position, stored as numbers in each point's state.
 
 A law that allows it has a field ``directions``, a NamedTuple of numbers; `Placed` wraps it and
-replaces them by the point's. A :class:`Place` in the law has the formulas. The state starts with
-nominal directions; `with_directions` sets each point's when a scene is lowered.
+replaces them by the point's. Its :class:`Place` has the formulas. States start with nominal
+directions; `with_directions` sets each point's when a scene is lowered.
 """
 
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ SOME = 1000  # points of a solid whose directions are checked before a run
 
 
 class Direction:
-    """Script argument: a direction ``(x, y, z)`` of numbers or of formulas of x0, y0, z0.
+    """Script argument: a direction ``(x, y, z)``, numbers or formulas of x0, y0, z0.
 
     Numbers give a unit vector, formulas a `Direction`.
     """
@@ -92,7 +92,7 @@ def unit_vector(components: Sequence[float], argument: Argument) -> Vector:
 
 @dataclass(frozen=True)
 class Place:
-    """Formulas of the directions of a law; unused in kernels."""
+    """Formulas of a law's directions; unused in kernels."""
 
     of: tuple[Vector | Direction, ...]
 
@@ -110,7 +110,7 @@ class Place:
 
 
 def placed(law: Any, kind: "type[Placed]", *of: Vector | Direction) -> Any:
-    """Return `law`, or a `kind` of `Placed` with it if some of its directions are formulas."""
+    """Return `law`, wrapped in a `kind` of `Placed` if any of its directions are formulas."""
     if not any_formula(of):
         return law
     if isinstance(law, Thermoelastic):
@@ -119,7 +119,7 @@ def placed(law: Any, kind: "type[Placed]", *of: Vector | Direction) -> Any:
 
 
 def nominal(*of: Vector | Direction) -> Vector:
-    """Return the numbers of directions, or x for all if some are formulas."""
+    """Return the numbers of directions, or x for all if any are formulas."""
     return sum(((1.0, 0.0, 0.0) if any_formula(of) else one for one in of), ())
 
 
@@ -138,14 +138,13 @@ def directions_in(law: "Placed", scene: Any) -> np.ndarray:
 
 
 def place_of(law: Any) -> Place | None:
-    """Return the formulas of a law or of one that it wraps."""
     return next(
         (one.place for one in laws.law_parts(law) if isinstance(one, Placed | Oriented)), None
     )
 
 
 def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any) -> np.ndarray:
-    """Return the state (k, 1) of a solid at rest, or (k, n) if the directions of points differ."""
+    """Return a solid's state at rest (k, 1), or (k, n) if the directions of points differ."""
     place = place_of(solid.material.law)
     if place is None:
         return column
@@ -157,7 +156,7 @@ def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any
 
 
 def directions_at_rest(state: tuple) -> Any:
-    """Return the numbers of a state that depend on the place: directions, or F of `Oriented`."""
+    """Return the numbers of a state that depend on position: directions, or F of `Oriented`."""
     if isinstance(state, State):
         return state.here or state.elastic.F
     inside = (directions_at_rest(item) for item in state if isinstance(item, tuple))
@@ -165,7 +164,7 @@ def directions_at_rest(state: tuple) -> Any:
 
 
 def index_in(state: tuple, numbers: Any) -> int:
-    """Return the place of the first of `numbers` in a flat state, or -1."""
+    """Return the index of the first of `numbers` in a flat state, or -1."""
     before = 0
     for item in state:
         if item is numbers:
@@ -188,7 +187,7 @@ class Placed(NamedTuple):
 
 
 class Oriented(NamedTuple):
-    """A law of F alone whose F starts as the rotation to the point's axes."""
+    """A law of F alone, whose F starts as the rotation to the point's axes."""
 
     in_lanes = True
 

@@ -1,10 +1,9 @@
-"""Saturated soil: any law for the effective stress of the skeleton, and water in its pores.
+"""Saturated soil: any law for the skeleton's effective stress, and water in its pores.
 
-The state adds the volume of the water at zero pressure and of the pores, per volume before
-deformation: p = K ln(content / pores). With a suction a < K, p = a ln S where the saturation S =
-content / pores is below 1, and the relative permeability is S (Gardner 1958). `advance` alone is
-undrained; in a run the flux through the nodes changes the content
-(:mod:`karamelo_py.kernels.equations.pore_water`).
+The state adds the volume of the water at zero pressure and of the pores, per initial volume: p = K
+ln(content / pores). With a suction a < K, p = a ln S where the saturation S = content / pores is
+below 1, and the relative permeability is S (Gardner 1958). `advance` alone is undrained; in a run
+the flux through the nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from typing import Any, NamedTuple
@@ -18,12 +17,12 @@ class Saturated(NamedTuple):
     """The skeleton `law` with water in its pores."""
 
     law: Any
-    n: float  # porosity before deformation
+    n: float  # initial porosity
     drag: float  # force per pore volume and water velocity: rho g / permeability
-    K: float  # bulk modulus of the water
-    rho: float  # density of the water at zero pressure
-    kozeny: float  # 1: permeability follows the porosity; 0: constant
-    suction: float  # below zero, where pores hold 1/e of their water; K: they stay full
+    K: float  # of the water
+    rho: float  # of the water at zero pressure
+    kozeny: float  # 1: permeability follows porosity; 0: constant
+    suction: float  # at which pores hold 1/e of their water; K: they stay full
 
     in_lanes = True
 
@@ -63,7 +62,7 @@ laws.wraps(
 
 @laws.energy_density.on(Saturated)
 def _energy_density_saturated(law, kin, state):
-    """Return the energy of skeleton and water; d/d pores of the latter is -p."""
+    """Return the energy of skeleton and water; the latter's slope by pores is -p."""
     x = state.content / state.pores - 1
     series = x * x * (0.5 - x * (1 / 3 - x * (0.25 - 0.2 * x)))
     compressed = where(abs(x) < 0.01, series, x - logarithm(1 + x))
@@ -72,7 +71,7 @@ def _energy_density_saturated(law, kin, state):
 
 
 def _terms(law, kin, state, of_skeleton):
-    """Return the squared skeleton speed, and trace and determinant of the two-phase problem."""
+    """Return trace and determinant of the two-phase wave problem."""
     dry = 1 / (laws.specific_volume(law) * laws.jacobian(law, kin, state))
     n = porosity(law, kin, state)
     slow, water = of_skeleton(law.law, kin, state.skeleton), law.K / n
@@ -82,7 +81,7 @@ def _terms(law, kin, state, of_skeleton):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # Just above the larger eigenvalue of the two phases, without a root; fastest without drag.
+    # Just above the larger eigenvalue of the two phases, without a root; drag only slows waves.
     trace, product = _terms(law, kin, state, laws.wave_speed_squared)
     return trace - product / trace
 
@@ -100,20 +99,20 @@ def pore_pressure(law, kin, state):
 
 @laws.number
 def saturation(law, kin, state):
-    """Return the fraction of the pores that water fills: 1 without suction."""
+    """Return the fraction of the pores that water fills; 1 without suction."""
     ratio = state.content / state.pores
     return where(law.suction < law.K, where(ratio < 1, ratio, 1), 1)
 
 
 @laws.number
 def porosity(law, kin, state):
-    """Return the porosity over the present volume."""
+    """Return the present porosity."""
     return state.pores / (state.pores + (1 - law.n))
 
 
 @laws.number
 def water_content(law, kin, state):
-    """Return the mass of the water per volume before deformation."""
+    """Return the water's mass per initial volume."""
     return law.rho * state.content
 
 

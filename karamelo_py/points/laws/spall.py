@@ -151,7 +151,7 @@ def _damage_after_cochran_banner(damage, memory, step):
 
 
 def cracked(w):
-    """Return the fraction of the tension that cracks of the opening `w` leave."""
+    """Return the fraction of the tension left by cracks with the opening `w`."""
     some = w > 0
     return 1 - where(some, power(where(some, w, 1), 2 / 3), 0)
 

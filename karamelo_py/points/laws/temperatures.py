@@ -1,6 +1,6 @@
 """Temperature of a point as changed by its law, a part of `eos_strength`.
 
-A temperature is a NamedTuple of parameters. Its memory is `Warm`, the `heat` of other parts, or ().
+A temperature is a NamedTuple of parameters; its memory is `Warm`, the `heat` of other parts, or ().
 """
 
 from typing import Annotated, NamedTuple

@@ -46,7 +46,7 @@ suggestion(
 def expanding(
     law: Any, cp: float | None, kappa: float | None, alpha: float, T: float = 0.0
 ) -> NamedTuple:
-    """`law` with a temperature, initially `T` unless its solid sets it; unchanged without cp."""
+    """Add a temperature to `law`, initially `T` unless its solid sets it, if cp is given."""
     if cp is None or kappa is None:
         if cp is not None:
             raise ScriptError(
@@ -79,7 +79,7 @@ class State(NamedTuple):
 
 @point_function(otherwise=True)
 def warmed_elastic(elastic, T):
-    """The elastic law at the temperature T."""
+    """Return the elastic law at the temperature T."""
     return elastic
 
 
@@ -97,7 +97,7 @@ laws.answers(Thermoelastic, {is_warm: True, laws.temperature: "T"})
 
 
 def heated_by(law, kin, state, loss):
-    """State warmed by energy `loss` per reference volume; unchanged without a temperature."""
+    """Warm the state by energy `loss` per reference volume, if it has a temperature."""
     if not is_warm(law):
         return state
     warmer = loss * laws.specific_volume(law) / laws.heat_capacity(law, loss)

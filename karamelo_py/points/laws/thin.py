@@ -1,8 +1,8 @@
 """Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
 
-The wrapped law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (no
+The inner law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (no
 branches in lanes) finds the strain increment q across the body (in 1D in y and z) without stress
-across; the rest enters the next step (de Borst 1991; Klinkel & Govindjee 2002).
+across; the rest goes to the next step (de Borst 1991; Klinkel & Govindjee 2002).
 """
 
 from typing import Any, NamedTuple
@@ -13,18 +13,18 @@ from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, n
 
 WHOLE = Axisymmetric()
 ENOUGH = 10  # trials of q for increments of any size
-UNROLLED = 9  # short trials are code without a loop
-FURTHEST = 0.3  # change of the stretch across in a trial
+UNROLLED = 9  # up to here trials are code without a loop
+FURTHEST = 0.3  # largest change of the stretch across in a trial
 FLATTEST, STEEPEST = 1e-4, 4.0  # accepted slopes of the stress across, over rho c^2
 
 
 class Thin(NamedTuple):
-    """The three-dimensional `law` without stress on the faces of a body."""
+    """The 3D `law` without stress on the faces of a body."""
 
     law: Any
 
     in_lanes = True
-    trials = 3  # small increments
+    trials = 3  # for small increments
 
 
 class ThinInLargeIncrements(Thin):
@@ -33,12 +33,12 @@ class ThinInLargeIncrements(Thin):
 
 
 class State(NamedTuple):
-    whole: Any  # state of the wrapped law
+    whole: Any  # of the inner law
     across: Any  # thickness over initial thickness
 
 
 def with_strain_across(law, kin, dl, q):
-    """Return the body's increment `dl` with q across it, for the wrapped law."""
+    """Return the increment `dl` with q across, for the inner law."""
     if isinstance(dl, LargeIncrement):
         step = with_strain_across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
@@ -63,7 +63,7 @@ def _advance_thin(law, kin, state, dl, dt):
     volume = laws.specific_volume(inner) * laws.jacobian(inner, WHOLE, old)
     squared = laws.wave_speed_squared(inner, WHOLE, old)
     modulus = squared / volume
-    # Stress across per strain q: 2 G + lambda in a plate, 2 G + 2 lambda in a bar.
+    # stress across per strain q: 2 G + lambda in a plate, 2 G + 2 lambda in a bar
     rest = squared - min(laws.shear_part(inner, WHOLE, old), squared)
     first = modulus + (2 - kin.dimension) * rest / volume
 

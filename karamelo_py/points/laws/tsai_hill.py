@@ -141,7 +141,7 @@ class _Fields(NamedTuple):
 
 
 class Ply(OfDeformation):
-    """An elastic solid with directions, in the field `elastic`, that breaks."""
+    """Elastic solid with directions, in the field `elastic`, that breaks."""
 
     __slots__ = ()
     in_lanes = True

@@ -28,9 +28,9 @@ from karamelo_py.points.laws import Absent, law_traits
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError
 
-ENOUGH = 1e3  # strain increment over the round-off whose stiffness is known
-LEAST = 0.01  # stiffness over that at rest of a strain that counts
-SMALL = 0.01  # step over relaxation time, below which a series is exact
+ENOUGH = 1e3  # strain increments over round-off whose stiffness is known
+LEAST = 0.01  # least stiffness, over that at rest, of a strain that counts
+SMALL = 0.01  # step over relaxation time below which a series is exact
 
 
 class ElasticMaterial:
@@ -68,7 +68,7 @@ def is_isotropic(law: Any) -> bool:
 
 
 class Wlf(NamedTuple):
-    """Shift of relaxation times with temperature, and kind of its argument (C1, C2, Tr)."""
+    """Shift of relaxation times with temperature; script argument (C1, C2, Tr)."""
 
     in_lanes = True
     script_kind = "the constants (C1, C2, Tr)"
@@ -113,7 +113,7 @@ DECADES = 30.0  # largest shift; the formula ends at T = Tr - C2
 
 
 def shifted(shift, dt, T):
-    """The step dt over the shift of times at temperature T."""
+    """Return the step dt over the shift of times at temperature T."""
     if isinstance(shift, Absent):
         return dt
     above = T - shift.Tr
@@ -124,7 +124,7 @@ def shifted(shift, dt, T):
 class Branch(NamedTuple):
     in_lanes = True
 
-    g: float  # relaxing fraction of the stiffness
+    g: float  # relaxing fraction of stiffness
     tau: float
     softness: float  # 1/(4 g G): stored energy over stress squared
     rest: Any
@@ -220,8 +220,8 @@ class State(NamedTuple):
     elastic: Any
     branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
-    gone: Any  # energy of the elastic law that is not stored, per reference volume
-    stiffness: Any  # of the last strain in shear, over that at rest
+    gone: Any  # energy of the elastic law not stored, per reference volume
+    stiffness: Any  # in shear, of the last strain, over that at rest
 
 
 def at_rest(branches, kin):
@@ -247,7 +247,7 @@ def mean_decay(x):
 
 
 def weight_before(x):
-    """Return the weight a of the old |h|^2 in its integral over dt/tau; the new one's is x - a."""
+    """Return the weight a of the old |h|^2 in its integral over dt/tau; the new one has x - a."""
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))

@@ -36,7 +36,7 @@ def viscous_pressure(viscosity, rate, density, sound):
 
 
 def viscous_speed(viscosity, q, density, sound):
-    """Return nu / h = Q1 h |d| + Q2 c, the viscosity nu over h, from q / rho >= Q1 (h d)^2."""
+    """Return nu / h = Q1 h |d| + Q2 c, nu being the viscosity, from q / rho >= Q1 (h d)^2."""
     return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
 
 

@@ -1,8 +1,8 @@
 """Equations of state: pressure of a point from its volume, positive in compression.
 
 An equation of state is a NamedTuple of parameters with a `specific_volume`, a part of
-`eos_strength`. `j` = det F, `heat` is the temperature (`Warm`) or (). The memory is a tuple, empty
-for most.
+`eos_strength`. `j` = det F, `heat` is the temperature (`Warm`) or (). The memory is a tuple, mostly
+empty.
 """
 
 from typing import Any, NamedTuple
@@ -36,7 +36,7 @@ def initial_loss(eos, template):
 
 @point_function(otherwise=True)
 def crush_work(eos, before, after, step):
-    """Return the work dissipated by crushing pores between two memories."""
+    """Return the work of crushing pores between two memories."""
     return 0
 
 
@@ -86,7 +86,7 @@ def ratio_at_pressure(eos, p, heat):
 
 @point_function(otherwise=True)
 def at_pressure(eos, j, memory, p, heat):
-    """Return volume ratio and memory of a point with the pressure p (fix initial_stress)."""
+    """Return volume ratio and memory at the pressure p (fix initial_stress)."""
     return ratio_at_pressure(eos, p, heat), memory
 
 

@@ -243,7 +243,6 @@ def _initial_energy_by_pressure(eos, template):
 
 
 def values(eos, j, E, heat):
-    """Return the pressure and its slopes by J and E."""
     at = (j, E, temperature_or(heat, eos.initial_temperature))
     return [evaluated(code, eos, at) for code in (eos.p, *eos.slopes)]
 
@@ -277,7 +276,7 @@ def _compression_energy_by_pressure(eos, j, memory):
 
 @at_pressure.on(ByPressure)
 def _at_pressure_by_pressure(eos, j, memory, p, heat):
-    # Newton's method along dE = -p dJ, in steps that at most halve or double the volume.
+    # Newton's method along dE = -p dJ, in steps that at most halve or double the volume
     first, _, _ = values(eos, j, memory.E, heat)
     mean, new, moves = 0.5 * (first + p), j, j > 0
     for _ in range(MOST_PASSES):

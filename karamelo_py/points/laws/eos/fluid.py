@@ -23,7 +23,7 @@ from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # times to fall, or rotate, by the liquid's size; dam breaks take 4
+LONG = 6.0, 0.5  # times to fall by, or rotations of, the liquid's size; dam breaks take 4
 FRONT = 1.5  # cells in which a point burns
 STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock and of a strong shock
 
@@ -259,7 +259,7 @@ def _initial_energy_ideal_gas(eos, template):
 
 @compressed.on(IdealGas)
 def _compressed_ideal_gas(eos, memory, step, heating):
-    # dE = -p dJ has the solution E J^(gamma - 1) = const, for any step size.
+    # dE = -p dJ has the solution E J^(gamma - 1) = const, for any step
     return InternalEnergy(memory.E * power(step.before / step.j, eos.gamma - 1) + heating)
 
 
@@ -386,7 +386,7 @@ def burnt(eos, memory):
 
 
 def cold(eos, j):
-    """Return the pressure of the products without energy, and its slope by J."""
+    """Return the products' pressure without energy, and its slope by J."""
     p = slope = 0
     for C, R in ((eos.A, eos.R1), (eos.B, eos.R2)):
         term, ratio = C * exponential(-R * j), eos.omega / (R * j)
@@ -407,7 +407,7 @@ def _ignited_jwl(eos, memory, since):
 
 @compressed.on(Jwl)
 def _compressed_jwl(eos, memory, step, heating):
-    # dE = -p dJ with the step's mean pressure, which is linear in E
+    # dE = -p dJ with the step's mean pressure, linear in E
     before, j, dt = step
     half, after = 0.5 * (j - before), memory._replace(since=memory.since + dt)
     F = burnt(eos, after)

@@ -21,7 +21,7 @@ from karamelo_py.points.laws.eos_strength import Eos
 from karamelo_py.points.laws.parameters import AboveZero
 from karamelo_py.script.errors import ScriptError
 
-MOST_PASSES = 60  # of Newton's method safeguarded by bisection; small steps take two or three
+MOST_PASSES = 60  # Newton's method with bisection; small steps take two or three
 
 
 class PAlphaConstants(NamedTuple):
@@ -131,7 +131,6 @@ def _initial_energy_p_alpha(eos, template):
 
 
 def on_curve(eos, p):
-    """Return the distension on the crush curve, and its slope."""
     left = min(max((eos.ps - p) / (eos.ps - eos.pe), 0), 1)
     open_pores = (eos.alpha0 - 1) * power(left, eos.n)
     some = left > 0
@@ -144,8 +143,7 @@ def solid_pressure(eos, j, alpha, heat):
 
 @compressed.on(PAlpha)
 def _compressed_p_alpha(eos, memory, step, heating):
-    # The solution is unique because ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the
-    # curve only slightly.
+    # Unique, as ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the curve only slightly.
     old = memory.alpha
     low = eos.ps - (eos.ps - eos.pe) * power((old - 1) / (eos.alpha0 - 1), 1 / eos.n)
     crushing = (solid_pressure(eos, step.j, old, ()) > low * old) & (old > 1)

@@ -172,7 +172,7 @@ def _compression_energy_shock(eos, j, memory):
     flat = 1 - y
     in_tension, near = closed < 0, y < 1e-3
     log_of = logarithm(where(in_tension, j, flat))
-    # the closed form is a small difference near 1
+    # near 1 the closed form is a small difference
     few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
     log_of_flat = log_of + ((1 - flat) - y) / flat  # corrects the rounding of 1 - y
     energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))

@@ -1,8 +1,8 @@
-"""Strengths: deviatoric stress of a point from its strain. One file each.
+"""Strengths: deviatoric stress of a point from its strain, one file each.
 
 A strength is a NamedTuple of parameters, a part of `eos_strength`. `heat` is the temperature
 (`Warm`) or (). Strengths that depend on pressure and change the volume define `pressure_response`
-instead of `shear_response`. The defaults are elastic with a shear modulus ``G`` and no memory.
+instead of `shear_response`. Defaults are elastic, with a shear modulus ``G`` and no memory.
 """
 
 import sys
@@ -33,7 +33,7 @@ class Remembered(NamedTuple):
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare the memory of a strength: names (also of dump columns) and initial values.
+    """Declare a strength's memory: names (also of dump columns) and initial values.
 
     A value is a number or the name of a parameter; ``ep``, the equivalent plastic strain, comes
     first.
@@ -65,14 +65,14 @@ def initial_memory(strength, template):
 def respond(strength, law, kin, step, memories):
     """Return deviatoric stress, memory and unstored work per volume after a `StrainStep`.
 
-    `memories` holds the memories of all parts of the `law`.
+    `memories` are those of all parts of the `law`.
     """
     return shear_response(strength, kin, step, memories.strength, memories.heat)
 
 
 @point_function()
 def shear_response(strength, kin, step, memory, heat):
-    """Respond like `respond`, for strengths that need nothing from other parts."""
+    """Respond like `respond`, for strengths independent of other parts."""
 
 
 @point_function()
@@ -137,7 +137,7 @@ def shear_modulus(strength):
 
 @point_function(otherwise=True)
 def damped_speed_squared(strength, squared, density):
-    """Return the squared wave speed raised by viscosity, which reduces the stable step."""
+    """Return the squared wave speed raised by viscosity, which shortens the stable step."""
     return squared
 
 

@@ -150,9 +150,9 @@ class Concrete(NamedTuple):
     The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and smax fc;
     in tension A falls to 0 at -T (1 - D). D grows by the plastic strain and, with eos p-alpha, by
     the volume strain of crushed pores, over the strain to failure (Holmquist, Johnson & Cook 1993,
-    14th Int. Symp. Ballistics, 591-600). Their pressure in three pieces is not built in: eos
-    p-alpha has the same parts, or eos formula. Dump columns: ep, damage, opened (the volume ratio
-    of gaps).
+    14th Int. Symp. Ballistics, 591-600). Their three-part pressure curve is not built in: use eos
+    p-alpha, which has the same parts, or eos formula. Dump columns: ep, damage, opened (the volume
+    ratio of gaps).
 
     See Also
     --------

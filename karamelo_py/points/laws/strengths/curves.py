@@ -189,7 +189,7 @@ class FlowStress(ByFlow, FlowFields):
     @classmethod
     def given(cls, G: AboveZero, Y: FlowFormula, *, T: FromZero = 293.0) -> Any:
         term = plain(Y, "Y")
-        smooth = plain(term, "Y", {"sqrt": lambda a: to_power(a, 0.5)})  # its slope at 0 is allowed
+        smooth = plain(term, "Y", {"sqrt": lambda a: to_power(a, 0.5)})  # allows its slope at 0
         writer = ProgramWriter(SEEDS)
         codes: dict[str, Any] = {
             "flow": writer.code(term),

@@ -117,7 +117,7 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # Half the in-plane principal stress difference in flow over sqrt(J2), and the dilatancy.
+    # half the in-plane principal stress difference in flow over sqrt(J2), and the dilatancy
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
@@ -135,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the apex the trial pressure counts, see below.
+            # The trial pressure counts beyond the apex, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

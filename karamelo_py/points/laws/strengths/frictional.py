@@ -40,7 +40,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Return cohesion, friction and dilation, linear from the peak to the residual.
+    """Return cohesion, friction and dilation, linear from peak to residual.
 
     A step uses the values at its beginning.
     """
@@ -52,7 +52,6 @@ def surface(strength, strain):
 
 
 def lowest_pressure(strength, strain):
-    """Return -cohesion / friction, or the strength's bound."""
     cohesion, friction, _ = surface(strength, strain)
     return tension_bound(strength, -cohesion / friction if friction > 0 else -inf)
 
@@ -67,12 +66,12 @@ def fraction_by_dilatancy(strength, memory):
     """Return the fraction b of F-bar's averaged pressure that the yield surface uses.
 
     Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
-    stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, with the
-    sines f of friction and d of dilatancy. With b = 0 it is negative for a between d and f
+    stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, f and d
+    being the sines of friction and dilatancy. With b = 0 it is negative for a between d and f
     (pressure grows in stripes, and strength falls); with b = (f - d)/(f (1 - d)) it is a square.
     """
     f, d = sines_after(strength, memory.ep)
-    # the sine of a steep cone in plane strain may exceed 1
+    # a steep cone's sine in plane strain may exceed 1
     return where(f > d, min((f - d) / (where(f > d, f, 1) * max(1 - d, 1e-3)), 1), 0)
 
 
@@ -161,7 +160,7 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # sine of dilatancy over sine of friction above which neither occurs
+ENOUGH = 1 / 3  # sine of dilatancy over that of friction above which neither occurs
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
 # latter also need steep friction and no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
@@ -180,7 +179,7 @@ def little_dilatancy(strength):
 def _vibrates(strength, scene):
     """Return facts if strain cycles of a point at its limit release net work.
 
-    Without dilatancy they release (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
+    Without dilatancy this is (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
     f = little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking

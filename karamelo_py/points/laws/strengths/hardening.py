@@ -21,7 +21,7 @@ from karamelo_py.points.laws.temperatures import temperature_or, thermal_pressur
 
 
 def elastic_trial(G, s, strain):
-    # the deviator of the sum, because rounding over many steps would give s a trace
+    # deviator of the sum, as rounding over many steps would give s a trace
     return dev(s + 2 * G * strain)
 
 
@@ -131,7 +131,7 @@ def onto_yield_surface(trial, q, flow, x):
 def radial_return(strength, kin, step, memory, heat):
     """Scale the trial deviatoric stress by flow/q (radial return, Wilkins 1964).
 
-    This is the `shear_response` of strengths with ``G``, a `flow_stress` and ``ep`` in the memory;
+    This is the `shear_response` of strengths with ``G``, a `flow_stress`, and ``ep`` in the memory;
     q is the trial's von Mises stress.
     """
     trial = elastic_trial(strength.G, step.s, step.strain)
@@ -151,7 +151,6 @@ class Around(NamedTuple):
 
 
 def respond_at_pressure(strength, law, kin, step, memories):
-    """Radial return with a flow stress at the pressure and volume after the step."""
     around = around_flow(strength, law, step, memories)
     return radial_return(strength, kin, step, memories.strength, around)
 
@@ -177,7 +176,7 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x, the flow stress does not: x is unique for any step size. Newton's
+    The left side falls with x, the flow stress does not, so x is unique for any step size. Newton's
     method is safeguarded by bisection.
     """
     slope = 3 * strength.G
@@ -196,8 +195,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. It is larger next to a
-        # kink of the curve, so the excess must be small too.
+        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. Next to a kink it is
+        # larger, so the excess must be small too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))

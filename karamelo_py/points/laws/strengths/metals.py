@@ -120,7 +120,7 @@ remembers(JohnsonCook, ep=0.0)
 shear_response.on(JohnsonCook)(radial_return)
 
 
-# increments up to this fraction of the strain use a series of this many terms
+# Increments up to this fraction of the strain use a series of this many terms.
 _NEAR, _TERMS = 1 / 32, 9
 
 

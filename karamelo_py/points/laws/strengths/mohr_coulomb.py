@@ -88,13 +88,13 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, yield_surface, G, K):
     """Return the principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    They return to a plane, to an edge if that changes their order, or else to the apex (Simpson
+    They return to a plane; to an edge if that changes their order; or else to the apex (Simpson
     2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
     sin(phi), sin(psi).
     """
     k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G
-    # The normals of yield function and plastic potential are (1 + sin, 0, sin - 1).
+    # normals of yield function and plastic potential: (1 + sin, 0, sin - 1)
     mean = 4 * lam * sin_phi * sin_psi
     up = 2 * G * (1 + sin_phi) * (1 + sin_psi)
     down = 2 * G * (1 - sin_phi) * (1 - sin_psi)
@@ -121,7 +121,7 @@ def returned_to_plane(s, yield_surface, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # on both planes, because they are equal but for rounding
+        # on both planes, as they are equal but for rounding
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
@@ -138,7 +138,7 @@ def returned_to_plane(s, yield_surface, G, K):
 def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
     s, p, K = trial
     k, sin_phi, _ = yield_surface = surface(strength, strain)
-    # a cheap bound of the yield function
+    # cheap bound of the yield function
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:

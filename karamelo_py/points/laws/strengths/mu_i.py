@@ -64,7 +64,7 @@ class MuI(NamedTuple):
     rho_s: AboveZero
 
     def checked(self):
-        """Refuse friction that decreases with the rate, which makes flow unstable."""
+        """Refuse friction that decreases with the rate, as flow would be unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below the friction of slow flow",
@@ -97,7 +97,7 @@ SLOW = 0.05  # fraction of the grains' viscosity that gives a warning
 def _slows(strength, scene):
     """Compare the viscosity of the PIC fraction with the grains', mu p/(rho gamma').
 
-    p is taken at half the height of a body, I as half of I0.
+    p is taken at half a body's height, I as I0 / 2.
     """
     added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
@@ -149,7 +149,7 @@ def _respond_mu_i(strength, law, kin, step, memories):
     flows = together & (shear > strength.mu_s * p)
     p = where(together, p, 1)
     slow, fast = strength.mu_s * p, strength.mu_2 * p
-    # (shear - tau)/(G dt) is the shear rate required by tau = mu(I) p: a quadratic equation.
+    # (shear - tau)/(G dt) is the shear rate at which tau = mu(I) p: a quadratic equation.
     grain = strength.d * sqrt(strength.rho_s / p)
     viscous = strength.I0 * strength.G * dt / grain
     b = fast + shear + viscous
