@@ -211,7 +211,7 @@ def fastest(C: np.ndarray) -> float:
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 
-# by dimension: stress components in the plane or line, and shears out of it
+# by dimension: stress components within a body's plane or line, and shears out of it
 OUT_OF_SCENE = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}
 
 

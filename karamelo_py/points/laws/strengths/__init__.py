@@ -65,7 +65,7 @@ def initial_memory(strength, template):
 def respond(strength, law, kin, step, memories):
     """Return deviatoric stress, memory and unstored work per volume after a `StrainStep`.
 
-    `memories` are those of all parts of the `law`.
+    `memories` holds the memories of all parts of the `law`.
     """
     return shear_response(strength, kin, step, memories.strength, memories.heat)
 

@@ -160,7 +160,7 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # sine of dilatancy over that of friction above which neither occurs
+ENOUGH = 1 / 3  # sine of dilatancy over sine of friction above which neither occurs
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
 # latter also need steep friction and no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
