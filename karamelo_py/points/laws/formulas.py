@@ -1,8 +1,8 @@
 """Formulas in laws: read from a script, differentiated, and code of a class.
 
 The structure of a formula is in the law's class, so kernels contain it as code; its numbers are
-parameters. Laws that differ only in numbers have common kernels, unless some are equal or small whole
-exponents.
+parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
+whole exponents.
 """
 
 from collections import namedtuple
