@@ -165,7 +165,6 @@ def matter_of(kin: Tag, block: Block) -> Matter:
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
-    """Return the block with the points `rows` in this order, unsorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
@@ -405,7 +404,6 @@ class Setup(NamedTuple):
 
 
 def with_items(of, /, **items):
-    """Replace items of a NamedTuple or of a `hold` tuple."""
     pairs = zip(of._fields, of, strict=True)
     return type(of)(*[items.get(name, item) for name, item in pairs])
 

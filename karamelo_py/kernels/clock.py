@@ -158,7 +158,6 @@ def move_check(s: Setup) -> MoveCheck:
 
 
 def checked_move(check, points, p):
-    """Return a point's move in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)

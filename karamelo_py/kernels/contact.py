@@ -448,7 +448,6 @@ def _node(contact, node, i):
 
 @noinline
 def _count_partners(which, bodies, node, count):
-    """Count each field's approaching (or `Touched`) pairs; return whether there are any."""
     contact, some_pair = bodies.contact, False
     contact.partners[:count] = 0
     for i in range(count):

@@ -87,7 +87,6 @@ def _touched_faces(shape, kin, x, about):
 
 @noinline
 def _list_point(body, surface, s, block, p):
-    """Record a contact of point `p` with a surface; return whether it touches."""
     kin, points, d = s.kin, block.points, s.kin.dimension
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
@@ -151,7 +150,6 @@ def _list_points(body, surface, s, block, number):
 
 @noinline
 def _hold(s, slot, x, c, force):
-    """Add a force component to the reaction of the fix that holds a node at `x`."""
     values, turning = s.control.values, s.bodies.torques[slot]
     values[slot + c] += force
     if turning:
@@ -162,7 +160,6 @@ def _hold(s, slot, x, c, force):
 
 @noinline
 def _give_to_points(body, s, block, number, measures):
-    """Add impulses of contacts to the nodes of a block's points, or sum their work."""
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
     kick, work = s.control.step[0].kick, 0.0
     for i in range(body.count[0]):

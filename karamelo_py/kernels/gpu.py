@@ -302,7 +302,6 @@ def _steps_to(s, grid, k):
 
 
 def _with_cell(totals, cells, cell, first, step):
-    """Add a cell's sums from rows `first`, `first` + `step`, ... of its box."""
     box = cells.box[index(max(cell, 0))]
     occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
@@ -343,7 +342,6 @@ def sum_before(i, fate, cells, begin, above):
 
 
 def place_list(i, fate, cells):
-    """Set the range of a cell's points and the number of its box."""
     chunk = i // CHUNK
     total = cells.before[chunk]
     for c in range(chunk * CHUNK, i):

@@ -93,7 +93,6 @@ def work_of_loads(i, fate, s, about, target):
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Return the function of a member of a hook on nodes, ACT or RUB, over `length`."""
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):
@@ -125,7 +124,6 @@ def whole_points(heats: bool) -> Callable:
 
 
 def on_point(points_of: Callable, then: int, values: int = 0) -> Callable:
-    """Return the function of a point for a hook on ``points_of(s, block, then)``."""
     control_of = _control(values)
 
     def visit_point(i, fate, s, block, about, *tag):

@@ -182,7 +182,6 @@ def _lay_cells(d, bodies, cells, reach):
 
 @noinline
 def _find_cells(d, bodies, cells, width):
-    """Find each point's cell; sort the second body's points by cell, stably."""
     n, m = bodies.first2, bodies.mass.size
     used = cells.count[0] * cells.count[1] * cells.count[2]
     cells.start[: used + 1] = 0
@@ -273,7 +272,6 @@ def _rub(push, bodies, i, contact):
 
 @noinline
 def _pass_on(push, bodies, cells, i, j):
-    """Apply a partner's part of the friction of `i`, proportional to its load."""
     kin, contact, d = push.kin, cells.contact, push.kin.dimension
     square = _push_between(push, bodies, i, j).squared()
     if square > 0:

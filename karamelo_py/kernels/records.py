@@ -129,7 +129,6 @@ def _lanes_from(builder: ir.IRBuilder, rows: list, lanes: Lanes, count: int) -> 
 def _gathered(
     builder: ir.IRBuilder, lanes: Lanes, first: Any, template: Any, read: Callable
 ) -> list:
-    """Gather by ``read(lane, column, count)``, which loads components of one point."""
     components: list = []
     for begin, count in _chunks(len(template)):
         column = builder.add(first, I64(begin))

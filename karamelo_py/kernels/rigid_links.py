@@ -592,7 +592,6 @@ def _descend(links, bodies):
 
 @noinline
 def _iterate(links, bodies, bounded):
-    """Newton's method with halved steps; return whether it converged."""
     m, energy = links.slope.shape[0], 0.0
     size = _residual(links, bodies, links.u, links.rest, bounded)
     for body in bodies:
@@ -760,7 +759,6 @@ def _collide(links, bodies, dt):
 
 @noinline
 def find(links, bodies, control, kin):
-    """List this step's links; return whether there are any."""
     dt, values = control.values[arrays.DT], control.values
     links.count[0], links.dt[0] = 0, dt
     for i in range(links.published.shape[0]):
@@ -788,7 +786,6 @@ def _sum_impulses(links):
 
 @noinline
 def solve(links, bodies, control):
-    """Find the bodies' velocities at the end of the step, and the links' impulses."""
     dt, kick, values = control.values[arrays.DT], control.step[0].kick, control.values
     _collide(links, bodies, dt)
     _solve(links, bodies)

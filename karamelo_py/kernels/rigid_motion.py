@@ -126,7 +126,6 @@ def records(kind: np.dtype, count: int = 1) -> Any:
 
 @noinline
 def _turn_about(state, axis, angle):
-    """Rotate about a principal axis (3,) of the initial frame."""
     q, c, s = state.q, cos(0.5 * angle), sin(0.5 * angle)
     a, b, d, e = q[0], q[1], q[2], q[3]
     x, y, z = s * axis[0], s * axis[1], s * axis[2]
@@ -345,7 +344,6 @@ def solve_system(J):
 
 @noinline
 def _iterate(body, dt, bounded):
-    """Newton's method with halved steps; return whether it converged."""
     work = body.solution
     M, J, energy = work.mass, work.slope, 0.0
     size = residual(body, dt, work.u, work.residual, bounded)
@@ -384,7 +382,6 @@ def _iterate(body, dt, bounded):
 
 @noinline
 def solve(body, dt):
-    """Find impulses and velocities at the end of the step."""
     state = body.state[0]
     state.passes = 0
     if _iterate(body, dt, False):
@@ -447,7 +444,6 @@ def start_step(body, control):
 
 @noinline
 def _velocities_of(body, momentum):
-    """Solve M U = P for the free components of U."""
     work = body.solution
     M, J = work.mass, work.slope
     for a in range(6):

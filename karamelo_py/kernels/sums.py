@@ -16,7 +16,6 @@ def adds(quantity: NamedTuple) -> bool:
 
 
 def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]:
-    """List column ranges, adjacent ones joined."""
     ends: dict[tuple[Any, int], int] = {}  # first column, by array and end
     for one in [one for quantity in quantities for one in type(quantity).gives]:
         array, first = one.into.array, one.into.first(kin)
@@ -66,7 +65,6 @@ def _clear_record(quantities, kin, nodes, n):
 
 @by_threads
 def sum_shares(quantities: tuple, kin: Tag, nodes: Nodes, buffers: Buffers, share: int) -> None:
-    """Sum the quantities at a part of the nodes, tile by tile, box by box."""
     nodes, buffers = at_hand(nodes), at_hand(buffers)
     first, parts = buffers.first, buffers.parts
     for row in range(first[share], first[share + 1]):

@@ -89,7 +89,6 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
-    """Return -V (averaged - the point's mean stress), a tensor."""
     _, _, f = pt.law_state_F
     V_tau, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - V_tau

@@ -99,7 +99,6 @@ def force_around(kin, pt):
 
 @eq.reads("force")
 def force_on_point(pt):
-    """Return the force (d,) of fixes and rotation, or ()."""
     force, around = pt.load(Force, pt.v), force_around(pt.kin, pt)
     if not len(force):
         return around
@@ -110,7 +109,6 @@ def force_on_point(pt):
 
 @eq.reads()
 def V_mean_stress(pt):
-    """Return V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
     return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
 
 

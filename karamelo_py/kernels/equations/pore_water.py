@@ -325,7 +325,6 @@ def _by_pressure(nodes, kin, n, rim):
 
 
 def _mass_given(nodes, kin, n, V):
-    """Return the mass of water supplied to a node per time; store it by `WAYS`."""
     supply, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
     whole, squared = real(0, V), real(0, V)
     if supply is None:

@@ -185,7 +185,6 @@ def _idle_damage(law, scene):
 
 
 def _idle_heat(law, scene):
-    """Return True if nothing reads the temperature or depends on it."""
     pressures = parameter(law.eos, "thermal"), parameter(law.temperature, "alpha", 1)
     presses = any(number != 0 for number in pressures)
     heat = initial_heat(law.temperature, 1.0)
@@ -250,13 +249,13 @@ FAST = 0.02  # fraction of the wave speed above which impacts make metals yield
 
 
 def _locks(law, scene):
-    """Return True if isochoric flow in load steps locks linear cells."""
+    """Isochoric flow in load steps locks linear cells."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _locks_at_impact(law, scene):
-    """Return True at impact in the total frame, where points stay in their linear cells."""
+    """At impact in the total frame, points stay in their linear cells, which lock."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"mark": scene.method.mark}
 

@@ -168,7 +168,6 @@ def fibre_criteria(law, T):
 
 
 def piola_stress(law, kin, state):
-    """Return the stress with the matrix of `state` and whole fibres."""
     E = laws.elastic_strain(law.elastic, kin, Deformed(state.F))
     cracked = (1 - state.matrix) * stress_of(law.cracked, E)
     return state.matrix * stress_of(law.elastic, E) + cracked

@@ -319,7 +319,6 @@ def _initial_state_hill(law, kin, template):
 
 
 def flow(strength, before, increment, dt):
-    """Return the flow stress and its slope, also for strengths with a closed form."""
     if isinstance(strength, Plastic | LinearHardening):
         ep = before.memory.ep + increment
         return strength.yield_stress + strength.H * ep, strength.H
@@ -327,7 +326,6 @@ def flow(strength, before, increment, dt):
 
 
 def yield_stress(strength: Any) -> float:
-    """Return the first flow stress, or 0 for a strength without one."""
     known = flow_stress.defined(type(strength))
     if not known and not isinstance(strength, Plastic | LinearHardening):
         return 0.0

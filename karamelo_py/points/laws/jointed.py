@@ -38,8 +38,6 @@ PASSES = 2  # iterations of the return to two yield surfaces
 
 
 class RockBetweenJoints(MohrCoulomb):
-    """Strength of the rock between its joints, without memory."""
-
     __slots__ = ()
 
 

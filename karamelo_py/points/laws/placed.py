@@ -119,7 +119,6 @@ def placed(law: Any, kind: "type[Placed]", *of: Vector | Direction) -> Any:
 
 
 def nominal(*of: Vector | Direction) -> Vector:
-    """Return the numbers of directions, or x for all if any are formulas."""
     return sum(((1.0, 0.0, 0.0) if any_formula(of) else one for one in of), ())
 
 

@@ -311,7 +311,6 @@ def _returned_gurson(strength, memory, trial):
 
 
 def on_gurson(Y, c, b, p):
-    """Return q on the yield surface at pressure p, and sinh and cosh of b p."""
     grown = exponential(min(b * p, -log(NO_VOIDS)))
     sinh, cosh = 0.5 * (grown - 1 / grown), 0.5 * (grown + 1 / grown)
     return Y * sqrt(max(1 + c * c - 2 * c * cosh, 0)), sinh, cosh
