@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import threading
 import time
 from argparse import Namespace
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path
 
 import pandas
@@ -26,6 +27,7 @@ from karamelo_py.script.errors import ScriptError
 
 TIMES = ["seconds", "cpu_seconds", "seconds_spread", "particle_steps_per_s", "peak_memory_mib"]
 OF_MACHINES = [*TIMES, "wall_s", "folder", "machine"]
+REAL = sys.executable  # before tests replace it
 WORDS = ["-var", "a=1:2:3", "-record", "v_x", "-jobs", "2"]
 
 distributed = pytest.importorskip("distributed")
@@ -117,6 +119,71 @@ def test_a_pool_of_mpi(folder):
     assert done.returncode == 0, done.stdout + done.stderr
     assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
     assert numbers("sweep.csv") == numbers("here.csv")
+
+
+SBATCH = """#!/bin/sh
+cp "$1" job.$$.sh
+setsid sh job.$$.sh > job.$$.txt 2>&1 &
+echo "Submitted batch job $!"
+"""
+
+
+@pytest.mark.usefixtures("starts_are_cheap")
+def test_a_queue_of_jobs(folder, monkeypatch):
+    """sbatch and scancel of a Slurm that starts jobs on this machine at once."""
+    pytest.importorskip("dask_jobqueue")
+    import dask
+
+    (folder / "bin").mkdir()
+    for name, text in ("sbatch", SBATCH), ("scancel", '#!/bin/sh\nkill -- "-$1"\n'):
+        (folder / "bin" / name).write_text(text, encoding="utf-8")
+        (folder / "bin" / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder / 'bin'}:{os.environ['PATH']}")
+    slurm = {"cores": 1, "memory": "1GB", "interface": "lo", "python": REAL, "death-timeout": 30}
+    with dask.config.set({f"jobqueue.slurm.{name}": value for name, value in slurm.items()}):
+        assert main(["sweep", "in.lin", *WORDS, "-jobs", "1", "-on", "slurm", "-o", "far.csv"]) == 0
+    assert len([*folder.glob("job.*.sh")]) == 1
+    assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
+    assert numbers("far.csv") == numbers("here.csv")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
+@pytest.mark.parametrize(("where", "end"), [(None, "KILL"), ("local", "KILL"), ("local", "INT")])
+def test_a_study_that_is_killed_leaves_no_process(folder, where, end):
+    """SIGKILL of the study alone; Ctrl-C of its group ends within seconds."""
+    text = SCRIPT.replace("run(1)", "run(1000000000)").replace("a + 2*b", "1e-12*a")
+    (folder / "in.long").write_text(text, encoding="utf-8")
+    words = ["sweep", "in.long", "-var", "a=1,2", "-record", "v_x", "-jobs", "2"]
+    code = "from karamelo_py.app.start import main; raise SystemExit(main())"
+    study = subprocess.Popen(
+        [REAL, "-c", code, *words, *(["-on", where] if where else [])], start_new_session=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+    known = study.pid, os.getpid()
+
+    def descendants():
+        found = [int(one) for one in os.listdir("/proc") if one.isdigit() and int(one) not in known]
+        return [one for one in found if works_in(one, folder)]
+
+    while not [*folder.glob("sweep/*/run.json")]:
+        time.sleep(0.05)
+    assert descendants()
+    (os.killpg if end == "INT" else os.kill)(study.pid, getattr(signal, f"SIG{end}"))
+    assert study.wait(20) == (130 if end == "INT" else -signal.SIGKILL)
+    said = study.stderr.read().decode()
+    assert "Traceback" not in said and ("interrupted" in said) == (end == "INT")
+    for _ in range(100):
+        if not descendants():
+            break
+        time.sleep(0.1)
+    assert not descendants()
+
+
+def works_in(pid, folder):
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/cwd").readlink().is_relative_to(folder)
+    return False
 
 
 def parcel_of(path, **values):
@@ -321,7 +388,7 @@ def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, an
         ("tcp://127.0.0.1:9", "no scheduler answers at tcp://127.0.0.1:9"),
         ("tpc://127.0.0.1:9", "-on tpc://127.0.0.1:9"),
         ("mpi", "there is one process"),
-        ("slurm", "-on slurm needs dask-jobqueue"),
+        ("slurm", "-on slurm: there is no command sbatch"),
     ],
 )
 def test_places_that_are_refused(folder, capsys, monkeypatch, where, says):

@@ -178,6 +178,8 @@ class Launch:
         if process.returncode < 0:
             return CaseOutcome("killed", f"ended by signal {-process.returncode}", facts, folder)
         outcome = CaseOutcome("done", "", facts, folder)
+        if not process.returncode and record.get("status") != "finished":
+            raise ScriptError(f"{folder / NAME} is not complete: is the disk full?")
         if process.returncode:
             error = error_of(record)
             last = outcome.complaint.rstrip().splitlines()[-1:]

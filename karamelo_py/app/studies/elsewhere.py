@@ -433,8 +433,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
         raise ScriptError(f"-on {options.on}", expected=WHERE)
     needed = "dask_jobqueue" if options.on in QUEUES else "distributed"
     if find_spec(needed) is None:
-        extra = "pip install '.[dask]' in the folder of karamelo-py"
-        hint = "pip install dask-jobqueue" if options.on in QUEUES else extra
+        hint = "pip install '.[dask]' in the folder of karamelo-py"
         raise ScriptError(f"-on {options.on} needs {needed.replace('_', '-')}", hint=hint)
     from distributed import Client, LocalCluster
 
@@ -450,7 +449,11 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
         elif options.on in QUEUES:
             import dask_jobqueue
 
-            cluster = getattr(dask_jobqueue, QUEUES[options.on])()
+            kind = getattr(dask_jobqueue, QUEUES[options.on])
+            command = kind.job_cls.submit_command.split()[0]
+            if shutil.which(command) is None:
+                raise ValueError(f"there is no command {command}")
+            cluster = kind()
             _closed(ends, cluster.close, timeout=PATIENCE)
             cluster.scale(jobs=jobs)
         else:

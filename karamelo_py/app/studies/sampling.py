@@ -63,7 +63,11 @@ def _law(name: str, kind: str, text: str) -> Any:
     parts = [number_of(piece.strip()) for piece in text.split(",")]
     numbers = [piece for piece in parts if piece is not None]
     expected = f"{KINDS[kind]} with numbers"
-    if len(numbers) != len(parts) or len(numbers) != KINDS[kind].count(",") + 1:
+    if (
+        not np.isfinite(numbers).all()
+        or len(numbers) != len(parts)
+        or len(numbers) != KINDS[kind].count(",") + 1
+    ):
         raise ScriptError(f"-var {name}: {kind}({text})", expected=expected)
     a, b, *more = numbers
     if kind in ("normal", "lognormal") and not b > 0:

@@ -1,9 +1,10 @@
 """karamelo-py sensitivity: which variables matter for a result."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,8 +36,8 @@ variables.
 morris: how much a variable changes the result over its range (1 % to 99 % quantile): mean absolute
 change (mu*), and standard deviation of the changes (sigma), which shows curvature and interaction
 (Morris 1991; Campolongo et al. 2007); n (d + 1) runs.
-fit: for expensive runs: sobol indices of a surrogate fitted to n runs, a polynomial or thin-plate
-splines, whichever has the smaller leave-one-out error (printed). Existing runs are reused."""
+fit: for expensive runs: sobol indices of a surrogate fitted to n runs, a polynomial or a Gaussian
+process, whichever has the smaller leave-one-out error (printed). Existing runs are reused."""
 DOUBTED = 0.2  # leave-one-out error of a fit, over the standard deviation of the runs
 LEVELS = 4  # levels of the method morris
 ENDS = 0.01, 0.99  # quantiles
@@ -44,30 +45,32 @@ ENDS = 0.01, 0.99  # quantiles
 Results = Callable[[np.ndarray], np.ndarray]  # (d, n) to (results, n)
 
 
+def _problem(laws: Sequence) -> dict[str, Any]:
+    names = [f"x{k}" for k in range(len(laws))]
+    return {"num_vars": len(laws), "names": names, "bounds": [[0.0, 1.0]] * len(laws)}
+
+
+def _intervals(analysis: Mapping, word: str) -> list[Interval]:
+    middles, halves = (np.asarray(analysis[name], float) for name in (word, f"{word}_conf"))
+    return [
+        Interval(m, m - h, m + h) for m, h in zip(middles.tolist(), halves.tolist(), strict=True)
+    ]
+
+
 def sobol(
     laws: Sequence, results: Results, n: int, seed: int
 ) -> list[list[tuple[Interval, Interval]]]:
-    from scipy.stats import sobol_indices
+    from SALib.analyze import sobol as analyzer
+    from SALib.sample import sobol as sampler
 
     require_power_of_2("-n", n)
-    rng = np.random.default_rng(seed)
-    indices = sobol_indices(func=results, n=n, dists=list(laws), rng=rng)
-    sure = indices.bootstrap(confidence_level=SURE, n_resamples=RESAMPLED // 4)
-    firsts, totals = np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
-    ends = [
-        [np.atleast_2d(end) for end in one.confidence_interval]
-        for one in (sure.first_order, sure.total_order)
-    ]
-    return [
-        [
-            tuple(
-                Interval(float(middle[s, k]), float(low[s, k]), float(high[s, k]))
-                for middle, (low, high) in zip((firsts, totals), ends, strict=True)
-            )
-            for k in range(firsts.shape[1])
-        ]
-        for s in range(len(firsts))
-    ]
+    problem = _problem(laws)
+    how: dict[str, Any] = {"calc_second_order": False, "seed": seed}
+    parts = sampler.sample(problem, n, **how)
+    numbers = results(np.array([law.ppf(u) for law, u in zip(laws, parts.T, strict=True)]))
+    how |= {"num_resamples": RESAMPLED // 4, "conf_level": SURE}
+    analyses = [analyzer.analyze(problem, one, **how) for one in numbers]
+    return [[*zip(_intervals(one, "S1"), _intervals(one, "ST"), strict=True)] for one in analyses]
 
 
 def morris(
@@ -77,22 +80,16 @@ def morris(
     from SALib.sample import morris as sampler
 
     low, high = (np.array([law.ppf(end) for law in laws]) for end in ENDS)
-    names = [f"x{k}" for k in range(len(laws))]
-    problem = {"num_vars": len(laws), "names": names, "bounds": [[0.0, 1.0]] * len(laws)}
-    parts = sampler.sample(problem, n, num_levels=LEVELS, seed=seed)
+    problem = _problem(laws)
+    how: dict[str, Any] = {"num_levels": LEVELS, "seed": seed}
+    parts = sampler.sample(problem, n, **how)
     numbers = results((low + parts * (high - low)).T)
-    made = []
-    for one in numbers:
-        analysis = analyzer.analyze(
-            problem, parts, one, num_levels=LEVELS, conf_level=SURE, seed=seed,
-            print_to_console=False,
-        )  # fmt: skip
-        half = np.asarray(analysis["mu_star_conf"], float)
-        mu, sigma = (np.asarray(analysis[word], float) for word in ("mu_star", "sigma"))
-        made.append(
-            [(Interval(m, m - h, m + h), float(s)) for m, h, s in zip(mu, half, sigma, strict=True)]
-        )
-    return made
+    how |= {"conf_level": SURE, "print_to_console": False}
+    analyses = [analyzer.analyze(problem, parts, one, **how) for one in numbers]
+    return [
+        [*zip(_intervals(one, "mu_star"), map(float, one["sigma"]), strict=True)]
+        for one in analyses
+    ]
 
 
 def results_of(study: Study, randoms: Sequence[Random], fixed: dict[str, str]) -> Results:
@@ -132,9 +129,11 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     needs_scipy("sensitivity")
-    if options.method == "morris" and find_spec("SALib") is None:
+    if options.method != "fit" and find_spec("SALib") is None:
         hint = "pip install '.[studies]' in the folder of karamelo-py"
-        raise ScriptError("karamelo-py sensitivity -method morris needs SALib", hint=hint)
+        raise ScriptError(
+            f"karamelo-py sensitivity -method {options.method} needs SALib", hint=hint
+        )
     out = variables.out_file(options.o, ".csv")
     randoms, options.var = random_variables(options.var)
     if len(randoms) < 2:

@@ -30,40 +30,74 @@ def polynomial(x: np.ndarray, y: np.ndarray, degree: int) -> Function:
     return lambda at: powers(at, degree) @ coefficients
 
 
-def splines(x: np.ndarray, y: np.ndarray) -> Function:
-    """Thin-plate splines through all values (Duchon 1977)."""
-    from scipy.interpolate import RBFInterpolator
+def likely(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Logarithms of the lengths (one per variable) and of the noise of largest likelihood."""
+    from scipy.linalg import LinAlgError, cho_factor, cho_solve
+    from scipy.optimize import minimize
 
-    return RBFInterpolator(x, y, kernel="thin_plate_spline", degree=1)
+    def loss(logs: np.ndarray) -> float:
+        try:
+            factor, lower = cho_factor(_covariance(x, logs))
+        except LinAlgError:
+            return 1e10
+        variance = y @ cho_solve((factor, lower), y) / len(y)
+        return 0.5 * len(y) * np.log(variance) + np.log(np.diag(factor)).sum()
+
+    y, count = y - y.mean(), x.shape[1]
+    bounds = [(-2.0, 4.0)] * count + [(-18.0, 0.0)]
+    ends = [
+        minimize(loss, [start] * count + [-9.0], method="L-BFGS-B", bounds=bounds)
+        for start in (0.0, 1.5)
+    ]
+    return min(ends, key=lambda end: end.fun).x
 
 
-FITS: dict[str, Fit] = {
-    "a linear function": partial(polynomial, degree=1),
-    "a quadratic polynomial": partial(polynomial, degree=2),
-    "a cubic polynomial": partial(polynomial, degree=3),
-    "thin-plate splines": splines,
-}
+def _correlation(x: np.ndarray, y: np.ndarray, logs: np.ndarray) -> np.ndarray:
+    from scipy.spatial.distance import cdist
+
+    lengths = np.exp(logs[:-1])
+    return np.exp(-0.5 * cdist(x / lengths, y / lengths, "sqeuclidean"))
 
 
-def error(fit: Fit, x: np.ndarray, y: np.ndarray) -> float:
+def _covariance(x: np.ndarray, logs: np.ndarray) -> np.ndarray:
+    return _correlation(x, x, logs) + np.exp(logs[-1]) * np.eye(len(x))
+
+
+def gaussian_process(x: np.ndarray, y: np.ndarray, logs: np.ndarray) -> Function:
+    """Mean of a Gaussian process with squared exponential correlations (Rasmussen & Williams 2006,
+    section 2.2); `logs` as `likely` returns them."""
+    weights = np.linalg.solve(_covariance(x, logs), y - y.mean())
+    return lambda at: y.mean() + _correlation(at, x, logs) @ weights
+
+
+POLYNOMIALS = {"a linear function": 1, "a quadratic polynomial": 2, "a cubic polynomial": 3}
+
+
+def left_out(fit: Fit, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Errors of the predictions of each value from all others."""
     others = ~np.eye(len(x), dtype=bool)
-    wrong = [fit(x[one], y[one])(x[[k]])[0] - y[k] for k, one in enumerate(others)]
-    return float(np.sqrt(np.mean(np.square(wrong))) / (y.std() or 1.0))
+    return np.array([fit(x[one], y[one])(x[[k]])[0] - y[k] for k, one in enumerate(others)])
 
 
-def best(x: np.ndarray, y: np.ndarray) -> tuple[str, float]:
-    """Return the name of the fit with the smallest error, and its error.
+def best(x: np.ndarray, y: np.ndarray) -> tuple[str, Fit, float]:
+    """Return the fit with the smallest leave-one-out error, its name and its error.
 
-    A polynomial needs twice as many runs as coefficients.
+    A polynomial needs twice as many runs as coefficients. The Gaussian process has the same lengths
+    for all runs but one (Rasmussen & Williams 2006, eq. 5.12).
     """
-    enough = {
-        name: fit
-        for name, fit in FITS.items()
-        if fit is splines or 2 * powers(x, fit.keywords["degree"]).shape[1] <= len(x)
+    fits: dict[str, Fit] = {
+        name: partial(polynomial, degree=degree)
+        for name, degree in POLYNOMIALS.items()
+        if 2 * powers(x, degree).shape[1] <= len(x)
     }
-    errors = {name: error(fit, x, y) for name, fit in enough.items()}
+    wrong = {name: left_out(fit, x, y) for name, fit in fits.items()}
+    logs, name = likely(x, y), "a Gaussian process"
+    inverse = np.linalg.inv(_covariance(x, logs))
+    fits[name] = partial(gaussian_process, logs=logs)
+    wrong[name] = inverse @ (y - y.mean()) / np.diag(inverse)
+    errors = {one: float(np.sqrt(np.mean(np.square(of)))) for one, of in wrong.items()}
     name = min(errors, key=errors.__getitem__)
-    return name, errors[name]
+    return name, fits[name], float(errors[name] / (y.std() or 1.0))
 
 
 def indices(
@@ -84,8 +118,8 @@ def indices(
     middle, spread = inputs.mean(axis=1), inputs.std(axis=1)
     x = (inputs.T - middle) / spread
 
-    def of(name: str, rows: np.ndarray, y: np.ndarray, samples: int = FEW) -> np.ndarray:
-        function = FITS[name](x[rows], y[rows])
+    def of(fit: Fit, rows: np.ndarray, y: np.ndarray, samples: int = FEW) -> np.ndarray:
+        function = fit(x[rows], y[rows])
         rng = np.random.default_rng(seed)
         made = sobol_indices(
             func=lambda at: function((at.T - middle) / spread)[None], n=samples,
@@ -98,10 +132,10 @@ def indices(
     for y in results(inputs):
         if not y.std():
             raise ScriptError("a result is the same in all runs: no variable matters for it")
-        name, wrong = best(x, y)
+        name, fit, wrong = best(x, y)
         every = np.ones(n, bool)
-        whole, rough = of(name, every, y, SAMPLES), of(name, every, y)
-        parts = np.array([of(name, group != k, y) for k in range(group.max() + 1)])
+        whole, rough = of(fit, every, y, SAMPLES), of(fit, every, y)
+        parts = np.array([of(fit, group != k, y) for k in range(group.max() + 1)])
         half = WIDE * np.sqrt((len(parts) - 1) * parts.var(axis=0)) + abs(whole - rough)
         tables.append(
             [
