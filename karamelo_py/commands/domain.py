@@ -141,11 +141,11 @@ def boundary(
     A reflected point retains its stress and tangential velocity. A body that hits the edge as a
     whole loses most of its normal velocity.
 
-    In a periodic direction, bodies at both ends touch. Its length is a multiple of the cell size.
-    Points return to the domain every 10 steps; until then, dumps may show them outside. It needs
-    method ulmpm with a linear basis or splines, scheme musl, any transfer except XPIC, and one
-    process without a GPU. Refused are other styles of boundary, axisymmetry, F-bar, heat, contact
-    of points, tools, free rigid bodies, and pore_water.
+    In a periodic direction, bodies at both ends touch. Its length is a multiple of the cell size,
+    and formulas of nodes should be periodic. Points return to the domain every 10 steps; until
+    then, dumps may show them outside. It needs method ulmpm with a linear basis or splines, scheme
+    musl, any transfer except XPIC, and one process without a GPU. Refused are other styles of
+    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
 
     In a sheared cell, which bodies fill, start with fix initial_velocity_particles of the mean
     velocity `shear` y. Momentum is conserved to round-off; the energy balance is not monitored.

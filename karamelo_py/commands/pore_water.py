@@ -34,7 +34,7 @@ def pore_water(
         The skeleton: any law of a solid, with the dry density, (1 - n) times the density of grains.
         Its stress is the effective stress.
     n
-        Porosity before deformation.
+        Porosity before deformation, from 0.01 to 0.9.
     permeability
         Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water is k
         times the gradient of the head.

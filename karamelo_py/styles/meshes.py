@@ -184,8 +184,8 @@ class STL(Enclosed):
     Parameters
     ----------
     file
-        A file with triangles or quadrilaterals: STL (text or binary), OBJ, or any format that
-        region mesh reads, in the length unit of the script.
+        Triangles or quadrilaterals: STL (text or binary), OBJ, or any format that region mesh
+        reads, in the length unit of the script.
     exterior
         The word ``exterior`` selects everything outside the surface.
 

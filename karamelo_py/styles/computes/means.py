@@ -103,7 +103,7 @@ class AverageTemperature(Mean):
 class MaxPlasticStrain(Compute):
     """Measure the largest equivalent plastic strain and temperature of a group of points.
 
-    Published as ID_Epmax and ID_Tmax; 0 if nothing can yield, or nothing has a temperature.
+    Published as ID_Epmax and ID_Tmax; 0 without a yield strength or a temperature.
 
     Example
     -------
@@ -204,8 +204,8 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z. Unlike the largest position, it does not jump when a few points
-    fly ahead.
+    Published as ID_x, ID_y, ID_z. Unlike the largest position, it ignores a few points that fly
+    ahead.
 
     Parameters
     ----------

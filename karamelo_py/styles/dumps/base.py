@@ -18,7 +18,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Dump(Rhythmic):
-    """Base of the dump styles: override `write`, which is called when the dump is due.
+    """Base of the dump styles: `write` is called when the dump is due.
 
     Parameters
     ----------
@@ -133,8 +133,8 @@ class OfPoints:
         (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
         stress), p (pressure), rho (density), volume, mass and so on.
     revolve
-        Axisymmetric scenes: number of copies of each point around the axis, in 3D. Positions,
-        velocities, stress and strain rotate, by the angle of twist, too.
+        Number of copies of each point around the axis, in 3D, for axisymmetric scenes. Positions,
+        velocities, stress and strain rotate, also by the angle of twist.
     """
 
     rows_are = "points"
@@ -188,7 +188,7 @@ class OfNodes:
         Columns for each node: x y z (position, the default), vx vy vz (velocity), vx_update ...
         (velocity after the momentum update), fx fy fz (total force), mass, T if heat flows.
     occupied
-        true: omit nodes without mass, for small files from a large and sparsely filled domain.
+        true: omit nodes without mass, for small files from a sparsely filled domain.
     """
 
     rows_are = "nodes"

@@ -33,8 +33,8 @@ class HeightsDump(Dump):
 
     Notes
     -----
-    The raster covers the domain, in 2D with one row. The volume of the points is conserved. QGIS,
-    ArcGIS, GDAL and region heights read the files.
+    The raster covers the domain, in 2D with one row. The depths add up to the volume of the points.
+    QGIS, ArcGIS, GDAL and region heights read the files.
 
     See Also
     --------

@@ -19,8 +19,8 @@ KINDS = "vertex", "line", "triangle"
 class SurfaceVtk(VtkDump):
     """Write the surfaces of rigid bodies and tools as a series of VTU files: triangles in 3D.
 
-    In ParaView open the file of the same name with the ending ``.pvd``, which lists all snapshots
-    with their times. `type` numbers the surfaces in the order of their fixes.
+    In ParaView open the file of the same name with the ending ``.pvd``. `type` numbers the surfaces
+    in the order of their fixes.
 
     Example
     -------

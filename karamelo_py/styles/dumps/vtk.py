@@ -83,9 +83,9 @@ class VtkDump(TableDump):
 class Vtk(OfPoints, VtkDump):
     """Write the material points as a series of VTU files, which ParaView opens.
 
-    Open the file of the same name with the ending ``.pvd``, which lists all snapshots with their
-    times. All components of velocity, force, stress or strain are also one array, for ParaView's
-    filters Glyph, Warp By Vector and Tensor Glyph.
+    Open the file of the same name with the ending ``.pvd``, which lists all snapshots. All
+    components of velocity, force, stress or strain are also one array, for ParaView's filters
+    Glyph, Warp By Vector and Tensor Glyph.
 
     Example
     -------
@@ -108,8 +108,7 @@ CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1,
 class GridVtk(OfNodes, VtkDump):
     """Write the background grids, with values at their nodes, as a series of VTU files.
 
-    In ParaView open the file of the same name with the ending ``.pvd``, which lists all snapshots
-    with their times.
+    In ParaView open the file of the same name with the ending ``.pvd``.
 
     Parameters
     ----------

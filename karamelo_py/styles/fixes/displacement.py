@@ -29,9 +29,9 @@ class Displacement(Fix):
 
     Notes
     -----
-    Points then have the columns ux, uy, uz in dumps, probes, pictures and formulas. To measure from
-    a later stage, use delete_fix and define the fix again. For points outside the group, and points
-    that enter later, displacements are measured from the initial position.
+    Points then have the columns ux, uy, uz. To measure from a later stage, use delete_fix and
+    define the fix again. Displacements of other points, and of points that enter later, are
+    measured from the initial position.
 
     See Also
     --------

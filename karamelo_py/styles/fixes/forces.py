@@ -141,9 +141,9 @@ class ForceNodes(Fix):
     Parameters
     ----------
     force
-        fx, fy, fz: numbers or formulas of time and published values. NULL leaves a component
-        unchanged; in 1D and 2D, omit the last ones or set them to NULL or 0. With
-        axisymmetric(true, twist=true), fz acts around the axis, on each node at its radius.
+        fx, fy, fz: functions of time and published values. NULL leaves a component unchanged; in 1D
+        and 2D, omit the last ones or set them to NULL or 0. With axisymmetric(true, twist=true), fz
+        acts around the axis, on each node at its radius.
 
     Example
     -------
@@ -381,8 +381,8 @@ class Detonation(Fix):
     Parameters
     ----------
     t
-        Time at which a point ignites (distance from the detonator over the detonation speed): a
-        number or a formula of x, y, z, x0, y0, z0.
+        Time at which a point ignites (distance from the detonator over the detonation speed), a
+        function of x, y, z, x0, y0, z0.
 
     Example
     -------

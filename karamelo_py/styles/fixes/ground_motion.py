@@ -133,7 +133,8 @@ class GroundMotion(VelocityNodes):
     Notes
     -----
     Accelerations are linear between the times of a file, 0 after the last one, and integrated from
-    rest. A rigid base reflects all waves that return to it; NULL directions are free.
+    rest; if the velocity does not return to 0, the base stays in motion. A rigid base reflects all
+    waves that return to it; NULL directions are free.
 
     With `through`, waves enter and leave through the edge. The record is the outcrop motion of
     rock, twice the incoming wave (Joyner & Chen 1975): its velocity v gives the traction rho c v of

@@ -70,7 +70,7 @@ class TemperatureNodes(HeatFix):
     Parameters
     ----------
     T
-        Temperature: a number or a formula of x0, y0, z0, time and published values.
+        Temperature, a function of x0, y0, z0, time and published values.
 
     Example
     -------
@@ -110,7 +110,7 @@ class TemperatureParticles(HeatFix):
     Parameters
     ----------
     T
-        Temperature: a number or a formula of x, y, z, x0, y0, z0, time and published values.
+        Temperature, a function of x, y, z, x0, y0, z0, time and published values.
 
     Example
     -------
@@ -211,10 +211,10 @@ class ConvectionParticles(FacesOfPoints):
     Parameters
     ----------
     group
-        Group of points: a single layer along the surface.
+        A single layer along the surface.
     h
-        Heat transfer coefficient, heat per area, time and kelvin: a number or a formula of x, y, z,
-        x0, y0, z0, time and published values.
+        Heat transfer coefficient, heat per area, time and kelvin, a function of x, y, z, x0, y0,
+        z0, time and published values.
     T_inf
         Temperature of the surrounding fluid, likewise.
 

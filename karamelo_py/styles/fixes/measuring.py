@@ -55,7 +55,7 @@ class CheckSolution(Fix):
     Parameters
     ----------
     displacement
-        ux, uy, uz, one per dimension of the domain: formulas of x0, y0, z0 and time.
+        ux, uy, uz, one per dimension: functions of x0, y0, z0 and time.
 
     Example
     -------

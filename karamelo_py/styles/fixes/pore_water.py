@@ -83,7 +83,7 @@ class SeepageFace(PorePressure):
     Parameters
     ----------
     p
-        Pressure where water leaves, usually 0: a number or a formula as in pore_pressure.
+        Pressure where water leaves, usually 0.
 
     Example
     -------
@@ -169,7 +169,7 @@ class InitialPorePressure(Fix):
     Parameters
     ----------
     p
-        Pressure: a number or a formula of x, y, z, x0, y0, z0.
+        Pressure, a function of x, y, z, x0, y0, z0.
 
     Example
     -------

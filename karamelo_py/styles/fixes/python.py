@@ -96,7 +96,8 @@ class Python(Fix):
     Restart files contain values that the function stores between steps if its module, or the class
     of a callable object, names them: ``remembers = ("taken", "left")``. They are numbers, texts,
     arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. The first file warns
-    of other such data that has changed.
+    of other such data that has changed, except in defaults of arguments, other objects and modules,
+    and ``np.random``.
 
     Example
     -------

@@ -85,8 +85,8 @@ class ContactBodies(Fix):
     no collision adds energy. Collisions within a step are resolved one by one, fastest first.
 
     Disks and spheres touch as a whole. Corners and edges of other shapes are rounded by balls of
-    0.05 cells, in 3D one per cell along edges. A fixed region is a wall or a container. Bodies that
-    a joint connects do not touch.
+    0.05 cells, in 3D one per cell along edges. A fixed region is a wall or a container; a body with
+    motion=... is a moving one. Bodies that a joint connects do not touch.
 
     The cost of a step grows with the number of pairs, and with the cube of the number of moving
     bodies: use it for up to some tens.

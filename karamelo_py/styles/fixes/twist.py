@@ -15,8 +15,7 @@ class AngularVelocityNodes(Fix):
     Parameters
     ----------
     omega
-        In radians per time, from x to z: a number or a formula of x0, y0, time and published
-        values.
+        In radians per time, from x to z, a function of x0, y0, time and published values.
 
     Example
     -------

@@ -215,8 +215,7 @@ class InitialVelocityNodes(Fix):
     Parameters
     ----------
     velocity
-        vx, vy, vz, one per dimension: numbers or formulas of x0, y0, z0. NULL leaves a component
-        unchanged.
+        vx, vy, vz, one per dimension: functions of x0, y0, z0. NULL leaves a component unchanged.
 
     Example
     -------

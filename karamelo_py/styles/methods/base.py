@@ -60,10 +60,8 @@ class Method:
 
     Attributes
     ----------
-    basis
-        Tag of the basis.
-    basis_name
-        Name of the basis in scripts, with its variant.
+    basis, basis_name
+        Tag of the basis, and its name in scripts.
     thermal
         Whether heat flows.
     mark
@@ -73,9 +71,9 @@ class Method:
     frame
         Whether weights are computed at present or reference positions.
     own_grids
-        Whether each solid has a separate grid over its bounding box, with its cell size.
+        Whether each solid has a separate grid over its bounding box.
     fields_per_solid
-        Whether each solid has a separate velocity field on the grid of the domain.
+        Whether each solid has a velocity field on the grid of the domain.
     """
 
     basis: NamedTuple

@@ -124,9 +124,9 @@ class BallTool(ToolFix):
     kind
         The word ``sphere``.
     R
-        Radius: a number or a formula of time.
+        Radius, as a function of time.
     x, y, z
-        Centre: numbers or formulas of time; z is 0 in 2D.
+        Centre, as a function of time; z is 0 in 2D.
     """
 
     published = ("x", "y", "z", "s")
