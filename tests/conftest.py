@@ -131,6 +131,13 @@ def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
     return run
 
 
+@pytest.fixture(scope="module", autouse=True)
+def _settled() -> None:
+    """What lives when a module begins stays: Python's collector need not go through it again."""
+    gc.collect()
+    gc.freeze()
+
+
 @contextmanager
 def interpreting(*folders: Path) -> Iterator[subprocess.Popen]:
     """A process that interprets scripts, and finds packages in further folders."""

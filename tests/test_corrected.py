@@ -54,15 +54,15 @@ def test_the_frequency_of_a_bar(run_interpreted, method, scheme, lumped, correct
 AXIS = """
 method(ulmpm, APIC, quadratic-spline, mass=corrected)
 scheme({scheme})
-dimension(2, 0, 1.2, 0, 2, 0.1)
+dimension(2, 0, 1.2, 0, 2, 0.2)
 axisymmetric(true)
 region(b, block, 0, 0.8, 0.5, 1.5)
 material(m, linear, 1, 1, 0.3)
-solid(b, region, b, 2, m, 0.1)
+solid(b, region, b, 2, m, 0.2)
 fix(start, initial_velocity_particles, all, 0.05*x0, 0)
-dump(d, all, particle, 60, d.*.LAMMPS, x0, s11, s33)
-set_dt(0.02)
-run(60)
+dump(d, all, particle, 20, d.*.LAMMPS, x0, s11, s33)
+set_dt(0.04)
+run(20)
 """
 
 
@@ -70,7 +70,7 @@ run(60)
 def test_stress_at_the_axis(run_interpreted, scheme):
     """Nodes on the axis take no radial velocity from their neighbours: s11 = s33 there."""
     points = run_interpreted(AXIS.format(scheme=scheme)).snapshots("d")[-1]
-    inner = points["x0"] < 0.05
+    inner = points["x0"] < 0.1
     s11, s33 = (points[name][inner] for name in ("s11", "s33"))
     assert abs(s11).min() > 1e-3
     assert np.allclose(s11, s33, rtol=0.02)

@@ -99,13 +99,13 @@ def test_fibres_carry_when_the_matrix_is_broken(run_interpreted):
 
 SCENE = f"""
     method(tlmpm, FLIP, linear, 1)
-    dimension(2, 0, 1, 0, 1, 0.25)
+    dimension(2, 0, 1, 0, 1, 0.5)
     plane_stress(true)
     region(box, block, 0, 1, 0, 1)
     {PLY.format(30)}
-    solid(s, region, box, 2, ply, 0.25, 0)
+    solid(s, region, box, 2, ply, 0.5, 0)
     group(s, particles, region, box, solid, s)
-    fix(v, initial_velocity_particles, s, 250*x, 100*x)
+    fix(v, initial_velocity_particles, s, 500*x, 200*x)
     set_dt(5e-6)
     compute(Es, strain_energy, s)
     compute(Ed, dissipated_energy, s)

@@ -425,7 +425,6 @@ def test_loops_keep_the_types_of_what_functions_close_over(last, kinds):
     assert kernel(caller)(*numbers, 3) == tuple(numbers)
 
 
-
 def last_pair(pair, n):
     last = (0.0, 0.0)
     for _ in range(n):
