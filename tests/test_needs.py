@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from conftest import INPUTS, ROOT
 
+from comparisons.lesser import MODELS, ROWS
 from karamelo_py.advice.suggestions import _output as output
 from karamelo_py.advice.suggestions import suggestions
 from karamelo_py.app.cli import main
@@ -537,13 +538,60 @@ def test_space_for_what_is_round(advice):
     rod = SPACE.format(region="cylinder, z, 3, 2.5, 2, 0, 2", v="0, 0, -1",
                        held="fix(f, body_force, all, 0, 0, sin(z))")  # fmt: skip
     said = advice(rod)
-    assert "cylinders about one axis" in said and "6.28 times the points" in said
+    assert "cylinders about one axis" in said and "13.6 times the points" in said
     assert "axisymmetric(true)" in said
     assert advice(rod.replace("sin(z)", "sin(x)")) == ""
     assert advice(rod.replace("0, 0, -1", "0.1, 0, -1")) == ""
     half = walls(half="-INF, 3, -INF, INF, -INF, INF") + "\n"
     part = rod.replace("fix(f, body_force, all", half + "fix(f, body_force, half")
     assert advice(part) == ""
+
+
+BALL = """
+method(ulmpm, FLIP, linear, 1)
+dimension(3, -4, 4, -4, 4, -1, 4, 0.5)
+material(rubber, neo-hookean, 1, 100, 0.3)
+region(ball, sphere, 0, 0, 1.5, 1)
+solid(ball, region, ball, 1, rubber, 0.5)
+{more}
+run(1)
+"""
+ON_A_PLATE = """region(plate, block, -3, 3, -3, 3, -1, 0)
+solid(plate, region, plate, 1, rubber, 0.5)
+group(ball, particles, region, ball, solid, ball)
+region(low, block, INF, INF, INF, INF, INF, -0.5)
+group(low, nodes, region, low, all)
+fix(hold, velocity_nodes, low, 0, 0, 0)
+fix(v, initial_velocity_particles, ball, {v})"""
+
+
+def test_less_than_3d_for_a_ball(advice):
+    """Under a pressure a line; thrown at a square plate that is wider, a half plane."""
+    said = advice(BALL.format(more="fix(p, edge_pressure, all, ball, time)"))
+    assert "spheres about one centre" in said and "spherical(true)" in said
+    plate = ON_A_PLATE.format(v="0, 0, -1")
+    said = advice(BALL.format(more=plate))
+    assert "bodies about one axis" in said and "plate as a round plate" in said
+    assert "axisymmetric(true)" in said
+    oblique, narrow = (
+        ON_A_PLATE.format(v="0.1, 0, -1"),
+        plate.replace("-3, 3, -3, 3", "-1, 3, 0, 1"),
+    )
+    for other in (oblique, narrow, "fix(p, edge_pressure, all, ball, x*y)"):
+        said = advice(BALL.format(more=other))
+        assert "spherical" not in said and "axisymmetric" not in said
+
+
+def test_uniaxial_stress_for_a_bar(advice):
+    """Of any section, whole or a quarter of it between symmetry planes; but not when bent."""
+    bar = PLATE.replace("box(", "(").format(box=12, thick=2, fixes="{fixes}")
+    bar = bar.replace("1, 11, 1, 13, 0, 2", "1, 11, 1, 3, 0, 2").format(fixes="{fixes}")
+    v = "fix(v, initial_velocity_particles, all, {})"
+    said = advice(bar.replace("{fixes}", v.format("0.1*x0, 0, 0")))
+    assert "a bar with free sides, and nothing acts along y and z: 4 times the points" in said
+    assert "dimension(1, 0, 12, 1), and uniaxial_stress(true, area=4)" in said
+    for other in ("0, 0.1*x0, 0", "0.1*y0, 0, 0"):
+        assert "uniaxial_stress" not in advice(bar.replace("{fixes}", v.format(other)))
 
 
 TWIST = """
@@ -564,6 +612,29 @@ def test_twist_for_a_rod_in_torsion(advice):
     for other in ("-3*(y0 - 2), 3*(x0 - 3), 0", "3*(x0 - 3), 3*(y0 - 2.5), 0", "-3*y0*(y0 - 2.5), "
                   "3*y0*(x0 - 3), 0"):  # fmt: skip
         assert "twist" not in advice(rod.replace("{velocity}", other))
+
+
+LESSER = {
+    "bar": "uniaxial_stress(true, area=0.00173611)",
+    "impact": "uniaxial_stress(true, area=0.0005)",
+    "along": "dimension(1",
+    "across": "dimension(1",
+    "shell": "spherical(true)",
+    "cavity": "spherical(true)",
+    "pressed": "spherical(true)",
+    "blast": "spherical(true)",
+    "pendulum": "twist=true",
+    "torsion": "twist=true",
+    "clutch": "twist=true",
+    "spin_up": "twist=true",
+}
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_check_finds_the_lesser_model(advice, row):
+    script, variables = ROWS[row].script, ROWS[row].full
+    said = advice(MODELS / f"in.{script}", **variables)
+    assert LESSER.get(row, LESSER.get(script, "plane_stress(true")) in said
 
 
 def test_wide_functions_where_no_point_crosses(advice):

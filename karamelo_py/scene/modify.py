@@ -130,6 +130,7 @@ class Fix(Publisher):
     faces_of: Any = None  # present faces (m, d, d) of a tool or a body
     accelerates = False  # formulas are forces per mass
     exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed on request
+    pressure: Any = None  # formula, if it presses on whole surfaces alone
     presses = False  # it is the force of a surface on points
     brakes = False
     water_only = False  # prescribes the pressure of pore water

@@ -23,8 +23,6 @@ class Region(Named):
     regions it combines.
     """
 
-    radius = 0.0
-    axis: Any = None  # of a cylinder in 3D: direction and two centre coordinates
     skin: Any = None  # `Skin`, of a region from a file
     catalogue = "regions"
 

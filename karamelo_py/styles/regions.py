@@ -154,7 +154,7 @@ class Cylinder(Primitive):
             ends = values["lo"], values["hi"]
             region.check_order(*ends, names, names.index("lo"))
             lo[along], hi[along] = ends
-            self.axis, self.slabs = (along, self.centre), [(along, *ends)]
+            self.slabs = [(along, *ends)]
         super().__init__(hub, lo, hi, exterior=exterior)
 
 

@@ -397,10 +397,10 @@ class EdgePressure(EdgeFix):
                 expected="the region of the solid",
                 hint="fix edge_traction, ..., all, tx, ty loads a set of faces",
             )
-        self.p = p
+        self.pressure = p
 
     def loads(self, faces: Faces) -> np.ndarray:
         force = np.zeros(faces.middle.shape)
-        p = self.p.evaluate_points(self.hub.values, faces.middle, faces.middle)
+        p = self.pressure.evaluate_points(self.hub.values, faces.middle, faces.middle)
         force[np.arange(len(force)), faces.axis] = -faces.sign * faces.area * p
         return force
