@@ -1,4 +1,4 @@
-"""How the loads of a scene act: along which directions, alike along which, symmetry planes."""
+"""Directions in which the loads of a scene act, and its symmetry planes."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple

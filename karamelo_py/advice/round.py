@@ -170,7 +170,7 @@ def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
 
 
 def _points_by_radius(solids: list[Solid], middle: Middle) -> float:
-    """Return the points of the bodies over those of their section, of the same size."""
+    """Return how many times more points the bodies have than their section."""
     many = 0.0
     for solid in solids:
         size = solid.h / (solid.ppc or 1)
