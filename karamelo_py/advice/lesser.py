@@ -49,7 +49,8 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
         return
     round_ = domain.kin.hoops > 0
     whole = "thickness" if d == 3 else "length" if round_ else "cross-section"
-    directions, many = [], 1
+    directions: list[int] = []
+    many = 1
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS

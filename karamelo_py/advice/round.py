@@ -55,7 +55,7 @@ class Middle(NamedTuple):
 
 def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
     domain, solids = hub.domain, [solid for solid in hub.solids.values() if solid.count]
-    if domain.dimension != 3 or not all(solid.region for solid in solids):
+    if domain.dimension != 3 or not solids:
         return
     if any(can(solid.material.whole, is_round) for solid in solids):
         return  # laws with directions
@@ -110,8 +110,10 @@ def _reach(solid: Solid, middle: Middle) -> float:
     return float(apart[middle.across].max())
 
 
-def _is_round(region: Region, here: Callable, middle: Middle, reach: float) -> bool:
+def _is_round(region: Region | None, here: Callable, middle: Middle, reach: float) -> bool:
     """Return True if positions of equal radius are all within a region, or all outside."""
+    if region is None:
+        return False
     rng = np.random.default_rng(1)
     r = 1.01 * reach * rng.random(SAMPLES)
     at = middle.lo + (middle.hi - middle.lo) * rng.random((SAMPLES, 3))
@@ -185,7 +187,7 @@ def _points_by_radius(solids: list[Solid], middle: Middle) -> float:
 def _sphere(hub: Hub, solids: list[Solid], middle: Middle) -> tuple[str, str]:
     far = max(np.abs(end - middle.centre).max() for end in (hub.domain.lo, hub.domain.hi))
     many = _points_by_radius(solids, middle)
-    part = {0: "", 1: "half ", 2: "quarter "}.get(np.count_nonzero(middle.sides), "eighth of ")
+    part = ("", "half ", "quarter ", "eighth of ")[int(np.abs(middle.sides).sum())]
     return (
         f"{part}spheres about one centre, and all acts along the radius: about {many:.2g} times "
         f"the points of a line{cost(hub, many, 1)}",
@@ -197,7 +199,8 @@ def _sphere(hub: Hub, solids: list[Solid], middle: Middle) -> tuple[str, str]:
 def _cylinder(
     hub: Hub, solids: list[Solid], middle: Middle, others: list[Fix], squares: list[str]
 ) -> Words:
-    (along,), domain, twists, lines = middle.along, hub.domain, False, []
+    domain, twists, lines = hub.domain, False, []
+    along = middle.along[0]
     named = "".join(AXES[axis] for axis in middle.across)
     for fix in others:
         if fix.friction is not None:
