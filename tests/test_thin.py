@@ -254,7 +254,11 @@ def test_what_cannot_be_thin_is_refused(run_interpreted, line, before, says):
     [
         ("plane_stress(true, thickness=0)", "thickness"),
         ("plane_stress(true)\neos(w, fluid, 1000, 2e6, 7)\nstrength(s, fluid, 1e-3)\n"
-         "material(water, eos-strength, w, s)", "no strength"),
+         "material(water, eos-strength, w, s)", "eos fluid is for fluids or loose grains"),
+        ("plane_stress(true)\neos(w, ideal-gas, 1, 1.4, p=1)\nstrength(s, linear, 1)\n"
+         "material(gas, eos-strength, w, s)", "eos ideal-gas is for fluids"),
+        ("plane_stress(true)\neos(w, linear, 1, 1)\nstrength(s, mu-i, 1, 0.4, 0.6, 0.3, 1, 1)\n"
+         "material(sand, eos-strength, w, s)", "strength mu-i is for fluids or loose grains"),
         ("plane_stress(true)\nmaterial(m, linear, 1000, 1e6, 0.3)\nanti_volumetric_locking(true)\n"
          "region(r, block, 0.5, 1, 0.5, 1)\nsolid(s, region, r, 1, m, 0.25, 0)\nrun(1)",
          "thin bodies do not lock"),
@@ -303,3 +307,25 @@ def test_load_steps_in_plane_stress_compile(run_script, law):
     run(1)
     """)
     assert done.log.right_x[-1] == pytest.approx(0.5, rel=0.02)  # E, strain 0.01, height 0.5
+
+
+CERAMIC = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(2, 0, 2, 0, 1, 0.5)
+    plane_stress(true)
+    eos(e, linear, 3.7, 131)
+    strength(s, johnson-holmquist-2, 90, 0.93, 0.6, 0.31, 0.6, 0.0, 1.0, 0.2, 2.79, 1.46, 0.005, 1)
+    material(alumina, eos-strength, e, s)
+    region(all, block, 0, 1, 0, 0.5)
+    solid(plate, region, all, 2, alumina, 0.5)
+    fix(v, initial_velocity_particles, all, {v}*x0, 0)
+    run(10)
+"""
+
+
+def test_stress_that_trials_leave_across_is_told(run_interpreted):
+    """A ceramic that breaks within a step; not one that stays elastic."""
+    said = run_interpreted(CERAMIC.format(v=-0.5)).err
+    assert "a step has left" in said and "of solid 'plate' (material alumina; thickness" in said
+    assert "damage 1" in said
+    assert "a step has left" not in run_interpreted(CERAMIC.format(v=-0.01)).err

@@ -19,6 +19,7 @@ from karamelo_py.scene.solid import named, solid_with
 DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
 ABSURD = 10.0  # cells in one step: a smaller step would not help
 LOOSE = 1.5  # largest spacing of an unstrained solid's points, in cells
+LEFT = 0.02  # stress across a thin body, over the largest stress
 APART = "no other point of it within a cell"
 
 
@@ -236,3 +237,26 @@ def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
         return own_step_instead(simulation)
     fixed = hub.update.fixed_dt is not None
     return "a smaller time step (set_dt)" if fixed else "a smaller dt_factor"
+
+
+def warn_of_stress_left(hub: Hub, simulation: Simulation) -> None:
+    """Warn once of stress across that is no longer small, with solid, law, step and state."""
+    if "stress across" in hub.update.warned_of:
+        return
+    left = hub.fields.particle("stress_left")
+    p = int(np.argmax(left)) if len(left) else 0
+    if not len(left) or left[p] <= LEFT:
+        return
+    hub.update.first_time("stress across")
+    solid = solid_with(hub, p)
+    command = "plane_stress" if hub.domain.dimension == 2 else "uniaxial_stress"
+    names = [name for name in ("thickness", "damage", "ep") if name in hub.fields.particle_names()]
+    state = ", ".join(f"{name} {hub.fields.particle(name)[p]:.3g}" for name in names)
+    hub.warn(
+        f"{command}: by {when(simulation)}, a step has left "
+        f"{left[p]:.1%} of the largest stress across a point of solid '{solid.id}' "
+        f"(material {solid.material.id}; {state})",
+        cause="its law breaks or softens faster than the trials of a step follow; the rest enters "
+        "the next step",
+        hint="dt_factor(0.5) or smaller load steps; column stress_left shows where",
+    )

@@ -144,6 +144,8 @@ class Narrator(Listener):
 
     def ended(self, run: RunLoop, simulation: Simulation, first_step: int, wall: float) -> None:
         self._tell_of_loss(simulation, energy.LOSS)
+        if self.hub.domain.thin:
+            explain.warn_of_stress_left(self.hub, simulation)
         steps = simulation.step - first_step
         stages = [(name, float(passed)) for name, (passed, _) in run.timings.on.items()]
         stages.append(("rest", max(wall - sum(seconds for _, seconds in stages), 0.0)))

@@ -2,6 +2,7 @@
 
 from typing import Annotated
 
+from karamelo_py.language import registry
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import is_rigid, is_round, law_parts, law_traits, parameter
 from karamelo_py.points.laws.across import Across
@@ -9,7 +10,7 @@ from karamelo_py.points.laws.thin import Thin
 from karamelo_py.scene.domain import Domain
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 
 
 def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive] = 1.0) -> None:
@@ -30,11 +31,12 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
     Notes
     -----
     Before the first material. Each law finds the strain across the plate for which szz vanishes.
-    The column ``thickness`` is the present thickness over the initial one. Masses, forces and
-    energies refer to the whole thickness. Refused are liquids, gases and loose grains, which have
-    no strength unless confined, and anti_volumetric_locking, which plane stress does not need; with
-    a thickness other than 1 also fixes that use sizes of points (contact between points and with
-    surfaces, fluxes through faces of points).
+    The column ``thickness`` is the present thickness over the initial one, ``stress_left`` the
+    largest szz that a step has left, over the largest stress: above 2 % a warning names solid and
+    state. Masses, forces and energies refer to the whole thickness. Refused are liquids, gases and
+    loose grains, which have no strength unless confined, and anti_volumetric_locking, which plane
+    stress does not need; with a thickness other than 1 also fixes that use sizes of points (contact
+    between points and with surfaces, fluxes through faces of points).
 
     See Also
     --------
@@ -75,7 +77,7 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float) -> None:
     domain = hub.require_domain()
     if domain.dimension != dimension:
-        message = f"the scene has {domain.dimension} dimensions, not {dimension}"
+        message = f"the scene has {plural(domain.dimension, 'dimension')}, not {dimension}"
         expected = f"dimension({dimension}, ...) before {command}(true)"
         hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
@@ -117,6 +119,13 @@ def refuse_late(hub: Hub) -> None:
         raise ScriptError(message, expected="all points before the first run", code="too-late")
 
 
+def _name_of(law: object) -> str:
+    """Return the family and style of a law or its part, such as 'eos ideal-gas'."""
+    kind, families = type(law), ("eos", "strength", "material")
+    named = ((family, registry.name_of(family, kind)) for family in families)
+    return next((f"{a} {name}" for a, name in named if name != kind.__name__), kind.__name__)
+
+
 def fit_to_domain(hub: Hub, material: Material) -> None:
     refuse_uneven(hub, material, "style")
     if hub.domain is None or is_rigid(material.whole):
@@ -125,11 +134,16 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
         material.flat = Across
     if not hub.domain.thin:
         return
-    parts = law_parts(material.whole)
-    if any(law_traits(law).flows and not parameter(law, "cohesion") > 0 for law in parts):
-        message = "without stress across the body this material has no strength"
-        expected = "a solid that sustains tension, or plane strain"
-        raise ScriptError(message, argument="style", expected=expected)
+    for law in law_parts(material.whole):
+        traits = law_traits(law)
+        if traits.fluid or (traits.flows and not parameter(law, "cohesion") > 0):
+            name = _name_of(law)
+            raise ScriptError(
+                f"{name} is for fluids or loose grains, which have no strength without stress "
+                f"across the body ({'plane' if hub.domain.dimension == 2 else 'uniaxial'} stress)",
+                argument="style",
+                expected="a solid that sustains tension, or plane strain",
+            )
     if hub.domain.dimension == 1 and not is_round(material.whole):
         raise ScriptError(
             "the material is not the same in y and z, so that a bar of it would bend or flatten",

@@ -30,6 +30,7 @@ class LawTraits(NamedTuple):
     hypoelastic: bool = False  # never yields, but does not return all work
     of_solids: bool = False  # eos that holds solids together
     burns: bool = False  # products of an explosive
+    fluid: bool = False  # eos of a liquid or gas
     least_density: float = 10.0  # kg/m^3; less suggests wrong units
 
 

@@ -66,7 +66,7 @@ class Axes:
             second = rest / sine
         if (wrong := ~(np.isfinite(second).all(axis=1) & (sine[:, 0] > LEAST))).any():
             k = int(np.flatnonzero(wrong)[0])
-            raise self.fault("two vectors that are parallel or zero", x0[k])
+            raise self.fault("two vectors are parallel, or one is zero", x0[k])
         return np.stack([first, second, np.cross(first, second)], axis=2)
 
     def rows(self, values: Values, x0: np.ndarray, F: Any) -> np.ndarray:
@@ -76,13 +76,13 @@ class Axes:
             R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places
         ]
         if np.abs(outside).max(initial=0) > LEANS:
-            raise self.fault("axes inclined to the plane or line of the scene", x0[0])
+            raise self.fault("the axes are inclined to the plane or line of the scene", x0[0])
         return np.stack([R[:, i, j] for i, j in F.places], axis=1)
 
     def fault(self, what: str, x0: np.ndarray) -> ScriptError:
         place = ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0, strict=False))
         return ScriptError(
-            f"the axes are {what}, at the point {place}",
+            f"axes: {what}, at the point {place}",
             mark=self.mark,
             expected=f"{self.script_kind}; in 2D without z",
         )

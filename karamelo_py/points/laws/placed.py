@@ -67,9 +67,10 @@ class Direction:
 
 def formulas_of_place(hub: Scene, argument: Argument) -> tuple[Expression, ...]:
     """Return the numbers or formulas of x0, y0, z0 in parentheses, or none if one is a text."""
-    values = [one.value(hub) for one in argument.listed()]
+    parts = [part for one in argument.listed() for part in one.listed()]  # (a), or ((a), (b))
+    values = [one.value(hub) for one in parts]
     formulas = tuple(Expression(one) for one in values if not isinstance(one, str))
-    for part, one in zip(argument.listed(), formulas, strict=False):
+    for part, one in zip(parts, formulas, strict=False):
         if others := one.names - FIRST:
             raise ScriptError(
                 f"a direction at rest cannot depend on {min(others)}",

@@ -2,7 +2,8 @@
 
 The inner law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (no
 branches in lanes) finds the strain increment q across the body (in 1D in y and z) without stress
-across; the rest goes to the next step (de Borst 1991; Klinkel & Govindjee 2002).
+across; the rest goes to the next step (de Borst 1991; Klinkel & Govindjee 2002). Each point records
+the largest rest.
 """
 
 from typing import Any, NamedTuple
@@ -35,6 +36,8 @@ class ThinInLargeIncrements(Thin):
 class State(NamedTuple):
     whole: Any  # of the inner law
     across: Any  # thickness over initial thickness
+    left: Any  # largest stress across that the trials of a step have left
+    largest: Any  # largest component of stress so far
 
 
 def with_strain_across(law, kin, dl, q):
@@ -54,7 +57,7 @@ def has_short_trials(law):
 
 @laws.initial_state.on(Thin)
 def _initial_state_thin(law, kin, template):
-    return State(laws.initial_state(law.law, WHOLE, template), 1)
+    return State(laws.initial_state(law.law, WHOLE, template), 1, 0, 0)
 
 
 @laws.advance.on(Thin)
@@ -69,20 +72,23 @@ def _advance_thin(law, kin, state, dl, dt):
 
     def tried(q):
         new = laws.advance(inner, WHOLE, old, with_strain_across(inner, kin, dl, q), dt)
-        return new, laws.cauchy_stress(inner, WHOLE, new)[2]
+        return new, laws.cauchy_stress(inner, WHOLE, new)
 
     large_trials = UNROLLED if has_short_trials(inner) else ENOUGH
     q, slope = modulus - modulus, first
-    new, stress = tried(q)
+    new, whole = tried(q)
+    stress = whole[2]
     for _ in range((large_trials if isinstance(dl, LargeIncrement) else law.trials) - 1):
         furthest, left = FURTHEST * (1 + q), stress
         step = max(min(-stress / slope, furthest), -furthest)
         q = q + step
-        new, stress = tried(q)
+        new, whole = tried(q)
+        stress = whole[2]
         secant = (stress - left) / where(step == 0, 1, step)
         usable = (secant > FLATTEST * modulus) & (secant < STEEPEST * modulus)
         slope = where(usable, secant, slope)
-    return State(new, state.across * (1 + q))
+    largest = max(state.largest, abs(whole[0]), abs(whole[1]), abs(whole[3]))
+    return State(new, state.across * (1 + q), max(state.left, abs(stress)), largest)
 
 
 laws.wraps(
@@ -144,5 +150,12 @@ def thickness(law, kin, state):
     return state.across
 
 
+@laws.number
+def stress_left(law, kin, state):
+    """Return the largest stress across that a step has left, over the largest stress so far."""
+    return state.left / where(state.largest > 0, state.largest, 1)
+
+
 laws.answers(Thin, {laws.stretch_across: "across"})
 laws.column(Thin, "thickness", thickness)
+laws.column(Thin, "stress_left", stress_left)

@@ -60,7 +60,7 @@ class Tait(NamedTuple):
     """
 
     in_lanes = True
-    traits = LawTraits(any_speed=True)
+    traits = LawTraits(any_speed=True, fluid=True)
     scalarised = ("compression_energy",)
 
     specific_volume: float
@@ -174,7 +174,7 @@ class IdealGas(NamedTuple):
     """
 
     in_lanes = True
-    traits = LawTraits(any_speed=True, least_density=1e-3)
+    traits = LawTraits(any_speed=True, fluid=True, least_density=1e-3)
 
     specific_volume: float
     gamma: float
@@ -334,7 +334,7 @@ class JwlConstants(NamedTuple):
 class Jwl(NamedTuple):
     style = "jwl"
     in_lanes = True
-    traits = LawTraits(any_speed=True, burns=True)
+    traits = LawTraits(any_speed=True, fluid=True, burns=True)
 
     specific_volume: float
     A: float
