@@ -412,7 +412,7 @@ def test_torque_times_time_is_angular_momentum(state_interpreted, run_interprete
     set_dt(0.02)
     log_modify(custom, Ek, Es, L_y, load_z)
     log(1)
-    run(8)""")  # fmt: skip
+    run(20)""")  # fmt: skip
     log = run_interpreted(script).log
     assert log["load_z"][1:] == pytest.approx(torque, rel=0.02)
     assert -log["L_y"][-1] == pytest.approx(0.02 * log["load_z"].sum(), rel=1e-8)

@@ -104,9 +104,10 @@ INSTEAD = {1: "cylindrical(true) or spherical(true)", 2: "axisymmetric(true)"}
 def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) -> None:
     domain, d, name = hub.require_domain(), kin.dimension, kin.word
     same = type(domain.kin) is type(kin) if active else isinstance(domain.kin, type(kin))
+    written = "axisymmetric(true, twist=true)" if isinstance(kin, Twisted) else f"{name}(true)"
     if active and domain.dimension != d:
-        message = f"{name} scenes have {SPACES[d]}, not {domain.dimension}"
-        expected = f"dimension({d}, ...) before {name}(true)"
+        message = f"{name}: such scenes have {SPACES[d]}, not {domain.dimension}"
+        expected = f"dimension({d}, ...) before {written}"
         hint = INSTEAD.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
     if active and domain.lo[0] < 0:
@@ -120,7 +121,7 @@ def _set(hub: Hub, active: bool, kin: Axisymmetric | Cylindrical | Spherical) ->
     refuse_across(domain, active)
     if active and domain.kin.hoops and not same:
         message = f"the scene is {domain.kin.word} already"
-        expected = f"{domain.kin.word}(false) first, or no {name}(true)"
+        expected = f"{domain.kin.word.split()[0]}(false) first, or no {written}"
         raise ScriptError(message, argument="active", expected=expected)
     if hub.solids and active != same:
         message, expected = "the solids already have points", "before the first solid"

@@ -17,8 +17,14 @@ NO_F_BAR = {"F-bar": "no anti_volumetric_locking: thin bodies do not lock"}
 TWIST = Restrictions(
     "twist", "axisymmetric(true) without twist, or 3D",
     only={"method": ("ulmpm", "tlmpm", "ulmpm/contacts")},
-    without=("series", "corners", "mass=corrected", "periodic", "rigid", "rigid_body",
-             "tools", "yielding walls"),
+    without=("series", "corners", "mass=corrected", "periodic", "rigid_body"),
+    but={
+        "tools": "ulmpm/contacts with fix contact/friction, which also rubs around the axis, or "
+                 "fix angular_velocity_nodes",
+        "rigid": "a stiff solid, or nodes held by fix angular_velocity_nodes",
+        "yielding walls": "velocities without geq, leq and mu, or ulmpm/contacts with fix "
+                          "contact/friction",
+    },
 )  # fmt: skip
 THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 

@@ -252,6 +252,8 @@ def per_direction(
                 hint = f"with a decimal point: {formulas[d - 1].text}.{extra.text}; else {hint}"
             if twists:
                 hint = AROUND
+            elif around and domain.kin.hoops == 1 and d == 2:
+                hint = "around the axis it acts with axisymmetric(true, twist=true)"
             raise ScriptError(
                 f"more components than the {plural(d, 'dimension')} of the domain",
                 argument=k,
