@@ -66,7 +66,7 @@ class Axes:
             second = rest / sine
         if (wrong := ~(np.isfinite(second).all(axis=1) & (sine[:, 0] > LEAST))).any():
             k = int(np.flatnonzero(wrong)[0])
-            raise self.fault("two vectors are parallel, or one is zero", x0[k])
+            raise self.fault("two vectors are parallel or zero", x0[k])
         return np.stack([first, second, np.cross(first, second)], axis=2)
 
     def rows(self, values: Values, x0: np.ndarray, F: Any) -> np.ndarray:
