@@ -166,7 +166,7 @@ def test_a_study_that_is_killed_leaves_no_process(folder, where, end):
         found = [int(one) for one in os.listdir("/proc") if one.isdigit() and int(one) not in known]
         return [one for one in found if works_in(one, folder)]
 
-    while not [*folder.glob("sweep/*/run.json")]:
+    while not [*folder.glob("sweep/*/run.json")] and study.poll() is None:
         time.sleep(0.05)
     assert descendants()
     (os.killpg if end == "INT" else os.kill)(study.pid, getattr(signal, f"SIG{end}"))
@@ -388,7 +388,7 @@ def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, an
         ("tcp://127.0.0.1:9", "no scheduler answers at tcp://127.0.0.1:9"),
         ("tpc://127.0.0.1:9", "-on tpc://127.0.0.1:9"),
         ("mpi", "there is one process"),
-        ("slurm", "-on slurm: there is no command sbatch"),
+        ("slurm", "error: -on slurm"),
     ],
 )
 def test_places_that_are_refused(folder, capsys, monkeypatch, where, says):
