@@ -73,13 +73,13 @@ def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Row], accuracy: str, cost: str, *,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """Forecast a run at `x` from the runs at `xs`, coarse ones first.
+    """Forecast a run at `x` from the runs at `xs`, coarse ones first; None without two errors, or
+    if the last run got worse.
 
-    The error continues with the last order. Its bounds follow from the least and largest order, at
-    least 33 % of it above and half below; a falling order may fall as much again, and one below 2
-    may reach 2. Errors small by chance count as large as they may be (`credible`). The time is
-    steps times (a + b points), fitted; other costs continue as between the last two runs. None with
-    fewer than two errors, or if the last run got worse.
+    The error continues with the last order, within bounds by the least and largest order, at least
+    33 % above and half below it; a falling order may fall as much again, and one below 2 may reach
+    2. Errors small by chance count as `credible`. The time is steps times (a + b points), fitted;
+    other costs continue as between the last two runs.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -128,7 +128,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
-    warnings: tuple[str, ...] = ()  # warnings of its finest run
+    warnings: tuple[str, ...] = ()  # of its finest run
 
     @property
     def label(self) -> str:
@@ -219,7 +219,7 @@ class Adviser:
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """Return a choice's cheapest variant that meets the target, known or expected.
+        """Cheapest variant of a choice that meets the target, known or expected.
 
         With `hope`, use the lower bound of the error; with `lucky`, accept errors small by chance.
         """
@@ -246,7 +246,7 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """Return the best candidate, after runs that may change it.
+        """Best candidate, after runs that may change it.
 
         Choices that could become the cheapest are followed until their candidate is the next finer
         variant.

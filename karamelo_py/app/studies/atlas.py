@@ -1,4 +1,4 @@
-"""karamelo-py atlas: regenerates the pictures and tables of a page with commands of the program."""
+"""karamelo-py atlas: regenerates the pictures and tables of a page."""
 
 import hashlib
 import json
@@ -149,7 +149,7 @@ def run(options: Namespace) -> int:
 
 
 def ended(folder: Path) -> tuple[list[str], int]:
-    """Return the runs that did not end well, and the count of all."""
+    """Runs that did not end well, and the count of all."""
     tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)

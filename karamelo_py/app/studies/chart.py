@@ -349,7 +349,6 @@ def write_page(family: Family, sheet: pictures.Sheet) -> None:
 
 
 def in_html(lead: str, exponent: int) -> str:
-    """Format a power of ten in HTML, with its `lead` if it is not ""."""
     return f"{lead}·10<sup>{exponent}</sup>" if lead else f"10<sup>{exponent}</sup>"
 
 

@@ -1,4 +1,4 @@
-"""Runs of a table as lines of increasing refinement, their orders, and the Pareto front."""
+"""Lines of increasing refinement, their orders, and the Pareto front."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -52,7 +52,7 @@ def order(x: Sequence[float], y: Sequence[float]) -> Order:
     return Order(float(slope), float(local.min()), float(local.max()))
 
 
-# Orders of smooth solutions (p + 1 for polynomials of order p); other words do not matter.
+# Orders of smooth solutions (p + 1 for polynomials of order p).
 REACHED = {
     "linear": 2, "ugimp": 2, "cpgimp": 2, "quadratic-spline": 3, "Bernstein-quadratic": 3,
     "cubic-spline": 4,
@@ -72,10 +72,10 @@ def reached(words: Iterable[str]) -> float:
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Explain errors that are small by chance, for runs from coarse to fine; else "".
+    """Explain errors that are small by chance, from coarse to fine; else "".
 
-    An error is chance if a finer run is worse. If no finer run is as good, it is also chance if the
-    sign changes, the error falls faster than by `highest`, the order of the basis, or it grows.
+    A finer run is worse; or, if no finer run is as good, the sign changes, the error falls faster
+    than by `highest`, the order of the basis, or it grows.
     """
     reasons, size = [], np.abs(np.asarray(values, float))
     for k, error in enumerate(size):
@@ -95,10 +95,10 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Sizes of errors for a forecast, without reductions by chance.
+    """Sizes of errors without reductions by chance.
 
-    They are at least the change since the previous run over the reduction by the order `highest`,
-    and the error of each finer run.
+    They are at least the change since the last run over the reduction by the order `highest`, and
+    the error of each finer run.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -132,7 +132,6 @@ class Table(NamedTuple):
 class GroupedRuns:
     choice: dict[str, str]  # variables that differ between lines
     rows: list[Mapping[str, str]]
-    # NaN where missing.
     x: np.ndarray
     cost: np.ndarray
     error: np.ndarray
@@ -160,7 +159,7 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Label a choice; values that mean nothing alone have their name."""
+    """Label a choice, with names of values that mean nothing alone."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -214,7 +213,6 @@ class Family:
         return GroupedRuns(choice, rows, x, cost, np.abs(signed), across, self.linear, chance)
 
     def _chance(self, rows: Sequence[Mapping], x: np.ndarray, signed: np.ndarray) -> list[str]:
-        """Explain errors in a line whose points increase or decrease throughout; else ""."""
         points = column(rows, "points")
         rise = np.diff(points[np.isfinite(points)])
         if self.words or len(rise) < 1 or not ((rise > 0).all() or (rise < 0).all()):

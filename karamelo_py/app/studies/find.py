@@ -70,7 +70,6 @@ def run(options: Namespace) -> int:
     )  # fmt: skip
 
     def happens(values: list[str]) -> list[bool]:
-        """Run all cases, each with its value of the searched variable."""
         named = [case | {name: value} for case, value in zip(cases, values, strict=True)]
         return judged(study, [{n: one[n] for n in plan.values} for one in named], options.when)
 

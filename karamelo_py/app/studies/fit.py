@@ -1,4 +1,4 @@
-"""karamelo-py fit: values of a script's variables that bring its log nearest to measurements."""
+"""karamelo-py fit: values of variables that bring a log nearest to measurements."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
@@ -33,11 +33,11 @@ largest measured value. The true value is within +- with a probability of 95 %, 
 differences are independent. There is no +- if the three searches disagree, nor for a value at the
 end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
-STARTS = (0.5, 0.2, 0.8)  # fractions of each range
+STARTS = (0.5, 0.2, 0.8)  # of each range
 # Waves and points that cross cells make curves rough: derivatives over 0.01 of a range end in a
 # local minimum.
 STEP = 0.04
-NEAR = 0.01  # fraction of a range within which values count as equal
+NEAR = 0.01  # of a range within which values count as equal
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search
 AGAIN = 3  # searches from a lower point near the end
 ALIKE = 0.99  # correlation of indistinguishable variables
@@ -130,7 +130,7 @@ class Search:
     def slopes(self, fraction: np.ndarray, both: bool = False) -> np.ndarray:
         """Derivatives (n, variables) towards the middle, or over `both` sides.
 
-        NoDerivatives if runs on both sides fail.
+        Raises NoDerivatives if runs on both sides fail.
         """
         moves = np.diag(np.where(fraction < 0.5, STEP, -STEP))
         first, *ahead = self.differences(fraction, *(fraction + moves))
@@ -163,9 +163,8 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Search around `end` along variables and the weakest direction for the lowest point.
-
-        `end` gets slopes over both sides.
+        """Search around `end` along variables and the weakest direction, with slopes over both
+        sides.
         """
 
         def nearby(*moves: np.ndarray) -> list[End]:

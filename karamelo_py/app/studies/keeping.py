@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 from karamelo_py.script.errors import codes
 
-ENDS = 0.2  # fraction of the run at both ends whose means are compared
+ENDS = 0.2  # of the run at both ends whose means are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
 
@@ -78,7 +78,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Make a Markdown table with rows by the variables `by`, and list silent failures.
 
-    Messages follow, by numbers. Variables in step with row variables are omitted.
+    Numbered messages follow. Variables in step with row variables are omitted.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

@@ -154,7 +154,7 @@ def row(
 ) -> Row:
     """Make a table row; unknown cells are None.
 
-    A failed run has no recorded values. A finished run's reason is why a value is missing.
+    A finished run's reason is why a value is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)

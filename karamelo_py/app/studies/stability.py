@@ -52,7 +52,7 @@ UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the energy is checked often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
-FIRST = 0.1  # fraction of the log over which energies are averaged
+FIRST = 0.1  # of the log over which energies are averaged
 FEW = 9  # largest number of values of a variable that all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",
@@ -147,9 +147,9 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Return the largest running mean over the first; inf for NaN.
+    """Largest running mean (10 % of the rows) over the first; inf for NaN.
 
-    Means are over 10 % of the rows. If the first is 0, the median replaces it.
+    If the first is 0, the median replaces it.
     """
     if not len(energy):
         return 0.0
@@ -182,8 +182,8 @@ class Map:
     """Stability over one or two `axes` of the variables in `values`.
 
     A run grows if the log column `energy` grows by more than the factor `bound`; without a column,
-    by the program's energy balance. The column `error` shades stable cells. A variable has the
-    index of its leader in `leaders` (-zip).
+    by the energy balance. The column `error` shades stable cells. A variable has the index of its
+    leader in `leaders` (-zip).
     """
 
     def __init__(
@@ -284,8 +284,7 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Return each row's x at which the first step equals the column `step`, extrapolated as a
-        power of x; or None."""
+        """Each row's x at which the first step equals the column `step`, or None."""
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
@@ -308,7 +307,7 @@ class Map:
             return None
         first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
         (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
-        if isclose(a, b, rel_tol=1e-6):  # both steps scale with the variable, up to round-off
+        if isclose(a, b, rel_tol=1e-6):  # both steps scale with the variable
             return None
         at = log(xa) - log(xb / xa) * log(a) / log(b / a)
         low, *_, high = edges(self.x)
@@ -452,13 +451,12 @@ def explore(
     apart: Sequence[bool] = (False, False),
     width: int = 1,
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Return the classes of the cells that were run, and those inferred for the others.
+    """Classes of the cells that were run, and those inferred for the others.
 
-    Cells on a grid about `stride` cells wide are run first. Cells between two of one class in a row
-    or column get that class, shortest gaps first; between two classes the middle cell is run,
-    longest gaps first. Along an edge, at least one in three cells is run to follow its curve.
-    Islands between runs are missed. Along an axis of words (`apart`), nothing is inferred. While
-    fewer than `width` cells are due at once, cells of the next rounds are run with them.
+    A grid of cells about `stride` apart is run first. Between two of one class in a row or column,
+    cells get that class; between two classes the middle cell is run, longest gaps first, and along
+    an edge at least one in three. Islands between runs are missed. Along an axis of words
+    (`apart`), nothing is inferred. At least `width` cells are run at once.
     """
     classes: list[Hashable] = []
     plane = np.full(shape, UNKNOWN)
@@ -527,7 +525,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle of the stretches of an edge that have no run."""
+    """Yield length and middle of stretches of an edge without a run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])

@@ -1,4 +1,4 @@
-"""Cases of a study: some run at once; known ones do not run again."""
+"""Cases of a study; known ones do not run again."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class Study:
             self.next_write = time.perf_counter() + 20 * (time.perf_counter() - begun)
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
-        """Run cases; an interrupt ends runs in progress, and finished ones are stored."""
+        """Run cases; an interrupt ends runs, and finished ones are stored."""
         waiting = []
         self.order.update(dict.fromkeys(tuple(case.values()) for case in cases))
         for case in cases:
@@ -164,7 +164,7 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Return the next case; the first of a kind goes ahead, because it compiles."""
+            """Next case; the first of a kind goes ahead, because it compiles."""
             kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
@@ -274,10 +274,7 @@ def _said(case: Mapping[str, str]) -> str:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """Predict the time by ridge regression of logarithms.
-
-    It is a product of powers of a case's numbers and factors of its words.
-    """
+    """Predict the time by ridge regression: powers of numbers, factors of words."""
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
         logs: dict[Any, float] = {}

@@ -1,4 +1,4 @@
-"""Distribution of the results of a sample, with intervals; probability of an event."""
+"""Distribution of the results of a sample; probability of an event."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, plural
 
 QUANTILES = (0.05, 0.5, 0.95)
-SURE = 0.95  # confidence of intervals
+SURE = 0.95  # of intervals
 RESAMPLED = 2000
 
 

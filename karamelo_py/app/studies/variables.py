@@ -1,4 +1,4 @@
-"""Variables of a study, their values, and common options of studies."""
+"""Variables of a study, and common options of studies."""
 
 import csv
 import os
@@ -144,7 +144,7 @@ def holds(
 
 
 def title_of(script: Path) -> str:
-    """First sentence of the comment at the head of a script, else the name of the file."""
+    """First sentence of a script's comment, else the name of the file."""
     lines = read_script(script).splitlines() if script.is_file() else []
     head = " ".join(line.strip("# ") for line in takewhile(re.compile(r"#+ *\w").match, lines))
     return fill(re.split(r"[.:](?:\s|$)", head)[0], 80) or script.name

@@ -1,8 +1,7 @@
 """Start runs as forks of warm processes, which have imported the program.
 
-A run leaves a copy of itself, with its kernels, for later runs of its kind. Runs are children of
-the study. This works on Linux only, where the study can adopt orphans; otherwise, or if anything
-fails, a run starts a new interpreter.
+A run leaves a copy of itself, with its kernels, for later runs of its kind. On Linux the study can
+adopt orphans; otherwise, or if anything fails, a run starts a new interpreter.
 """
 
 import ctypes
@@ -71,7 +70,7 @@ class WarmProcesses:
     def start(
         self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Start a run whose output and error go to `files`; return the child's pid, or None."""
+        """Start a run with output and error to `files`; return the child's pid, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()
