@@ -1,4 +1,4 @@
-"""A run of a study: a separate process and folder, and the facts in its run.json."""
+"""A run of a study, and the facts in its run.json."""
 
 import hashlib
 import json
@@ -39,8 +39,7 @@ _NOT_OF_RUN = ("internal", "busy")
 
 @dataclass
 class CaseOutcome:
-    """Status: ``done``, ``failed``, ``refused`` (by a mistake of the script, before any step),
-    ``too long`` or ``killed``."""
+    """Status: ``done``, ``failed``, ``refused`` (before any step), ``too long`` or ``killed``."""
 
     status: str
     reason: str = ""  # unless done
@@ -102,10 +101,10 @@ class Stop(Exception):
 @dataclass
 class Launch:
     script: Path
-    threads: int = 1  # number for each run
+    threads: int = 1  # of each run
     repeat: int = 1  # runs of each case; the time is their median
     limit: float | None = None  # seconds
-    texts: tuple[str, ...] = ()  # texts of the script and its includes
+    texts: tuple[str, ...] = ()  # of the script and its includes
     stop: threading.Event = field(default_factory=threading.Event)
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
@@ -116,7 +115,7 @@ class Launch:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Return the stored outcome; None starts the case again."""
+        """Stored outcome; None starts the case again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -231,7 +230,7 @@ OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of MPI pool
 
 
 def environment() -> dict[str, str]:
-    """Return the environment in which runs import this very program."""
+    """Environment in which runs import this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     inherited = {name: text for name, text in os.environ.items() if not name.startswith(OF_MPI)}

@@ -271,8 +271,8 @@ class Elsewhere:
     ):  # fmt: skip
         """`send` makes contents known to the machines; its result goes to one that asks for them.
 
-        `workers` returns the threads of each worker by address; it is empty if a case cannot be
-        sent to chosen workers.
+        `workers` returns the threads of each worker by address, or nothing if workers cannot be
+        chosen.
         """
         self.parcel, self.send, self.executor, self.size = parcel, send, executor, size
         self.ends, self.workers = ends, workers

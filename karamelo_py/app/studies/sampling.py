@@ -26,7 +26,7 @@ CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
 class Random(NamedTuple):
     name: str
     text: str  # as given
-    law: Any  # distribution of scipy.stats
+    law: Any  # of scipy.stats
 
 
 def needs_scipy(word: str) -> None:
@@ -149,7 +149,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def prepare(options: Namespace) -> dict[str, Any]:
-    """Replace random variables in the options by lists of samples; return facts for the record."""
+    """Replace random variables by samples; return facts for the record."""
     calls = (CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
     if not options.sample:
         if any(call and call[1] in KINDS for call in calls):

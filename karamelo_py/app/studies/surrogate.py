@@ -9,8 +9,8 @@ import numpy as np
 from karamelo_py.app.studies.uncertainty import Interval
 from karamelo_py.script.errors import ScriptError
 
-GROUPS = 10  # groups of runs, each omitted once for the intervals of indices
-SAMPLES, FEW = 16384, 1024  # samples of the fitted function for each index, and for its interval
+GROUPS = 10  # of runs, each omitted once for the intervals of indices
+SAMPLES, FEW = 16384, 1024  # of the fitted function for each index, and for its interval
 WIDE = 1.96  # standard deviations of an interval of 95 %
 
 Function = Callable[[np.ndarray], np.ndarray]  # (n, d) to (n,)
@@ -103,10 +103,10 @@ def best(x: np.ndarray, y: np.ndarray) -> tuple[str, Fit, float]:
 def indices(
     laws: Sequence, results: Callable[[np.ndarray], np.ndarray], n: int, seed: int
 ) -> tuple[list[list[tuple[Interval, Interval]]], list[tuple[str, float]]]:
-    """First and total Sobol' indices for each result and variable, and the fit of each result.
+    """First and total Sobol' indices by result and variable, and the fit of each result.
 
-    Intervals are by leaving out 10 % of the runs (delete-group jackknife), and include the error
-    of the sums over samples; they contain the error of the fit as far as it changes with the runs.
+    Intervals are by a delete-group jackknife (10 % of the runs), and include the error of sums over
+    samples; they contain the error of the fit as far as it changes with the runs.
     """
     from scipy.stats import qmc, sobol_indices
 
