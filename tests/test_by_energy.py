@@ -1,6 +1,7 @@
 """Laws given by their stored energy: closed forms, other laws, and what is refused."""
 
 import os
+import re
 import subprocess
 import sys
 from itertools import pairwise
@@ -23,7 +24,10 @@ from karamelo_py.points.laws import (
     energy_density,
     initial_state,
     kirchhoff_stress,
+    shear_part,
+    wave_speed_bound,
     wave_speed_squared,
+    with_temperature,
 )
 from karamelo_py.points.laws.by_energy import (
     ISOCHORIC,
@@ -42,11 +46,14 @@ from karamelo_py.points.laws.hyperelastic import (
     Ogden,
     SaintVenantKirchhoff,
     Yeoh,
+    of_energy,
     ready,
 )
 from karamelo_py.points.laws.neo_hookean import NeoHookean
 from karamelo_py.points.laws.parameters import lame_parameters
+from karamelo_py.points.laws.placed import Direction
 from karamelo_py.script.derivatives import derivative
+from karamelo_py.script.expressions import Expression
 
 LAM, G = lame_parameters(1e6, 0.3)
 BUILT_IN = NeoHookean(1e-3, LAM, G)
@@ -56,6 +63,7 @@ LAWS = {form: ready(form, rho=1000, G=G, lam=LAM) for form in (FORMULA, IN_STRET
 SPACE = Space()
 ISO = "I1*J^(-2/3) - 3"
 TISSUE = Holzapfel(1, 0.3, 0.8, 0.9, 5, fibre=(0.6, 0.8, 0.0), fibre2=(0.6, -0.8, 0.0)).checked()
+TURNING = Direction((Expression.seed("x0"), Expression(1.0), Expression(0.0)), None)
 HOOPED = Holzapfel(1, 0.3, 0.8, 0.9, 5, fibre=(0.0, 0.0, 1.0)).checked()
 
 
@@ -397,6 +405,18 @@ element(e, r, p, kinematics=plane-strain)"""  # fmt: skip
     assert found[1]["q"] == pytest.approx(2 * found[0]["q"], rel=1e-10)
 
 
+@pytest.mark.parametrize("fibres", [(), ((1.0, 0.0, 0.0),) * 2, (TURNING,) * 2])
+def test_waves_in_entropic_rubber_have_the_temperature_of_the_point(fibres):
+    """An energy in proportion to T: twice the temperature, twice the square of the speed."""
+    along = " + 300*T*(I4 - 1)^2" if fibres else ""
+    energy = with_numbers(f"700*T*({ISO}) + 1e4*T*(J - 1)^2{along}")
+    law = of_energy(1000, energy, fibres, 293.0, (2000, 0.2, 0.0))
+    cold = initial_state(law, SPACE, 1.0)
+    hot = with_temperature(law, SPACE, cold, 586.0)
+    for speed in (wave_speed_squared, wave_speed_bound, shear_part):
+        assert speed(law, SPACE, hot) == pytest.approx(2 * speed(law, SPACE, cold), rel=1e-12)
+
+
 def test_rest_is_without_stress_and_energy():
     for law in (*LAWS.values(), Ogden.given(1, 5, 0.6, 1.3), Yeoh(1, 9, 1, -0.1, 0.1).checked()):
         state = initial_state(law, SPACE, 1.0)
@@ -558,6 +578,17 @@ def test_fibres_that_lose_convexity_are_reported(more):
     h, stiff = 1e-3, np.log(x) * 0.9
     curvatures = [stored(e + h) + stored(e - h) - 2 * stored(e) for e in (stiff, np.log(x))]
     assert curvatures[0] > 0 >= curvatures[1]
+
+
+def test_fibres_that_turn_are_judged_at_all_angles(run_interpreted):
+    """Two families that stiffen each other only along each other, not at right angles."""
+    law = "I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2 + (I6 - 1)^2 + 4*(I4 - 1)*(I6 - 1)"
+    text = "material(m, hyperelastic, 1, {}, fibre=({}, 0), fibre2=(1, 0, 0))\n"
+    said = [run_interpreted(text.format(law, first)).err for first in ("1, 0", "x0, y0")]
+    aligned, turning = (
+        float(re.search(r"along the fibres.* stretch of (\S+)", s)[1]) for s in said
+    )
+    assert 0.5 < aligned < 0.7 and 0.9 < turning < 1.1
 
 
 def test_fibres_stiffen_with_temperature(run_interpreted):

@@ -830,11 +830,11 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
 
 
 def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
-    """A law of F in Python: the same stress along three paths as the energy of Gent (1996)."""
+    """A law of F in Python: the same stress along three paths as by its energy (Blatz & Ko 1962)."""
     paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}
     lines = [
-        "material(own, mpm_examples.rubber.Gent, 1000, 3e5, 25, 1e8)",
-        "material(energy, gent, 1000, 3e5, 25, 1e8)",
+        "material(own, mpm_examples.rubber.BlatzKo, 1000, 3e5)",
+        "material(energy, hyperelastic, 1000, mu/2*(I2/J^2 + 2*J - 5), mu=3e5)",
     ]
     for name, ends in paths.items():
         lines += [f"load_path({name}, 5, {ends})"]

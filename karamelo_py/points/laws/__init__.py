@@ -381,4 +381,4 @@ def with_stress(law, kin, state, stress):
 
 @point_function(otherwise=True)
 def specific_volume(law):
-    return law.specific_volume
+    return 1 / law.rho if "rho" in law._fields else law.specific_volume

@@ -229,23 +229,31 @@ ALONG_FIBRES = {
     "stretching along the fibres alone": lambda x: (x, 1.0),
 }
 NEAR = 1e-3
+ANGLES = 1.0, 0.75, 0.5, 0.25, 0.0  # squared cosines between two families of fibres
 
 
 def _fibre_paths(law: NamedTuple) -> list[tuple[int, str]]:
     return list(product([k for k, code in enumerate(law.along) if code], ALONG_FIBRES))
 
 
-def stiffness_along_fibre(law: NamedTuple, family: int, path: str, x: float) -> float:
+def aligned(law: NamedTuple) -> float:
+    """Return the squared cosine of the angle between two families of fibres."""
+    return sum(p * q for p, q in zip(law.directions[:3], law.directions[3:], strict=True)) ** 2
+
+
+def stiffness_along_fibre(
+    law: NamedTuple, family: int, path: str, x: float, cosine2: float | None = None
+) -> float:
     """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
 
-    At constant volume it is the curvature by ln l. NaN where the energy has no value.
+    `cosine2` replaces the squared cosine between the families. At constant volume it is the
+    curvature by ln l. NaN where the energy has no value.
     """
-    a, b = law.directions[:3], law.directions[3:]
-    aligned = sum(p * q for p, q in zip(a, b, strict=True)) ** 2
+    along = aligned(law) if cosine2 is None else cosine2
     W = []
     for h in (-NEAR, 0, NEAR):
         stretch, side = ALONG_FIBRES[path](x * exp(h))
-        squares = [stretch**2, aligned * stretch**2 + (1 - aligned) * side * side]
+        squares = [stretch**2, along * stretch**2 + (1 - along) * side * side]
         if family:
             squares.reverse()
         try:
@@ -268,15 +276,18 @@ def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
 
 
 @lru_cache(typed=True)
-def first_instability(law: NamedTuple) -> tuple[str, float] | None:
+def first_instability(law: NamedTuple, turning: bool = False) -> tuple[str, float] | None:
     """Return path and stretch nearest to rest where a direction or path loses its stiffness.
 
-    A path ends where the energy does, as at the limit of chains.
+    A path ends where the energy does, as at the limit of chains. Fibres whose directions are
+    `turning` from point to point may enclose any angle.
     """
     unstable = []
     judged = [(path, partial(least_stiffness, law, path), x) for path in PATHS for x in (0.5, 3.0)]
     for (family, path), end in product(_fibre_paths(law), (0.5, 2.0)):
-        judged.append((path, partial(stiffness_along_fibre, law, family, path), end))
+        for cosine2 in ANGLES if turning else (aligned(law),):
+            stiffness = partial(stiffness_along_fibre, law, family, path, cosine2=cosine2)
+            judged.append((path, stiffness, end))
     for path, stiffness_at, end in judged:
         for x in np.geomspace(1, end, 60)[1:].tolist():
             try:

@@ -50,9 +50,17 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
         yield from _doubts_of_expansion(alpha, "the coefficient of linear expansion")
     if isinstance(law, EosStrength):
         yield from _doubts_of_parts(law, state)
+    turning = False
     while isinstance(law, Thermoelastic | Placed):
+        turning = isinstance(law, Placed)
         law = law.elastic
-    if isinstance(law, ByEnergy) and (unstable := first_instability(law)):
+    if (lam := parameter(law, "lam")) < 0:
+        nu = lam / (2 * (lam + law.G))
+        yield (
+            f"its Poisson's ratio is {nu:.3g}: a bar of it swells when it is pulled",
+            f"{-nu:.3g}, unless it is auxetic",
+        )
+    if isinstance(law, ByEnergy) and (unstable := first_instability(law, turning)):
         path, stretch = unstable
         yield (
             f"it loses its stiffness in {path} at a stretch of {stretch:.2g}",

@@ -44,6 +44,16 @@ class OfDeformation:
     __slots__ = ()
 
 
+def of_deformation(law: type) -> type:
+    """Declare a law whose state is its deformation gradient F (class decorator)."""
+    for function in (
+        laws.initial_state, laws.by_rates, laws.deformation, laws.jacobian, laws.advance,
+        laws.cauchy_stress, laws.elastic_strain,
+    ):  # fmt: skip
+        function.on(law)(function.find((OfDeformation,)))
+    return law
+
+
 class Hyperelastic(OfDeformation, ElasticLaw):
     __slots__ = ()
 

@@ -10,8 +10,8 @@ from collections import namedtuple
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
-from karamelo_py.points.kinematics import inner
-from karamelo_py.points.laws import column
+from karamelo_py.points.kinematics import inner, nothing
+from karamelo_py.points.laws import answers, column
 
 
 class StrainStep(NamedTuple):
@@ -96,6 +96,18 @@ def initial_loss(strength, template):
 
 def no_loss_yet(strength, template):
     return (0.0,)
+
+
+def without_shear_stiffness(strength: type) -> type:
+    """Declare a strength without elastic shear, whose work is dissipated (class decorator)."""
+    answers(strength, {shear_modulus: 0, shear_energy: 0})
+    initial_loss.on(strength)(no_loss_yet)
+
+    @shear_strain.on(strength)
+    def _no_shear_strain(strength, kin, s):
+        return nothing(kin)
+
+    return strength
 
 
 @point_function(otherwise=True)

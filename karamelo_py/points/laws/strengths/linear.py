@@ -4,8 +4,8 @@ from math import sqrt
 from typing import NamedTuple
 
 from karamelo_py.language.rules import known_failure
-from karamelo_py.points.kinematics import dev, inner, nothing
-from karamelo_py.points.laws import LawTraits, answers, parameter, specific_volume, strengths
+from karamelo_py.points.kinematics import dev, inner
+from karamelo_py.points.laws import LawTraits, parameter, specific_volume, strengths
 from karamelo_py.points.laws.parameters import AboveZero, FromZero
 from karamelo_py.points.laws.strengths.hardening import elastic_trial
 from karamelo_py.points.laws.viscosity import damped, inviscid
@@ -137,15 +137,7 @@ known_failure(
     "large with 10 cells",
     cure="faces of rigid solids on lines of the grid, or finer cells",
 )
-strengths.initial_loss.on(Viscous)(strengths.no_loss_yet)
-
-
-answers(Viscous, {strengths.shear_modulus: 0, strengths.shear_energy: 0})
-
-
-@strengths.shear_strain.on(Viscous)
-def _shear_strain_viscous(strength, kin, s):
-    return nothing(kin)
+strengths.without_shear_stiffness(Viscous)
 
 
 @strengths.shear_response.on(Viscous)

@@ -10,7 +10,6 @@ from karamelo_py.points.laws import (
     elastic_strain,
     energy_density,
     initial_state,
-    jacobian,
     kirchhoff_stress,
     wave_speed_squared,
 )
@@ -31,13 +30,8 @@ class ElasticFluid(NamedTuple):
     material(water, elastic-fluid, 1000, 2e9)
     """
 
-    specific_volume: float  # reference volume per mass
-    K: float
-
-    @classmethod
-    def given(cls, rho: Annotated[float, Positive], K: Annotated[float, Positive]):
-        """The law from density and bulk modulus."""
-        return cls(1 / rho, K)
+    rho: Annotated[float, Positive]
+    K: Annotated[float, Positive]
 
 
 class FluidState(NamedTuple):
@@ -66,15 +60,10 @@ def _kirchhoff_stress_elastic_fluid(law, kin, state):
     return state.J * cauchy_stress(law, kin, state)
 
 
-@jacobian.on(ElasticFluid)
-def _jacobian_elastic_fluid(law, kin, state):
-    return state.J
-
-
 @wave_speed_squared.on(ElasticFluid)
 def _wave_speed_squared_elastic_fluid(law, kin, state):
     # dp/d(density), with density = rho0 / J
-    return law.K * law.specific_volume * state.J * state.J
+    return law.K / law.rho * state.J * state.J
 
 
 @energy_density.on(ElasticFluid)

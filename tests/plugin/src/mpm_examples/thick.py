@@ -3,10 +3,12 @@
 from math import sqrt
 from typing import NamedTuple
 
-from karamelo_py.points.kinematics import dev, inner, nothing
+from karamelo_py.points.kinematics import dev, inner
 from karamelo_py.points.laws import strengths
+from karamelo_py.points.laws.viscosity import damped
 
 
+@strengths.without_shear_stiffness
 class Bingham(NamedTuple):
     """Mud that flows beyond a yield stress.
 
@@ -32,12 +34,5 @@ def shear_response(strength, kin, step, memory, heat):
 
 @strengths.damped_speed_squared.on(Bingham)
 def damped_speed_squared(strength, squared, density):
-    # c' = sqrt(c^2 + a^2) + a for a = nu/h makes the program take steps below h^2/(2 nu).
-    a = 4 / 3 * viscosity(strength, 0) / (density * strength.cell_size)
-    return (sqrt(squared + a * a) + a) ** 2
-
-
-strengths.shear_modulus.on(Bingham)(lambda strength: 0)
-strengths.shear_energy.on(Bingham)(lambda strength, kin, s: 0)
-strengths.shear_strain.on(Bingham)(lambda strength, kin, s: nothing(kin))
-strengths.initial_loss.on(Bingham)(strengths.no_loss_yet)
+    nu = 4 / 3 * viscosity(strength, 0) / density
+    return damped(squared, nu / strength.cell_size)  # makes the step shorter
