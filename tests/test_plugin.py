@@ -830,7 +830,7 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
 
 
 def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
-    """A law of F in Python: the same stress along three paths as by its energy (Blatz & Ko 1962)."""
+    """A law of F in Python: the same stress along three paths as by its energy."""
     paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}
     lines = [
         "material(own, mpm_examples.rubber.BlatzKo, 1000, 3e5)",
