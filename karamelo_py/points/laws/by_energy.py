@@ -286,8 +286,8 @@ def first_instability(law: NamedTuple, turning: bool = False) -> tuple[str, floa
     judged = [(path, partial(least_stiffness, law, path), x) for path in PATHS for x in (0.5, 3.0)]
     for (family, path), end in product(_fibre_paths(law), (0.5, 2.0)):
         for cosine2 in ANGLES if turning else (aligned(law),):
-            stiffness = partial(stiffness_along_fibre, law, family, path, cosine2=cosine2)
-            judged.append((path, stiffness, end))
+            along = partial(stiffness_along_fibre, law, family, path, cosine2=cosine2)
+            judged.append((path, along, end))
     for path, stiffness_at, end in judged:
         for x in np.geomspace(1, end, 60)[1:].tolist():
             try:
