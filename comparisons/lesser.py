@@ -23,10 +23,10 @@ HEAD = """# What a lesser model saves
 
 Each row is a scene of `inputs/models/` in fewer dimensions and in 3D, next to its exact or
 published answer. The 3D grid has cubic cells, one across half the thickness of a plate and two
-across half a bar. Cost is the processor time of the steps in 3D over the lesser model's. Spheres in
-3D: nodes that are driven inside a hole (`in.shell`, `in.cavity`) let its surface lag by 11 to 18 %;
-a pressure on cut points (`in.pressed`) errs by 2 %. The wall that drives a fluid (`in.spin_up`) is
-such a staircase in 3D, too.
+across half a bar. Cost is the processor time of the steps in 3D divided by the lesser model's. The
+surface of a sphere is a staircase of nodes in 3D: prescribed displacements inside a hole
+(`in.shell`, `in.cavity`) are 11 to 18 % too small at its surface, a pressure on cut points
+(`in.pressed`) errs by 2 %. The wall of `in.spin_up` is such a staircase, too.
 
 Five factors are below 20. `in.specimen` (16, 13, 11) and the limit load of `in.disk` (11) take load
 steps: the lesser model has 128 and 723 points, and most of its 0.2 and 1.4 s is the same for any

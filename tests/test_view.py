@@ -96,6 +96,22 @@ def test_view_takes_files_in_the_order_of_their_steps(tmp_path, monkeypatch, cap
     assert (tmp_path / "f.16.png").exists()
 
 
+def test_frames_have_one_range_of_colours(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    hub = FakeHub(tmp_path)
+    hub.dumps["d"] = Particle(hub, 8, "p.dump", "vx")
+    for n in (8, 16):
+        hub.fields.points["vx"][:] *= n
+        hub.run(n)
+    limits, save = [], pictures.Picture.save_png
+    monkeypatch.setattr(
+        pictures.Picture, "save_png",
+        lambda self, *rest: limits.append(self.limits) or save(self, *rest),
+    )  # fmt: skip
+    assert call(capsys, "view", "p.dump", "-c", "vx", "-o", "m.gif")[0] == 0
+    assert len(limits) > 1 and len({*limits}) == 1
+
+
 def test_a_pattern_in_quotes_is_that_of_a_shell(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     hub = FakeHub(tmp_path, dimension=2)

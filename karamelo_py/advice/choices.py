@@ -63,7 +63,7 @@ CHOICES = (
         lambda s: s.gas and len(s.soft) == 1 and s.speed < 0.1 and not s.burns,
         ("method(ulmpm, APIC, cubic-spline, mass=corrected)",),
         "sound in a gas",
-        "corrected accelerations err by 0.7 % where others err by 3 to 6 %",
+        "corrected accelerations err by 0.7 %, other set-ups by 3 to 6 %",
         ("in.organ", "in.piston"),
     ),
     Choice(
@@ -84,7 +84,7 @@ CHOICES = (
         lambda s: s.liquid and s.sag > 0,
         ("method({grid}, AFLIP, quadratic-spline, 1)",),
         "a liquid under its weight",
-        "surface waves and fronts lose least where points take the change of the velocity",
+        "surface waves and fronts lose least with AFLIP",
         ("in.slosh", "in.dam_ritter"),
     ),
     Choice(
@@ -134,7 +134,7 @@ CHOICES = (
         ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
         "one elastic body",
         "points stay in their cells, so a linear basis is second order, conserves energy and "
-        "rotation, and takes half of the visits",
+        "rotation, and visits points half as often",
         ("in.energy_disk", "in.turns", "in.cantilever"),
     ),
     Choice(

@@ -185,7 +185,9 @@ class Narrator(Listener):
 
 
 def _counted(simulation: Simulation) -> dict[str, int]:
-    deleted, boundary = int((~simulation.present).sum()), simulation.hub.update.boundary
-    if deleted or boundary == "delete":
+    hub, deleted = simulation.hub, int((~simulation.present).sum())
+    if len(hub.waiting) or len(hub.inactive):  # some points come later, or come back
+        return {"points present": simulation.count - deleted}
+    if deleted or hub.update.boundary == "delete":
         return {"deleted points": deleted}
-    return {"reflections": simulation.bounces} if boundary == "reflect" else {}
+    return {"reflections": simulation.bounces} if hub.update.boundary == "reflect" else {}

@@ -59,9 +59,7 @@ def print_styles(words: Sequence[str]) -> int:
         raise ScriptError(f"too many arguments: {' '.join(words)}", expected=STYLES_USAGE)
     page = _Page()
     for index, family in enumerate([_family(words[0])] if words else families()):
-        if index:
-            page.say()
-        page.say(_plural(family), "bold")
+        page.say("\n" * (index > 0) + _plural(family), "bold")
         page.rows([(name, family, name) for name in registry.names(family)])
     return 0
 
@@ -233,9 +231,8 @@ def _patterns(word: str) -> list[re.Pattern]:
 
 def _subcommands(word: str, manuals: Mapping[str, tuple[str, str]]) -> Iterable[tuple[str, str]]:
     begins = _patterns(word)
-    for name, (_, text) in manuals.items():
-        if all(each.search(f"{name} {text}") for each in begins):
-            yield PROGRAM, name
+    texts = [(name, f"{name} {text}") for name, (_, text) in manuals.items()]
+    return [(PROGRAM, name) for name, text in texts if all(each.search(text) for each in begins)]
 
 
 def _arguments(word: str) -> dict[str, Parameter]:

@@ -278,9 +278,8 @@ class Drawing:
         values.set("time", snapshot.time)
         values.set("timestep", snapshot.step)
         formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
-        for name in set().union(
-            *(one.names for one in (*formulas, *filter(None, [self.look["title"]])))
-        ):
+        used = [one.names for one in (*formulas, *filter(None, [self.look["title"]]))]
+        for name in set().union(*used):
             if name not in GLOBAL_SEEDS and name in values and np.isnan(values.get(name)):
                 raise ScriptError(
                     f"{name} at step {snapshot.step} is not in dumps",

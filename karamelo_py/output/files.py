@@ -171,10 +171,9 @@ class Frames:
 
     def _save_mp4(self, path: Path, file: BinaryIO) -> None:
         command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png"]
-        command += ["-framerate", f"{self.fps:g}", "-i", "-"]
+        command += ["-framerate", f"{self.fps:g}", "-i", "-", "-f", "mp4"]
         # Players need even sizes and chroma at half resolution.
-        command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
-        command += ["-f", "mp4", file.name]
+        command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", file.name]
         done = subprocess.run(command, input=b"".join(self._frames), capture_output=True)
         if done.returncode != 0:
             last = (done.stderr.decode(errors="replace").strip().splitlines() or ["?"])[-1]

@@ -286,7 +286,7 @@ def _side_by_side(at: _Stop) -> Mistake:
 
 
 _NAMED = ("region", "group", "fix", "compute", "dump", "unfix", "uncompute", "undump")
-NO_BLOCKS = "there are no loops and blocks; if(condition, a, b) chooses a value"
+NO_BLOCKS = "a script has no loops, blocks or imports; if(condition, a, b) chooses a value"
 
 
 def _block_or_call(name: str, words: list[str]) -> str:

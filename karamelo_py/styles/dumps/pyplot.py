@@ -340,7 +340,7 @@ class Movie(PyPlot):
     file
         File name ending in .gif or, if the program ffmpeg is installed, .mp4.
     vmin, vmax
-        Limits of the colours; by default the colours change when values exceed the present limits.
+        Limits of the colours; else a range that grows. ``karamelo-py view`` has one for all frames.
 
     Example
     -------
