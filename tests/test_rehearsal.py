@@ -110,6 +110,7 @@ CALLS = {
     "translate_particles": (SCENE, "translate_particles(all, region, every, 1, 0)"),
     "units": (SCENE, "units(mm, g, ms)"),
     "value": (SCENE, "E0 = value(E)"),
+    "viscosity": (BARE, "viscosity(prony, rubber, g=0.2, tau=0.01)"),
     "write_restart": (SCENE, "write_restart(w.h5)"),
     "xcm": (SCENE, "X = xcm(all, x)"),
 }
