@@ -396,6 +396,19 @@ def test_a_run_that_is_killed_is_recorded(folder):
     assert (outcome.status, outcome.reason) == ("killed", "ended by signal 9")
 
 
+def test_a_killed_run_sets_the_exit_status(folder, monkeypatch):
+    """The other one is done."""
+    ends = iter(["killed", "done"])
+
+    def run(launch, values, folder):
+        return case.CaseOutcome(next(ends), folder=folder)
+
+    monkeypatch.setattr(case.Launch, "run", run)
+    assert main(["sweep", "in.flight", "-var", "N=2,4", "-jobs", "1"]) == 1
+    ends = iter(["done", "done"])
+    assert main(["sweep", "in.flight", "-var", "N=2,4", "-jobs", "1"]) == 0
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="runs are copies on Linux alone")
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_runs_are_copies_of_warm_processes_and_write_what_others_do(folder):

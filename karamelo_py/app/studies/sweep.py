@@ -17,9 +17,9 @@ Runs a script with every combination of values of its variables, and writes one 
   karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
 
 Each run has a separate folder, named after its values, in a folder named after the table. A run
-that fails is recorded with its reason, and the sweep continues; if all fail, the exit status is 1.
-An interrupted sweep continues where it stopped when the same command is given again. Processor,
-threads and versions are written next to the table (sweep.json)."""
+that fails is recorded with its reason, and the sweep continues. The exit status is 1 if all fail or
+one is killed. An interrupted sweep continues where it stopped when the same command is given again.
+Processor, threads and versions are written next to the table (sweep.json)."""
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -67,7 +67,7 @@ def run(options: Namespace) -> int:
         messages = out.parent / rows[0]["folder"] / "err.txt"
         hint = f"{messages} has all its messages" if messages.is_file() else None
         raise ScriptError(f"no run is done: {rows[0]['reason']}", hint=hint)
-    return 0
+    return int(any(row["status"] == "killed" for row in rows))
 
 
 def tell(rows: Sequence[Row], study: Study) -> None:
