@@ -41,13 +41,7 @@ _folders: WeakValueDictionary[Path, Simulation] = WeakValueDictionary()
 
 
 class SimulationError(ScriptError):
-    """An error in a script or a command.
-
-    Attributes
-    ----------
-    message, mark, expected, hint
-        Parts of the message; `mark` has file, line, column and the text of the line.
-    """
+    """An error: `message`, `expected`, `hint`, `mark` (file, line, column, text of the line)."""
 
     def __str__(self) -> str:
         return self.render()

@@ -60,6 +60,10 @@ def vector(kin: Any) -> int:
     return kin.dimension
 
 
+def unknowns(kin: Any) -> int:
+    return len(kin.Unknown._fields)
+
+
 def tensor(kin: Any) -> int:
     """Count the hoop component too."""
     return kin.tensor_size

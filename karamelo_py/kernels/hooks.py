@@ -32,7 +32,7 @@ from typing import Any, NamedTuple
 from numba import types
 
 from karamelo_py.compiler import point_function
-from karamelo_py.compiler.fields import field, load_vector, store, vector
+from karamelo_py.compiler.fields import field, load_vector, store, unknowns, vector
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Index, Tag
@@ -232,12 +232,14 @@ NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "vel
 
 def _field_reader(item: Any, number: Callable) -> Callable:
     shape = item.shape
-    as_vector = shape is vector
+    as_vector, as_unknown = shape is vector, shape is unknowns
 
     def of_field(members, law, state, n):
         numbers = tuple([number(members, k, n) for k in range(shape(members.kin))])
         if as_vector:
             return members.kin.Vector._make(numbers)
+        if as_unknown:
+            return members.kin.Unknown._make(numbers)
         return numbers[0] if len(numbers) == 1 else numbers
 
     return of_field

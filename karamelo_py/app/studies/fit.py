@@ -163,9 +163,7 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Search around `end` along variables and the weakest direction, with slopes over both
-        sides.
-        """
+        """Search around `end` along variables and the weakest direction, by both sides."""
 
         def nearby(*moves: np.ndarray) -> list[End]:
             near = [np.clip(end.fraction + s * move, 0, 1) for move in moves for s in (1, -1)]

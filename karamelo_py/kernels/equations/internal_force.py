@@ -6,7 +6,7 @@ The total frame has reference volumes and gradients, and the first Piola-Kirchho
 from math import sqrt
 
 from karamelo_py.compiler import point_function, real, where
-from karamelo_py.compiler.fields import Field, StepField, increase, load_vector
+from karamelo_py.compiler.fields import Field, StepField, increase, load_vector, unknowns
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.fbar import FBar, NodalStress, mean_stress
@@ -20,7 +20,7 @@ from karamelo_py.points.transfers import forces_by_arms
 class Force(StepField):
     """Force of fixes; with twist, the third component acts around the axis."""
 
-    shape = staticmethod(lambda kin: len(kin.Unknown._fields))
+    shape = unknowns
     columns = ("bx", "by", "bz")
 
 

@@ -227,9 +227,7 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore a file's state, also as last good state of `point`; with `outputs`, files
-        continue.
-        """
+        """Restore a file's state, also as last good state; with `outputs`, files continue."""
         check(hub, self)
         simulation, content = hub.simulation, self.content
         comm = hub.settings.comm

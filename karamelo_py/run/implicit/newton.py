@@ -145,9 +145,7 @@ class Newton:
         return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
-        """Change of displacements (m, d), as accurate as quadratic convergence requires (Eisenstat
-        & Walker 1996).
-        """
+        """Change of displacements (m, d), as accurate as needed (Eisenstat & Walker 1996)."""
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):
             equations.linearise(self.dt, self.ghost)

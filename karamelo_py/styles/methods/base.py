@@ -62,10 +62,6 @@ class Method:
     ----------
     basis, basis_name
         Tag of the basis, and its name in scripts.
-    thermal
-        Whether heat flows.
-    mark
-        Location of the command in the script, for messages.
     corrected
         Whether accelerations are corrected for the lumped masses.
     frame
