@@ -29,7 +29,19 @@ class Lanes(LaneType):
         return ir.VectorType(register_type(self.scalar), self.width)
 
 
-@functools.cache
+def per_type(function: Callable) -> Callable:
+    """Cache results by Numba's type numbers; hashes of types take long."""
+    known: dict[int, Any] = {}
+
+    def found(kind: types.Type) -> Any:
+        if kind._code not in known:
+            known[kind._code] = function(kind)
+        return known[kind._code]
+
+    return found
+
+
+@per_type
 def register_type(kind: types.Type) -> ir.Type:
     if hasattr(kind, "register_type"):
         return kind.register_type()
@@ -47,7 +59,7 @@ def register_type(kind: types.Type) -> ir.Type:
     return NOTHING
 
 
-@functools.cache
+@per_type
 def memory_type(kind: types.Type) -> ir.Type:
     """Return the LLVM type in memory, where booleans take a byte."""
     if isinstance(kind, types.Boolean):
@@ -59,7 +71,7 @@ def memory_type(kind: types.Type) -> ir.Type:
     return register_type(kind)
 
 
-@functools.cache
+@per_type
 def is_empty(kind: types.Type) -> bool:
     """Return True for types without a value, such as None and tuples of tags."""
     if isinstance(kind, types.BaseTuple) and not hasattr(kind, "register_type"):
@@ -100,7 +112,7 @@ def in_module(builder: ir.IRBuilder, content: ir.Constant, name: str) -> ir.Glob
 def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types.Type) -> ir.Value:
     if isinstance(wanted, types.Literal):
         wanted = types.unliteral(wanted)
-    if kind == wanted:
+    if kind is wanted or kind == wanted:
         return value
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
         parts = zip(unpack(builder, value), kind, wanted, strict=True)

@@ -158,6 +158,12 @@ def describe(numba_type: Any) -> str:
     return f"{how}:{numba_type}"
 
 
+@functools.cache
+def _registered(count: int, changes: int) -> tuple[str, set[str]]:
+    """Describe the implementations in all keys; return a hash and their modules."""
+    return short_hash(*map(_words, session.registered)), choices.modules_of(*session.registered)
+
+
 class KernelFiles:
     """Cached kernels of one function for a `processor`, loaded by `load`.
 
@@ -189,9 +195,10 @@ class KernelFiles:
     def _key(self, kinds: tuple, result: Any) -> str:
         function = self._function
         classes = (one for kind in kinds for one in choices.classes_in(kind))
-        made = [function, *self._called, *session.registered]
-        elsewhere = sorted(choices.modules_of(*made, *classes))
-        words = [*map(_words, made), *map(describe, kinds)]
+        made = [function, *self._called]
+        registered, modules = _registered(len(session.registered), session.changes)
+        elsewhere = sorted(choices.modules_of(*made, *classes) | modules)
+        words = [*map(_words, made), registered, *map(describe, kinds)]
         words += [describe(result) if result is not None else "", self._processor, _sources()]
         words += [machine.describe(), repr(_VERSIONS)]
         words += [f"{one} {_stamp(one)}" for one in elsewhere]

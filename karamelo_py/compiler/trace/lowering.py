@@ -108,7 +108,7 @@ class Lowering:
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
         first = kinds[0]
-        if all(kind == first for kind in kinds):
+        if all(kind is first or kind == first for kind in kinds):
             return first
         if all(isinstance(kind, types.Number | types.Boolean) for kind in kinds):
             return arithmetic.common(*kinds)
