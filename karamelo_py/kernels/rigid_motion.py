@@ -316,30 +316,32 @@ def add_slope(body, i, bounded):
                 way = c.slip[k] / c.speed
                 slope -= c.rub * way * c.slip[j] / c.speed
                 slope += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
-            for a in range(6):
-                for b in range(6):
+            for a in range(A.shape[1]):  # 36 terms: loops compile faster
+                for b in range(A.shape[1]):
                     J[a, b] += slope * A[k, a] * A[j, b]
 
 
 @noinline
 def solve_system(J):
     """Solve J (6, 7) by pivoted elimination; the solution replaces the last column."""
-    for k in range(6):
+    size, last = J.shape
+    last -= 1
+    for k in range(size):
         best = k
-        for a in range(k + 1, 6):
+        for a in range(k + 1, size):
             if abs(J[a, k]) > abs(J[best, k]):
                 best = a
-        for b in range(7):
+        for b in range(last + 1):
             J[k, b], J[best, b] = J[best, b], J[k, b]
-        for a in range(k + 1, 6):
+        for a in range(k + 1, size):
             factor = J[a, k] / J[k, k]
-            for b in range(k, 7):
+            for b in range(k, last + 1):
                 J[a, b] -= factor * J[k, b]
-    for back in range(6):
-        k = 5 - back
-        for b in range(k + 1, 6):
-            J[k, 6] -= J[k, b] * J[b, 6]
-        J[k, 6] /= J[k, k]
+    for back in range(size):
+        k = size - 1 - back
+        for b in range(k + 1, size):
+            J[k, last] -= J[k, b] * J[b, last]
+        J[k, last] /= J[k, k]
 
 
 @noinline
