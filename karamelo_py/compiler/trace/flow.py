@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import types
 
-from karamelo_py.compiler.code import exceptions
 from karamelo_py.compiler.llvm import scalar_of
 from karamelo_py.compiler.trace.values import (
     HeldValue,
@@ -102,15 +101,12 @@ class Flow:
     def __init__(self, lowering: Any):
         self.lowering, self.builder = lowering, lowering.builder
 
-    def _block(self) -> Any:
-        return self.builder.append_basic_block("way")
-
     def edge(self, names: dict[str, Any]) -> Edge:
         return Edge(self.builder.block, names, self.lowering.read)
 
     def split(self, condition: Value) -> tuple[Edge, Edge]:
         truth = emit(bool, condition)
-        blocks = self._block(), self._block()
+        blocks = [self.builder.append_basic_block("way") for _ in range(2)]
         self.builder.cbranch(truth._value, *blocks)
         return tuple(Edge(block, {}, dict(self.lowering.read)) for block in blocks)
 
@@ -131,7 +127,7 @@ class Flow:
                 merged = self._merged([thing, *(edge.names[name] for edge in edges[1:])], phis)
                 if merged is not _DROPPED:
                     names[name] = merged
-        block = self._block()
+        block = self.builder.append_basic_block("way")
         for k, edge in enumerate(edges):
             self.start(edge)
             self._enter(block, phis, [phi.on[k] for phi in phis])
@@ -186,9 +182,6 @@ class Flow:
         phis.append(Phi(made, things))
         return made
 
-    def fail(self, kind: type, arguments: tuple) -> None:
-        exceptions.fail(self.builder, kind, arguments)
-
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
@@ -209,7 +202,7 @@ class Flow:
             return self._phi(thing, kind, [thing], phis)
 
         carried = {name: begun(names[name], (name,)) for name in sorted(changed & names.keys())}
-        block = self._block()
+        block = self.builder.append_basic_block("way")
         self._enter(block, phis, [phi.on[0] for phi in phis])
         self.start(Edge(block, {}, dict(self.lowering.read)))
         return LoopHeader(block, phis, carried, paths), names | carried

@@ -31,16 +31,11 @@ def part_type(kind: types.Array, index: Any) -> types.Array:
     return kind.copy(ndim=kind.ndim - len(places) + len(slices), layout=layout)
 
 
-def _index_type(lowering: Any, thing: Any) -> types.Type:
+def _index(lowering: Any, thing: Any, count: Any) -> Any:
+    """Compute an index, from the end if negative."""
     kind = types.unliteral(lowering.kind_of(thing))
     if not isinstance(kind, types.Integer | types.Boolean):
         raise Untraceable(f"{kind} is no index")
-    return kind
-
-
-def _index(lowering: Any, thing: Any, count: Any) -> Any:
-    """Compute an index, from the end if negative."""
-    kind = _index_type(lowering, thing)
     value = lowering.lowered(thing, types.intp)
     is_positive = isinstance(thing, int) and thing >= 0
     if is_positive or isinstance(kind, types.Boolean) or not kind.signed:

@@ -3,7 +3,6 @@
 import copy
 import functools
 import operator
-from collections import OrderedDict, defaultdict
 from collections.abc import Callable
 from typing import Any
 
@@ -183,9 +182,7 @@ class Lowering:
             self.read[key] = self.wrapped(parent._kind[k], value), parent  # preserves its id
         return self.read[key][0]
 
-    def function(
-        self, name: str, run: Callable, kinds: tuple, result: types.Type | None = None
-    ) -> ir.Function:
+    def function(self, name: str, run: Callable, kinds: tuple, result: Any = None) -> ir.Function:
         """Return the module's separate function for `run`; `gives` is its result type."""
         module = self.builder.module
         functions = vars(module).setdefault("own", {})
@@ -198,9 +195,7 @@ class Lowering:
             made.gives = inner.give_back(run, kinds, made.args, result)
         return functions[run, kinds]
 
-    def give_back(
-        self, run: Callable, kinds: tuple, values: Any, result: types.Type | None
-    ) -> types.Type:
+    def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
         """Write a function; return its result type, which the code determines if it is None."""
         passed = iter(values)
         with traced.writing(self):
@@ -246,24 +241,19 @@ class Lowering:
 
 
 def _copied(names: dict[str, Any]) -> dict[str, Any]:
-    return {n: copy.copy(x) if type(x) in _CONTAINERS else x for n, x in names.items()}
+    return {n: copy.copy(x) if isinstance(x, list | dict | set) else x for n, x in names.items()}
 
 
-_CONTAINERS = list, dict, set, OrderedDict, defaultdict
-
-
-def function_type(kinds: tuple, result: types.Type, *more: ir.Type) -> ir.FunctionType:
+def function_type(kinds: tuple, result: Any, *more: ir.Type) -> ir.FunctionType:
     """Return a function's LLVM type; empty arguments are not passed."""
-    gives = ir.VoidType() if llvm.is_empty(result) else llvm.register_type(result)
+    is_void = result is None or llvm.is_empty(result)
+    gives = ir.VoidType() if is_void else llvm.register_type(result)
     arguments = [llvm.register_type(k) for k in kinds if not llvm.is_empty(k)]
     return ir.FunctionType(gives, [*arguments, *more])
 
 
-def new_function(
-    module: ir.Module, kinds: tuple, result: types.Type | None, name: str
-) -> ir.Function:
+def new_function(module: ir.Module, kinds: tuple, result: Any, name: str) -> ir.Function:
     """Start an LLVM function, with a `Failure` except on GPUs."""
-    result = types.none if result is None else result
     if traced.in_one_module():
         return ir.Function(module, function_type(kinds, result), name)
     return exceptions.passing(ir.Function(module, function_type(kinds, result, llvm.I64), name))

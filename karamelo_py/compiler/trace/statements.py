@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
+from karamelo_py.compiler.code import exceptions
 from karamelo_py.compiler.trace import values
 from karamelo_py.compiler.trace.choices import codes_in
 from karamelo_py.compiler.trace.flow import Edge, Flow, Grows, Range, is_value
@@ -525,7 +526,7 @@ class AstCompiler:
         kind = vars(builtins).get(exception.id) if isinstance(exception, ast.Name) else None
         if not isinstance(kind, type) or any(map(is_value, arguments)):
             self.unknown(node)
-        self.flow.fail(kind, tuple(arguments))
+        exceptions.fail(self.flow.builder, kind, tuple(arguments))
         self.goes = False
 
     def Assert(self, node: ast.Assert) -> None:
