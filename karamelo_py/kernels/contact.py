@@ -77,6 +77,7 @@ class SeparateFields(NamedTuple):
     torque: np.ndarray  # (F,) slot of the torque
     torques: np.ndarray  # (values,) slot of the torque of the force in each slot, or 0
     memory: np.ndarray  # (F,) steps that a contact is remembered
+    fluid: np.ndarray  # (F,) bool
     surface: np.ndarray  # (F, k) distance to the surface over mean position, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet
     partners: np.ndarray  # (F,) int64 scratch: contacts of each field
@@ -350,6 +351,21 @@ def _gap(bodies, outward, pair, where):
     return gap - _reach(bodies, outward, pair.m, where, -1)
 
 
+@noinline
+def _is_beyond(bodies, pair, where):
+    """Return True for a fluid's node more than half a cell outside of a rigid surface.
+
+    If such nodes stuck, the fluid would come to rest half a cell before the surface.
+    """
+    contact, led, side = bodies.contact, pair.n, 1
+    fluid = contact.fluid[pair.m // contact.stride]
+    if contact.rigid[pair.m // contact.stride]:
+        led, side, fluid = pair.m, -1, contact.fluid[pair.n // contact.stride]
+    if not (fluid and contact.rigid[led // contact.stride]):
+        return False
+    return _reach(bodies, pair.outward, led, where, side) < -0.5 * where.h
+
+
 def _directions(bodies, pair):
     """Return further directions that may show a gap; zeros for none.
 
@@ -526,7 +542,7 @@ def _touch_pair(bodies, control, i, j, where):
     rub, sticks = 0.0, False
     around = around_of(kin, contact, nodes, pair, False)
     slides, yields = (*slide, *around[:1]), (*pair.yielding, *around[1:2])
-    if contact.friction[a, b] > 0:
+    if contact.friction[a, b] > 0 and not _is_beyond(bodies, pair, where):
         rub, sticks = _friction_of(yields, contact.friction[a, b], push, slides, share)
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0

@@ -292,6 +292,8 @@ class ContactFriction(Fix):
     -----
     Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
 
+    A liquid or gas rubs at nodes within half a cell of a rigid solid.
+
     Frictional work heats solids with a temperature: half each, or all of it if only one has a
     temperature; with ``thermo-mechanical`` by the effusivities sqrt(kappa rho cp), as between
     half-spaces.

@@ -181,6 +181,7 @@ class ULMPMContacts(Method):
             torque=slots[:, 1].copy(),
             torques=hub.values.torques,
             memory=np.array([MEMORY if flows(law) else 1 for law in laws]),
+            fluid=np.array([any(law_traits(k).fluid for k in law_kind(law)) for law in laws]),
             surface=np.array(
                 [surface_table(self.basis, first[k].half_size.mean() / h) for k in range(count)]
             ),
