@@ -121,7 +121,7 @@ def test_fixes(monkeypatch, own_cache, method):
     monkeypatch.setenv("KARAMELO_PY_CACHE", own_cache)
     steps = StepsOnCard(Emulator(), one.setup, (hub.update.scheme, type(one.visits)), hooks)
     steps.send()
-    assert steps.advance(43) == other.advance(43) == 0
+    assert steps.advance(21) == other.advance(21) == 0
     steps.fetch()
     for here, there in zip(state(one), state(other), strict=True):
         assert np.abs(here - there).max() <= 1e-12 * np.abs(there).max()
@@ -132,7 +132,7 @@ def test_fixes(monkeypatch, own_cache, method):
         assert hub.values.get(name) == pytest.approx(value, rel=1e-10, abs=1e-9), name
     assert method != "ulmpm" or hub.values.get("base_y") > 100  # it bears the column by now
     watches = one.control.energy[0], other.control.energy[0]
-    assert watches[0].looks == watches[1].looks == 5
+    assert watches[0].looks == watches[1].looks == 3
     for name in ("kinetic", "stored", "work", "balance", "of_drift", "elastic", "lost", "crossed"):
         assert watches[0][name] == pytest.approx(watches[1][name], rel=1e-9, abs=1e-12), name
 
