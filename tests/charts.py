@@ -36,7 +36,7 @@ def _texts(axes):
 
 # Quantities without a unit, apart from ratios.
 DIMENSIONLESS = re.compile(
-    r"cells|points per cell|stretch|fraction of .*|shear|damage|density, pressure"
+    r"cells|points per cell|stretch|FLIP coefficient|fraction of .*|shear|damage|density, pressure"
     r"|.*strain|.*error.*|.* / .*"
 )
 

@@ -97,6 +97,22 @@ def test_fibres_carry_when_the_matrix_is_broken(run_interpreted):
     assert (t.sxx[-1] - t.sxx[21]) / (t.exx[-1] - t.exx[21]) == pytest.approx(ALONG, rel=5e-3)
 
 
+def test_a_broken_ply_has_no_stress_across(run_interpreted):
+    """A slope of the stress across of 6e-5 of the modulus; the same element in 3D."""
+    loads = """
+        load_path(cube, 40, exx=0.02, syy=0, szz=0)
+        load_path(plate, 40, exx=0.02, syy=0)
+        element(three, apart, cube)
+        element(two, apart, plate, kinematics=plane-stress)
+    """
+    script = PLY.format(90).replace("60e6, 90)", "60e6, 90, residual=1e-3)")
+    folder = run_interpreted(script + loads).folder
+    three, two = (read_log(folder / f"element_{name}.txt") for name in ("three", "two"))
+    assert two.sxx[-1] == pytest.approx(three.sxx[-1], rel=1e-3)
+    assert two.ezz[-1] == pytest.approx(three.ezz[-1], rel=1e-3)
+    assert abs(two.szz[-1]) < 1e-6 * two.sxx[-1]
+
+
 SCENE = f"""
     method(tlmpm, FLIP, linear, 1)
     dimension(2, 0, 1, 0, 1, 0.5)

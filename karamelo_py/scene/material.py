@@ -50,9 +50,10 @@ class Material(MaterialPart):
     @property
     def words(self) -> str:
         styles = [
-            registry.name_of(kind, type(law))
+            name
             for kind, law in zip(self.whole._fields, self.whole, strict=True)
-            if isinstance(law, tuple) and law and registry.names(kind)
+            if isinstance(law, tuple) and law
+            if registry.knows(kind, name := registry.name_of(kind, type(law)))
         ]
         parts = ", ".join(styles)
         return f"{self.id} ({self.style}{': ' if parts else ''}{parts})"

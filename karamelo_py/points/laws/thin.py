@@ -16,7 +16,7 @@ WHOLE = Axisymmetric()
 ENOUGH = 10  # trials of q for increments of any size
 UNROLLED = 9  # up to here trials are code without a loop
 FURTHEST = 0.3  # largest change of the stretch across in a trial
-FLATTEST, STEEPEST = 1e-4, 4.0  # accepted slopes of the stress across, over rho c^2
+FLATTEST, STEEPEST = 1e-6, 4.0  # accepted slopes of the stress across, over rho c^2
 
 
 class Thin(NamedTuple):
