@@ -212,6 +212,8 @@ def test_a_stress_beyond_yield_is_not_found(run_script):
         ("load_path(a, 2, syx=0)", "did you mean 'sxy'?"),
         ("material(tool, rigid, 1)\nload_path(a, 2, exx=0)\nelement(b, tool, a)",
          "material 'tool' is rigid"),
+        ("material(wood, orthotropic, 1, 9, 9, 1, 0, 0, 0, 5, 4, 3)\nload_path(a, 2, exx=0)\n"
+         "element(b, wood, a, kinematics=uniaxial-stress)", "not the same in y and z"),
         # What follows from a wrong line is not told.
         ("load_path(a, 0, ezz=-0.1)\nelement(b, steel, a)\nprint(value(b_exx))",
          "'increments' must be a whole number above 0"),

@@ -433,6 +433,9 @@ def test_plane_stress_for_a_thin_plate(advice):
     said = advice(PLATE.format(box=12, thick=2, fixes=pull))
     assert "a plate with free faces, and nothing acts along z: 2 times the points of" in said
     assert "dimension(2, 0, 12, 0, 14, 1) and plane_stress(true, thickness=2)" in said
+    locking = pull + "\nanti_volumetric_locking(true)"
+    said = advice(PLATE.format(box=12, thick=2, fixes=locking))
+    assert "not with anti_volumetric_locking" in said
     loaded = "fix(pull, edge_traction, all, box, xhi, {tx}, 0, 0)"
     said = advice(PLATE.format(box=12, thick=2, fixes=loaded.format(tx="2*y")))
     assert "plane_stress(true, thickness=2)" in said
@@ -594,6 +597,47 @@ def test_uniaxial_stress_for_a_bar(advice):
         assert "uniaxial_stress" not in advice(bar.replace("{fixes}", v.format(other)))
 
 
+WOOD = "orthotropic, 1, 140, 9, 6, 0.3, 0.2, 0.4, 5, 4, 3"
+HILL = (
+    "linear, 1, 100, 0.3)\nstrength(y, plastic, 38, 1, 1)\nmaterial(m, hill, rubber, y, R=(2,1,1)"
+)
+
+
+@pytest.mark.parametrize(
+    ("section", "law", "said"),
+    [
+        ("slab", WOOD, "plane strain"),
+        ("slab", WOOD + ", axes=(90*x0)", "plane strain"),
+        ("slab", WOOD + ", 0, 30", ""),
+        ("slab", WOOD + ", axes=(1, 0, 1, 0, 1, 0)", ""),
+        ("slab", WOOD + ", axes=(90*z0)", ""),
+        ("slab", "jointed, 1, 100, 0.25, 1, 25, 0, 30", ""),
+        ("13", WOOD + ", 30", "plane_stress"),
+        ("13", WOOD + ", 0, 30", ""),
+        ("13", WOOD + ", axes=(90*z0)", ""),
+        ("3", "transverse, 1, 9, 0.3, 140, 0.3, 5, 90, 90", "uniaxial_stress"),
+        ("3", WOOD, ""),
+        ("3", HILL, ""),
+        ("3", "jointed, 1, 100, 0.25, 1, 25, 30, 90", ""),
+    ],
+)
+def test_directions_of_a_law_fit_the_lesser_model(advice, section, law, said):
+    """As scenes refuse them, or warn of them."""
+    if section == "slab":
+        text = SPACE.format(region="block, 1, 4, 1, 3, 0, 2", v="0.1*x0, 0.2, 0", held=HELD)
+    else:
+        pull = "fix(v, initial_velocity_particles, all, 0.1*x0, 0, 0)"
+        text = PLATE.format(box=12, thick=2, fixes=pull).replace("1, 13, 0", f"1, {section}, 0")
+    text = text.replace("neo-hookean, 1, 100, 0.3", law)
+    found = advice(text.replace("1, rubber", "1, m") if law is HILL else text)
+    assert said in found if said else found == ""
+
+
+def test_directions_across_a_line(advice):
+    line = plane(more="fix(walls, velocity_nodes, all, NULL, 0)", side=8, law=WOOD + ", {}")
+    assert "a line" in advice(line.format(0)) and advice(line.format(30)) == ""
+
+
 TWIST = """
 group(ends, nodes, region, box, all)
 fix(turn, velocity_nodes, ends, {velocity})
@@ -607,6 +651,9 @@ def test_twist_for_a_rod_in_torsion(advice):
     assert "which rotate and twist about it" in said
     assert "axisymmetric(true, twist=true)" in said
     assert "fix(turn_around, angular_velocity_nodes, ends, 3)" in said
+    xpic = rod.replace("ulmpm, FLIP, linear, 1", "ulmpm, XPIC, linear, 2")
+    said = advice(xpic.replace("{velocity}", "-3*(y0 - 2.5), 3*(x0 - 3), 0"))
+    assert "not with transfer XPIC (instead: APIC or FLIP)" in said
     ramp = "-time*z0*(y0 - 2.5), time*z0*(x0 - 3), 0"
     assert "angular_velocity_nodes, ends, omega)" in advice(rod.replace("{velocity}", ramp))
     for other in ("-3*(y0 - 2), 3*(x0 - 3), 0", "3*(x0 - 3), 3*(y0 - 2.5), 0", "-3*y0*(y0 - 2.5), "

@@ -166,6 +166,7 @@ def test_axes_by_formulas_of_place(state_interpreted, axes):
         ("1, 0, 0, 0, 0, 1", "inclined to the plane"),
         ("1, 0", "does not define axes"),
         ("30*time", "cannot depend on time"),
+        ("30*z0", "depends on z0, which a scene in 2D does not have"),
     ],
 )
 def test_axes_that_are_none(run_interpreted, axes, says):

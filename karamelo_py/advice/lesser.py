@@ -1,6 +1,8 @@
 """Suggestions of `check`: fewer dimensions, or half of the body, suffice."""
 
 from collections.abc import Callable, Iterator
+from math import prod
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,13 +19,24 @@ from karamelo_py.advice.loads import (
     depends,
     given,
     rollers,
+    to_change,
 )
 from karamelo_py.advice.round import round_bodies
 from karamelo_py.kernels.laws import law_on
 from karamelo_py.points.kinematics import KINEMATICS, Space, free_from
 from karamelo_py.points.kinematics.twist import Twisted
-from karamelo_py.points.laws import initial_state, law_parts, law_traits, wave_speed_squared
+from karamelo_py.points.laws import (
+    can,
+    initial_state,
+    is_round,
+    law_parts,
+    law_traits,
+    wave_speed_squared,
+)
+from karamelo_py.points.laws.leaning import leans
+from karamelo_py.points.laws.placed import names_in, place_of
 from karamelo_py.points.laws.thin import Thin
+from karamelo_py.scene.domain import THIN as THIN_BODY
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
@@ -49,21 +62,22 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
         return
     round_ = domain.kin.hoops > 0
     whole = "thickness" if d == 3 else "length" if round_ else "cross-section"
-    directions: list[int] = []
-    many = 1
+    counts: dict[int, int] = {}  # layers by direction
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
         # A radial scene costs as much per point: two layers waste nothing.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
-            several = [axis for axis in rest if axis not in directions]
+            several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):
-                directions, many = [*directions, k], many * layers
-    if not directions:
+                counts[k] = layers
+    while counts and _leans(hub, rest := [axis for axis in range(d) if axis not in counts]):
+        del counts[min(counts)]
+    if not counts:
         return
-    rest = [axis for axis in range(d) if axis not in directions]
-    named = " and ".join(AXES[k] for k in directions)
-    whole = whole if len(directions) == 1 else "cross-section"
+    many = prod(counts.values())
+    named = " and ".join(AXES[k] for k in counts)
+    whole = whole if len(counts) == 1 else "cross-section"
     kind = "plane strain" if len(rest) == 2 else "a line"
     yield (
         f"all solids are uniform along {named}, and nothing moves in this direction: "
@@ -102,6 +116,8 @@ def _bar(hub: Hub, held: dict[int, Roller]) -> Words:
         prisms = all(_is_prism(solid, k, rest) for solid in solids)
         if len(columns) > 1 or not prisms or _is_led(hub, rest, held) or not acts_alike(hub, [k]):
             continue
+        if _leans(hub, [k]) or not all(is_round(solid.material.whole) for solid in solids):
+            continue
         volume = sum(float(solid.volume0.sum()) for solid in solids)
         length = sum(float(solid.hi[k] - solid.lo[k]) for solid in solids)
         many = len(x0) / (length / solids[0].h * solids[0].ppc)
@@ -112,7 +128,7 @@ def _bar(hub: Hub, held: dict[int, Roller]) -> Words:
             f"of a line{cost(hub, many, 1, _longer(hub, 1))}, with the same energies to some "
             "per cent (waves shorter than a few widths are slower in the bar), and cells need not "
             "fit into the width",
-            _domain_of(hub, [k], area),
+            _domain_of(hub, [k], area) + to_change(hub, THIN_BODY),
         )
         return
 
@@ -130,7 +146,7 @@ def _thin(hub: Hub, held: dict[int, Roller]) -> Words:
         whole = thickness * (1 + (k in held))
         if not layers or whole > THIN * wide or _is_led(hub, [k], held):
             continue
-        if not acts_alike(hub, rest):
+        if _leans(hub, rest) or not acts_alike(hub, rest):
             continue
         plate = "a plate with free faces, and"
         if k in held:
@@ -139,9 +155,30 @@ def _thin(hub: Hub, held: dict[int, Roller]) -> Words:
             f"{plate} nothing acts along {AXES[k]}: {layers} times the points "
             f"of plane stress{cost(hub, layers, 2, _longer(hub, 2))}, with the same energies to "
             "some per cent, and cells need not fit into the thickness",
-            _domain_of(hub, rest, f" and plane_stress(true, thickness={thickness:g})"),
+            _domain_of(hub, rest, f" and plane_stress(true, thickness={thickness:g})")
+            + to_change(hub, THIN_BODY),
         )
         return
+
+
+class Fewer(NamedTuple):
+    """A scene in fewer dimensions, as warnings of leaning directions see it."""
+
+    hub: Hub
+    d: int
+
+
+def _leans(hub: Hub, rest: list[int]) -> bool:
+    """Return True if a law has directions that do not fit a scene of the axes `rest` alone."""
+    d = len(rest)
+    for solid in hub.solids.values():
+        law = solid.material.whole
+        place = place_of(law)
+        lost = {axis + "0" for axis in AXES[d:]} & (names_in(place.formulas) if place else set())
+        # Directions would need other numbers if other axes became x and y.
+        if can(law, is_round) and (lost or rest != [*range(d)] or leans(law, Fewer(hub, d))):
+            return True
+    return False
 
 
 def _flows(hub: Hub) -> bool:
@@ -231,6 +268,8 @@ def _mirrored(hub: Hub) -> Words:
         return
     if not all(solid.region for solid in solids):
         return  # they may have velocities
+    if any(can(solid.material.whole, is_round) for solid in solids):
+        return  # directions may differ from their mirror image
     for k in range(free_from(domain.kin), domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2

@@ -6,8 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.advice.basics import is_zero
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.points.basis import support
 from karamelo_py.points.kinematics import KINEMATICS
+from karamelo_py.run.lower.build import features
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -109,6 +111,14 @@ def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
     basis, kin = hub.update.method.basis, hub.domain.kin
     nodes = support(basis, kin) / support(basis, KINEMATICS[d]())
     return f" (at this cell size about {points * nodes * longer:.2g} times the cost)"
+
+
+def to_change(hub: Hub, restrictions: Restrictions) -> str:
+    """Return words of the choices of a scene that another model does not support."""
+    refused = [feature for feature in features(hub) if restrictions.exclude(feature)]
+    return "".join(
+        f"; not with {one.words} (instead: {restrictions.instead_of(one)})" for one in refused
+    )
 
 
 def cells(x: np.ndarray, h: float) -> np.ndarray:

@@ -16,9 +16,10 @@ from karamelo_py.advice.loads import (
     depends,
     given,
     positions,
+    to_change,
 )
 from karamelo_py.points.laws import can, is_round
-from karamelo_py.scene.domain import Domain
+from karamelo_py.scene.domain import TWIST, Domain
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
@@ -233,7 +234,7 @@ def _cylinder(
         yield (
             f"{bodies} about one axis, which rotate and twist about it: {times}",
             f"{line} and axisymmetric(true, twist=true), y along the axis, and for the velocities "
-            f"around it {', '.join(lines)}",
+            f"around it {', '.join(lines)}" + to_change(hub, TWIST),
         )
         return
     yield (

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from karamelo_py.commands.thin import fit_to_domain
+from karamelo_py.commands.thin import fit_to_domain, refuse_flattening
 from karamelo_py.language import registry
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
@@ -271,6 +271,8 @@ def element(
         message = f"the directions of material '{material.id}' differ from point to point"
         raise ScriptError(message, argument="material", expected="directions given by numbers")
     law, kin = material.filled, KINEMATICS.get(kinematics)
+    if kinematics == "uniaxial-stress":
+        refuse_flattening(material, "kinematics", "3D with syy=0 and szz=0")
     if kin is None:
         law = ThinInLargeIncrements(material.whole)
         kin = PlaneStrain() if kinematics == "plane-stress" else Line()

@@ -82,6 +82,13 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
         hint = {1: "uniaxial_stress(true)", 2: "plane_stress(true)"}.get(domain.dimension)
         raise ScriptError(message, argument="active", expected=expected, hint=hint)
     refuse_across(domain, active)
+    if not active and thickness != 1:
+        name = "thickness" if dimension == 2 else "area"
+        message = f"{command}(false) does not use {name}={thickness:g}"
+        raise ScriptError(message, argument=name, expected=f"{command}(true, ...), or no {name}")
+    if active and domain.thin and thickness != domain.thickness:
+        message = f"the body has {command} with {domain.thickness:g} across already"
+        raise ScriptError(message, argument="active", expected=f"one {command}(true, ...)")
     if active and domain.kin.hoops:
         message = f"the scene is {domain.kin.word}, which has hoop stress"
         raise ScriptError(message, argument="active", expected=f"{domain.kin.word}(false)")
@@ -105,6 +112,15 @@ def refuse_uneven(hub: Hub, material: Material, argument: str) -> None:
         argument=argument,
         expected="cylindrical(true), or a material with equal axes y and z",
     )
+
+
+def refuse_flattening(material: Material, argument: str, instead: str) -> None:
+    if not is_round(material.whole):
+        raise ScriptError(
+            "the material is not the same in y and z, so that a bar of it would bend or flatten",
+            argument=argument,
+            expected=f"{instead}, or a material with equal axes y and z",
+        )
 
 
 def refuse_across(domain: Domain, active: bool) -> None:
@@ -144,10 +160,6 @@ def fit_to_domain(hub: Hub, material: Material) -> None:
                 argument="style",
                 expected="a solid that sustains tension, or plane strain",
             )
-    if hub.domain.dimension == 1 and not is_round(material.whole):
-        raise ScriptError(
-            "the material is not the same in y and z, so that a bar of it would bend or flatten",
-            argument="style",
-            expected="plane_stress in 2D, or a material with equal axes y and z",
-        )
+    if hub.domain.dimension == 1:
+        refuse_flattening(material, "style", "plane_stress in 2D")
     material.flat = Thin

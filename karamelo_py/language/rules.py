@@ -69,14 +69,17 @@ class Restrictions(NamedTuple):
             return feature.name not in self.only.get(feature.kind, (feature.name,))
         return feature.kind in self.without or feature.kind in self.but
 
-    def error(self, subject: Feature, feature: Feature) -> ScriptError:
+    def instead_of(self, feature: Feature) -> str:
         kind = feature.kind
         names = [AS_WRITTEN.get(kind, "{}").format(name) for name in self.only.get(kind, ())]
         instead = ", ".join(names[:-1]) + " or " * (len(names) > 1) + "".join(names[-1:])
+        return self.but.get(kind) or instead or feature.instead
+
+    def error(self, subject: Feature, feature: Feature) -> ScriptError:
         return ScriptError(
             f"{subject.words} does not support {feature.words}",
             mark=feature.mark or subject.mark,
-            expected=self.but.get(kind) or instead or feature.instead,
+            expected=self.instead_of(feature),
         )
 
 

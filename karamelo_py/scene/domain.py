@@ -17,7 +17,7 @@ NO_F_BAR = {"F-bar": "no anti_volumetric_locking: thin bodies do not lock"}
 TWIST = Restrictions(
     "twist", "axisymmetric(true) without twist, or 3D",
     only={"method": ("ulmpm", "tlmpm", "ulmpm/contacts")},
-    without=("series", "corners", "mass=corrected", "periodic", "rigid_body"),
+    without=("series", "corners", "mass=corrected", "periodic", "rigid_body", "newmark"),
     but={
         "tools": "ulmpm/contacts with fix contact/friction, which also rubs around the axis, or "
                  "fix angular_velocity_nodes",

@@ -101,8 +101,9 @@ class Values:
         first = self._used
         if first + count > CAPACITY:
             raise ScriptError(
-                f"there are more than {CAPACITY} values of fixes and computes",
-                hint="reuse the IDs of deleted fixes and computes, whose values remain in memory",
+                f"there are more than {CAPACITY} values of fixes, computes and elements",
+                hint="reuse the IDs of deleted fixes and computes, whose values remain in memory; "
+                "put further elements (25 values or more each) into another script",
             )
         self._used += count
         return first

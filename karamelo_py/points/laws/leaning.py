@@ -4,12 +4,16 @@ from collections.abc import Callable
 from typing import Any
 
 from karamelo_py.language.rules import known_failure
+from karamelo_py.points.laws import law_parts
+
+LEANING: dict[type, Callable[[Any, Any], bool]] = {}  # by kind of law
 
 
 def warn_of_leaning(
     kind: type, of: str, when: Callable[[Any, Any], bool], cure: str, title: str = "directions"
 ) -> None:
     """Warn of scenes, `when(law, scene)`, in which a law of `kind` would shear out of the plane."""
+    LEANING[kind] = when
     known_failure(
         kind,
         f"{title} out of the plane",
@@ -17,4 +21,14 @@ def warn_of_leaning(
         reason=f"the {of} of material '{{owner.id}}' lean: the body would shear out of its plane, "
         "which {scene.d}D prevents",
         cure=cure,
+    )
+
+
+def leans(law: Any, scene: Any) -> bool:
+    """Return True if `law` would shear out of a `scene`, of which it asks ``d`` and ``hub``."""
+    return any(
+        when(part, scene)
+        for part in law_parts(law)
+        for kind, when in LEANING.items()
+        if isinstance(part, kind)
     )

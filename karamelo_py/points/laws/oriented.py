@@ -12,8 +12,16 @@ import numpy as np
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
-from karamelo_py.points.kinematics import total
-from karamelo_py.points.laws.placed import ELASTIC, Oriented, State, formulas_of_place
+from karamelo_py.points.kinematics import KINEMATICS, total, unit
+from karamelo_py.points.laws.leaning import LEANING
+from karamelo_py.points.laws.placed import (
+    ELASTIC,
+    Oriented,
+    State,
+    formulas_of_place,
+    refuse_absent,
+    some_places,
+)
 from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.script.expressions import Expression
@@ -51,6 +59,7 @@ class Axes:
 
     def rotations(self, values: Values, x0: np.ndarray) -> np.ndarray:
         """Return rotations (n, 3, 3) with the axes as columns at positions `x0` (n, d)."""
+        refuse_absent(self.formulas, x0.shape[1], self.mark)
         numbers = [one.evaluate_points(values, x0) for one in self.formulas]
         if len(numbers) == 1:
             (angle,) = np.radians(numbers)
@@ -72,10 +81,7 @@ class Axes:
     def rows(self, values: Values, x0: np.ndarray, F: Any) -> np.ndarray:
         """Return the components (n, k) of the initial deformation gradient, a tensor such as F."""
         R = self.rotations(values, x0)
-        outside = [
-            R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places
-        ]
-        if np.abs(outside).max(initial=0) > LEANS:
+        if inclined(R, F):
             raise self.fault("the axes are inclined to the plane or line of the scene", x0[0])
         return np.stack([R[:, i, j] for i, j in F.places], axis=1)
 
@@ -86,6 +92,20 @@ class Axes:
             mark=self.mark,
             expected=f"{self.script_kind}; in 2D without z",
         )
+
+
+def inclined(R: np.ndarray, F: Any) -> bool:
+    """Return True if rotations (n, 3, 3) have components that a tensor such as F lacks."""
+    away = [R[:, i, j] for i in range(3) for j in range(3) if i != j and (i, j) not in F.places]
+    return bool(np.abs(away).max(initial=0) > LEANS)
+
+
+def _axes_lean(law: Any, scene: Any) -> bool:
+    F, at = unit(KINEMATICS[scene.d]()), some_places(law, scene)
+    return any(inclined(law.place.rotations(scene.hub.values, x0), F) for x0 in at)
+
+
+LEANING[Oriented] = _axes_lean  # the run refuses them
 
 
 def oriented(law: Any, axes: Axes | None) -> Any:

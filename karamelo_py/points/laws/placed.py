@@ -5,7 +5,7 @@ replaces them by the point's. Its :class:`Place` has the formulas. States start 
 directions; `with_directions` sets each point's when a scene is lowered.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Any, ClassVar, NamedTuple
@@ -52,6 +52,7 @@ class Direction:
 
     def at(self, values: Values, x0: np.ndarray) -> np.ndarray:
         """Return unit vectors (n, 3) at positions `x0` (n, d)."""
+        refuse_absent(self.formulas, x0.shape[1], self.mark)
         a = [one.evaluate_points(values, x0) for one in self.formulas]
         size = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         if not (wrong := ~(np.isfinite(size) & (size > 0))).any():
@@ -63,6 +64,17 @@ class Direction:
             mark=self.mark,
             expected="three numbers at every point, not all 0",
         )
+
+
+def refuse_absent(formulas: Sequence[Expression], d: int, mark: Mark | None) -> None:
+    """Refuse formulas of coordinates that a scene in `d` dimensions does not have."""
+    if absent := names_in(formulas) & {"x0", "y0", "z0"} - {*("x0", "y0", "z0")[:d]}:
+        message = f"a direction depends on {min(absent)}, which a scene in {d}D does not have"
+        raise ScriptError(message, mark=mark, expected="a formula of x0" + " and y0" * (d > 1))
+
+
+def names_in(formulas: Sequence[Expression]) -> frozenset[str]:
+    return frozenset().union(*(one.names for one in formulas))
 
 
 def formulas_of_place(hub: Scene, argument: Argument) -> tuple[Expression, ...]:
@@ -100,6 +112,10 @@ class Place:
     def __float__(self) -> float:
         return 0.0
 
+    @property
+    def formulas(self) -> tuple[Expression, ...]:
+        return sum((one.formulas for one in self.of if isinstance(one, Direction)), ())
+
     def rows(self, values: Values, x0: np.ndarray, _: Any = None) -> np.ndarray:
         """Return the numbers (n, k) of the law's field ``directions`` at `x0` (n, d)."""
         return np.hstack(
@@ -129,12 +145,15 @@ def any_formula(of: Sequence[Vector | Direction]) -> bool:
 
 def directions_in(law: "Placed", scene: Any) -> np.ndarray:
     """Return the directions (n, k) of some points of a scene with this law."""
-    rows = [
-        law.place.rows(scene.hub.values, solid.places[: min(solid.count, SOME)])
-        for solid in scene.hub.solids.values()
-        if place_of(solid.material.law) is law.place
-    ]
+    rows = [law.place.rows(scene.hub.values, x0) for x0 in some_places(law, scene)]
     return np.vstack(rows) if rows else np.empty((0, 0))
+
+
+def some_places(law: "Placed | Oriented", scene: Any) -> Iterator[np.ndarray]:
+    """Yield positions (n, d) of each solid with this law."""
+    for solid in scene.hub.solids.values():
+        if place_of(solid.material.law) is law.place:
+            yield solid.places[: min(solid.count, SOME)]
 
 
 def place_of(law: Any) -> Place | None:

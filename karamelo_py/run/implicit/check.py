@@ -37,12 +37,6 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     kin = method.kinematics(hub)
-    if update.scheme.traits.inertia and isinstance(kin, Twisted):
-        yield (
-            "has no inertia of rotation around an axis, as twist=true needs",
-            f"scheme(quasi-static), or {_EXPLICIT}",
-            None,
-        )
     if method.fields_per_solid and isinstance(kin, Twisted):
         yield "knows no friction of contact around an axis (twist=true)", _EXPLICIT, method.mark
     for solid in hub.solids.values():

@@ -111,7 +111,7 @@ def check_scene(hub: Hub) -> None:
             )
 
 
-def _features(hub: Hub) -> Iterator[Feature]:
+def features(hub: Hub) -> Iterator[Feature]:
     update, settings, method = hub.update, hub.settings, hub.update.method
     kin = method.kinematics(hub)
     mark, name = method.mark, registry.name_of("method", type(method))
@@ -121,6 +121,10 @@ def _features(hub: Hub) -> Iterator[Feature]:
     yield Feature("basis", method.basis_name, f"the basis {method.basis_name}", mark=mark)
     yield Feature("transfer", transfer, f"transfer {transfer}", mark=mark)
     yield Feature("scheme", scheme, f"scheme {scheme}", mark=update.scheme_mark)
+    if update.scheme.traits.implicit and update.scheme.traits.inertia:
+        words = f"scheme {scheme}, which has no inertia of rotation around an axis"
+        instead = "scheme(quasi-static) or scheme(musl)"
+        yield Feature("newmark", "", words, instead, update.scheme_mark)
     yield Feature("kinematics", kin.word, f"{kin.word} scenes")
     if not method.frame.moves:
         yield Feature("grids of solids", "", f"method {name}", "method(ulmpm, ...)", mark)
@@ -189,7 +193,7 @@ def _check_restrictions(hub: Hub) -> None:
         if restrictions is not None
     }
     if declared:
-        compare(declared, _features(hub))
+        compare(declared, features(hub))
 
 
 def thread_count(hub: Hub, points: int) -> int:
