@@ -217,3 +217,13 @@ def test_answers_of_help_name_what_there_is():
 def test_help_takes_commands_of_other_programs(capsys):
     assert main(["help", "unfix"]) == 1
     assert "delete_fix(ID)" in capsys.readouterr().err
+
+
+def test_help_groups_parameters_with_one_description_and_omits_one_that_repeats_the_type(capsys):
+    out = call(capsys, "help", "material", "hyperelastic")[1]
+    _, *kinds, text = out.partition("cp=, kappa=, alpha=")[2].splitlines()[:5]
+    assert [kind.split(":")[0].strip() for kind in kinds] == ["cp", "kappa", "alpha"]
+    assert out.count("Heat capacity") == 1 and text.strip().startswith("Heat capacity")
+    assert "x, y or z" not in call(capsys, "help", "internal_force")[1]
+    assert "File name" not in call(capsys, "help", "write_restart")[1]
+    assert "one of K, C; K when left out" in call(capsys, "help", "units")[1]

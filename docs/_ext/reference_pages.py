@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from karamelo_py.app.catalogue import COMMAND, describe_parameter, families, help_of
+from karamelo_py.app.catalogue import COMMAND, described, families, help_of
 from karamelo_py.language import registry
 
 TITLES = {
@@ -100,13 +100,10 @@ def _page(family: str, name: str, own: dict[str, list[str]]) -> str:
         parts.append(escaped(help_.text))
     if help_.parameters:
         parts.append("## Parameters")
-    for parameter in help_.parameters:
-        lines = [describe_parameter(parameter), parameter.description]
-        said = [escaped(" ".join(line.split())) for line in lines if line]
-        parts.append(
-            f"`{parameter.name}{'=' * parameter.keyword}`\n: "
-            + "\n\n  ".join(said or ["as said above"])
-        )
+    for group, lines in described(help_.parameters):
+        names = ", ".join(f"`{each.name}{'=' * each.keyword}`" for each in group)
+        said = [escaped(" ".join(line.split())) for line in lines]
+        parts.append(f"{names}\n: " + "\n\n  ".join(said or ["see above"]))
     for title, content in help_.sections.items():
         parts.append(f"## {title}")
         if title == "Example":

@@ -3,7 +3,7 @@
 import inspect
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
@@ -19,6 +19,7 @@ PROGRAM = "karamelo-py"
 STYLES_USAGE = "karamelo-py styles [FAMILY]"
 HELP_USAGE = "karamelo-py help COMMAND, karamelo-py help STYLE, or karamelo-py help FAMILY STYLE"
 _WIDEST = 88  # characters per line
+_FILLERS = {"a", "an", "the", "one", "of", "or"}
 
 
 def families() -> list[str]:
@@ -43,7 +44,9 @@ def describe_parameter(parameter: Parameter) -> str:
     if text == "anything":  # interpreted by the command or style
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]
-    if parameter.variadic:
+    if parameter.variadic and parts[0].startswith("one of "):
+        parts = ["some of" + parts[0].removeprefix("one of")]
+    elif parameter.variadic:
         parts.append("any number of them")
     if parameter.optional:
         if isinstance(default, bool):
@@ -51,7 +54,29 @@ def describe_parameter(parameter: Parameter) -> str:
         elif isinstance(default, float):
             default = f"{default:g}"
         parts.append("may be left out" if default is None else f"{default} when left out")
-    return ", ".join(parts)
+    return ("; " if parts[0].startswith(("one of ", "some of ")) else ", ").join(parts)
+
+
+def described(parameters: Iterable[Parameter]) -> Iterator[tuple[list[Parameter], list[str]]]:
+    """Parameters with a common description, and the lines that explain them: types, description.
+
+    A first sentence that only repeats the types is omitted.
+    """
+    for text, same in groupby(parameters, key=lambda p: p.description or describe_parameter(p)):
+        group = list(same)
+        names: dict[str, list[str]] = {}
+        for each in group:
+            names.setdefault(describe_parameter(each), []).append(each.name)
+        kinds = [f"{', '.join(names[k])}: {k}" if len(names) > 1 else k for k in names if k]
+        text = text if group[0].description else ""
+        first, *rest = re.split(r"(?<=\.)\s+", text, maxsplit=1)
+        if _words(first) <= _words(" ".join(kinds)):
+            text = "".join(rest)
+        yield group, [*kinds, *filter(None, [text])]
+
+
+def _words(text: str) -> set[str]:
+    return set(re.findall(r"\w+", text.lower())) - _FILLERS
 
 
 def print_styles(words: Sequence[str]) -> int:
@@ -188,14 +213,11 @@ def _explain(family: str, name: str) -> int:
         page.paragraph(text)
     if help_.parameters:
         page.heading("Parameters")
-        for (kind, description), alike in groupby(
-            help_.parameters, key=lambda each: (describe_parameter(each), each.description)
-        ):
-            group = list(alike)
+        for group, lines in described(help_.parameters):
             names = (f"{each.name}=" if each.keyword else each.name for each in group)
             page.say(f"  {', '.join(names)}")
-            page.paragraph(kind, indent=6)
-            page.paragraph(description, indent=6)
+            for line in lines:
+                page.paragraph(line, indent=6)
             if group[0].kind.family:
                 page.say(f"      karamelo-py help {group[0].kind.family} NAME explains one.")
     for title, content in help_.sections.items():
@@ -255,8 +277,8 @@ def _explain_argument(word: str, parameters: dict[str, Parameter]) -> None:
     of = f"{parameter.name}, an argument of " if word != parameter.name else "an argument of "
     page.paragraph(of + ", ".join(parameters))
     page.say()
-    page.paragraph(describe_parameter(parameter), indent=6)
-    page.paragraph(parameter.description, indent=6)
+    for line in next(described([parameter]))[1]:
+        page.paragraph(line, indent=6)
     page.say()
     page.say(f"karamelo-py help {owner} explains the rest.")
 

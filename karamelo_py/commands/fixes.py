@@ -164,7 +164,7 @@ Direction = Literal["x", "y", "z"]
 
 
 def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the centre of mass of a group, as a formula that stays up to date.
+    """Give the centre of mass of a group, re-evaluated whenever it is used.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
 
 def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the internal force of a group, as a formula that stays up to date.
+    """Give the internal force of a group, re-evaluated whenever it is used.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
 
 def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the force that fixes apply to a group, as a formula that stays up to date.
+    """Give the force that fixes apply to a group, re-evaluated whenever it is used.
 
     Parameters
     ----------

@@ -274,10 +274,10 @@ def units(
     time: Annotated[str, Literal[*TIMES]],
     temperature: Literal["K", "C"] = "K",
 ) -> None:
-    """Name the consistent units of the scene, for labels of pictures and plots, dumps and banner.
+    """Name the consistent units, for labels in pictures, plots, dumps and the banner.
 
     No number is converted. A scene in mm, g, ms has forces in N, stresses in MPa and energies in
-    mJ. Before the first step, densities outside 10 to 100000 kg/m^3 (gases: below 0.001) and wave
+    mJ. Before the first step, densities outside 10 (gases: 0.001) to 100000 kg/m^3 and wave
     speeds outside 1 m/s to 50 km/s give a warning.
 
     Parameters

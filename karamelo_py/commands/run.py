@@ -162,7 +162,7 @@ def run_time(
     time
         Duration, from now.
     on_trouble
-        As in run.
+        ``halve``: after a failure, return to the last good state and halve the step, as in run.
 
     Example
     -------
@@ -188,7 +188,7 @@ def run_until(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
         Formula of time, timestep, dt and published values; a value other than 0 ends the run. NaN
         is an error.
     on_trouble
-        As in run.
+        ``halve``: after a failure, return to the last good state and halve the step, as in run.
 
     Example
     -------
@@ -210,7 +210,7 @@ def run_while(hub: Hub, condition: Expression, *, on_trouble: OnTrouble = "stop"
     condition
         Formula of time, timestep, dt and published values; 0 ends the run. NaN is an error.
     on_trouble
-        As in run.
+        ``halve``: after a failure, return to the last good state and halve the step, as in run.
 
     Example
     -------

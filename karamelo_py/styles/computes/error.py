@@ -227,13 +227,14 @@ class Reference(Compared, Compute):
         over a coordinate.
     file
         Columns separated by commas, semicolons or blanks, with names in the first row (else 1, 2,
-        ...); # begins a comment line. The first column is the time, or for points a coordinate or
-        another column by its name.
+        ...); # begins a comment line. The first column is the time. For points it is named after a
+        column of points, such as x, y0 or T, over which the curve is given.
     column
-        The column to compare with; for points also their column, such as s11 or vx.
+        The column of the file to compare with. For points, the name must also be a column of
+        points, such as s11 or vx.
     norm
-        ``L1``, ``L2`` (default) or ``max``, and ``absolute`` (default) or ``relative``, in any
-        order.
+        At most one of ``L1``, ``L2`` (default) and ``max``, and one of ``absolute`` (default) and
+        ``relative``, in any order.
 
     Example
     -------
@@ -256,7 +257,7 @@ class Reference(Compared, Compute):
     error
     """
 
-    syntax = "group|value, file, column[, L1|L2|max][, absolute|relative]"
+    syntax = "subject, file, column[, L1|L2|max][, absolute|relative]"
     published = ("", "now", "curve")
     remembers = ("norm",)
 

@@ -53,7 +53,7 @@ class Summand(NamedTuple):
 
 
 class ForceOn(Compute):
-    """Measure the force on a solid or of fixes, its torque, and its point of action.
+    """Measure the force on a solid, or exerted by fixes, with its torque and point of action.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class ForceOn(Compute):
         A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A fix:
         its force on its group. Several: their sum.
     x, y, z
-        Position that the torque is about; default: the origin.
+        Position about which the torque is taken.
 
     Example
     -------
@@ -76,9 +76,9 @@ class ForceOn(Compute):
     ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, tool or surface takes the opposite
     force.
 
-    The point of action is the nearest to x, y, z on the line of action, in 3D on the central axis,
-    along which a torque may remain. With the torque about the origin, the line meets y = 0 at x =
-    ID_tz/ID_y.
+    The point of action is the point of the line of action closest to (x, y, z). In 3D the line is
+    the central axis; a torque about it may remain. With the torque about the origin, the line
+    meets y = 0 at x = ID_tz/ID_y.
 
     Walls (fix velocity_nodes), loads and weight count only if their fixes are named. Forces act at
     present positions of points and nodes at the beginning of the step (in load steps torques err by
