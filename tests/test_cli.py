@@ -199,7 +199,7 @@ def test_a_number_that_a_transfer_does_not_take_is_taken_away(run_interpreted):
     """As docs/script.md has it."""
     script = 'transfer = "FLIP"\nalpha = 1\nmethod(ulmpm, transfer, linear, alpha)\n'
     chosen = "-var", "transfer", "APIC"
-    hint = "hint: -var alpha mechanical takes it away"
+    hint = "hint: -var alpha mechanical removes it"
     assert hint in run_interpreted(script, *chosen, status=1).err
     assert "error" not in run_interpreted(script, *chosen, "-var", "alpha", "mechanical").err
 

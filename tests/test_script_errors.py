@@ -222,7 +222,7 @@ COMMANDS = [
     ("fix(1, all, body_force, 0, 1)", 5, "such as n1"),
     ("method(ulmpm, MLS, quadratic-spline, 0.9)", 38, "MLS takes no number"),
     ("a = 1\nmethod(ulmpm, PIC, linear, a, mechanical)", 28, "method(ulmpm, PIC, linear, mech"),
-    ("a = 1\nmethod(ulmpm, APIC, linear, a)", 29, "hint: -var a mechanical takes it away"),
+    ("a = 1\nmethod(ulmpm, APIC, linear, a)", 29, "hint: -var a mechanical removes it"),
     ("method(ulmpm, FLIP, cubic, 1)", 21, "did you mean 'cubic-spline'?"),
     ("method(ulmpm, FLIP, quadratic spline, 1)", 21, "did you mean 'quadratic-spline'?"),
     ("region(r, circle, 0, 0, 1)", 11, "the style cylinder"),

@@ -317,4 +317,4 @@ def test_a_half_start_shows_no_more_than_the_speed_at_a_wall(run_interpreted):
 
 def test_where_there_is_no_half_start(run_interpreted):
     said = run_interpreted(block(1, "run(1)", scheme="newmark, start=half"), status=1).err
-    assert "implicit steps take velocities at their ends" in said
+    assert "start is for explicit schemes" in said

@@ -49,7 +49,9 @@ registry.may_differ(print_)
 
 
 def value(hub: Hub, expression: Expression) -> float:
-    """Give the present value of a formula, as a constant number; also called ``evaluate``.
+    """Give the present value of a formula, as a constant number.
+
+    ``value`` and ``evaluate`` are names of the same command.
 
     Parameters
     ----------

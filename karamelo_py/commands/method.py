@@ -37,13 +37,13 @@ def method(
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
         First the numbers of the transfer (the FLIP coefficient, the order of XPIC), of the basis
-        and the method; then words in any order. ``thermo-mechanical``: heat flows between points.
-        ``gradient-enhanced``: FLIP also maps the velocity gradient. ``det``, ``diagonal``,
-        ``stretch`` or ``corners``: the variant of cpgimp. ``R4``, ``Q4``, ``R8``, ``H8``, ``T3`` or
-        ``Tet4``: the domains of the cpdi methods.
+        and the method; then words in any order. ``thermo-mechanical``: heat flows between points
+        (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the velocity
+        gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp. ``R4``,
+        ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
     mass
-        ``corrected``: remove most of the error of the lumped masses from the accelerations, with
-        APIC, AFLIP, MLS or TPIC and splines. Linear momentum is conserved.
+        ``corrected``: remove from the accelerations most of the errors due to mass lumping.
+        Available with APIC, AFLIP, MLS or TPIC and splines. Linear momentum is conserved.
 
     Example
     -------
@@ -56,17 +56,17 @@ def method(
 
     Notes
     -----
-    Before the first solid.
+    This command must precede the first solid.
 
-    ``method(auto)`` reads the script up to its first run and chooses method, transfer, basis,
-    scheme, mass and F-bar for the scene (docs/choose.md).
+    ``method(auto)``, without further arguments, reads the script up to its first run and chooses
+    method, transfer, basis, scheme, mass and F-bar for the scene (docs/choose.md).
 
     ``thermo-mechanical``: before each momentum update, heat flows between materials with a
     temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
     a temperature), also between bodies with common nodes. Other heat comes only from fixes. Points
-    take temperature increments (as in FLIP), so only conduction smooths temperatures. `dt` also
-    respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d dimensions. If
-    ``mechanical``, points are heated only by their own work.
+    take temperature increments (as in FLIP, for any velocity transfer), so only conduction smooths
+    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
+    dimensions. With ``mechanical``, points are heated only by their own plastic and viscous work.
 
     See Also
     --------
@@ -109,13 +109,14 @@ def auto(hub: Hub, kind: Literal["auto"]) -> None:
     """Choose the method for the scene that the rest of the script describes.
 
     The script is read up to its first run; materials, bodies, speeds, contact and duration select a
-    row of the table in docs/choose.md. Banner and ``check`` show the lines. ``scheme``,
-    ``anti_volumetric_locking`` and ``dt_factor`` of the script take precedence.
+    row of the table in docs/choose.md. Banner and ``check`` show the chosen lines, such as
+    ``method(...)``. ``scheme``, ``anti_volumetric_locking`` and ``dt_factor`` of the script take
+    precedence.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
     if not interpreter.has_more:
-        message = "method(auto) reads the script ahead, and there is nothing after it"
+        message = "method(auto) reads the script ahead, but no lines follow"
         hint = "in Python: Simulation.script(...) with the whole scene, or a method by name"
         raise ScriptError(message, expected="the whole scene and a run after it", hint=hint)
     chosen = choosing.choose(hub)
@@ -142,8 +143,8 @@ def scheme(
     arguments
         Arguments of the style; explicit schemes have none.
     start
-        ``half``: forces act for half of the first explicit step, so that velocities and kinetic
-        energies belong to the logged time.
+        With ``half``, forces act for half of the first explicit step, so that velocities and
+        kinetic energies belong to the logged time; with ``full`` (default), for the whole step.
 
     Example
     -------
@@ -153,10 +154,11 @@ def scheme(
     Notes
     -----
     Explicit positions belong to the end of a step, velocities to its middle. With ``full`` the
-    initial velocity is the velocity half a step before the start: a projectile is g dt t/2 too far,
-    and logged velocities and kinetic energies are half a step early. With ``half`` both are
-    second-order accurate in the step, and points also store their previous velocity. Velocities set
-    later, such as ``sim.points["vx"] = values``, belong to half a step earlier.
+    initial velocity is taken as the velocity at t = -dt/2. The position of a projectile then has
+    the error g dt t/2, and logged velocities and kinetic energies lag by half a step. With ``half``
+    positions and velocities are second-order accurate in the step, and points also store their
+    previous velocity. Velocities set later, such as ``sim.points["vx"] = values``, are taken as the
+    velocities half a step earlier.
 
     See Also
     --------
@@ -170,11 +172,11 @@ def scheme(
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
             error.expected = "start=full or start=half" if error.hint else error.expected
-        for name in PUBLISHED:  # a script that reads these is not at fault
+        for name in PUBLISHED:  # avoid follow-up errors about these names
             hub.values.publish(name)
         raise
     if start == "half" and chosen.traits.implicit:
-        message = "implicit steps take velocities at their ends"
+        message = "start is for explicit schemes; implicit velocities belong to the end of a step"
         raise ScriptError(message, argument="start", expected="an explicit scheme, or no start")
     update, runs = hub.update, len(hub.runs)
     update.half_start = start == "half"
@@ -216,8 +218,8 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Low-order basis functions constrain the volume of each point, so that nearly incompressible and
     plastic bodies are too stiff. Averaging the volume increment with the basis weights removes the
-    excess constraints (Coombs et al. 2018); the mean stress is averaged likewise, so that forces do
-    the work of the averaged strain.
+    excess constraints (Coombs et al. 2018). The mean stress is averaged with the same weights, so
+    that nodal forces are work-conjugate to the averaged strain.
 
     Example
     -------
@@ -227,10 +229,10 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
     -----
     It costs one more pass over the points per stress update and one per force evaluation.
 
-    Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p of the point plus a
-    fraction of the difference from the averaged pressure: (sin(phi) - sin(psi))/(sin(phi) (1 -
-    sin(psi))). With p alone, non-dilatant sand would lose half of its strength. Load steps use p
-    alone, so do not average such sand there.
+    Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p + c (p_mean - p),
+    where p is the pressure of the point, p_mean the averaged pressure, and c = (sin(phi) -
+    sin(psi))/(sin(phi) (1 - sin(psi))). With p alone, non-dilatant sand would lose half of its
+    strength. Implicit load steps use p alone: do not use F-bar for non-dilatant sand with them.
 
     See Also
     --------
@@ -400,7 +402,7 @@ class _Call:
                 f"{who} takes {takes}",
                 mark=argument.mark,
                 expected=self.instead(chosen),
-                hint=f"-var {word} mechanical takes it away" if word else None,
+                hint=f"-var {word} mechanical removes it" if word else None,
             )
         for family in FAMILIES:
             for name in registry.names(family):

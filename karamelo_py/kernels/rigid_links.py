@@ -1,14 +1,16 @@
 """Contacts and joints between rigid bodies, solved together with all other loads.
 
 A link has a position, 3 x 6 matrices A and B, and the relative velocity r = A U_a - B U_b of two
-bodies; its impulse p acts on the first, -p on the second. Impulses are stiff and implicit in the
-velocities at the end of the step (`SOFT` is the fraction of an approach that remains)::
+bodies there; its impulse p acts on the first, -p on the second, so that momentum and angular
+momentum are conserved to round-off. Impulses are stiff and implicit in the velocities at the end of
+the step (`SOFT` is the fraction of an approach that remains)::
 
     contact:  p_n = max(-(n . r + g / dt), 0) / (SOFT w_n), p_t = -r_t / (SOFT w_t), at most mu p_n
     joint:    p_k = -(e_k . r + c_k / dt) / (SOFT w_k), for each direction e_k that it holds
 
-with gap g, displacement c of the joint, and w the velocity change per impulse. Newton's method
-finds the velocities of all bodies, with their contacts with points.
+with gap g, displacement c from where the joint holds, and w the velocity change per unit impulse.
+Newton's method finds the velocities of all bodies together, including their contacts with material
+points.
 
 Collisions come first and use the velocities before the forces of the step, so bodies at rest do not
 bounce (Guendelman, Bridson & Fedkiw 2003, "Nonconvex rigid bodies with stacking"). The fastest
@@ -40,9 +42,9 @@ from karamelo_py.kernels.surfaces import (
 
 SOFT = 1e-5
 GIVEN_BACK = 0.1  # fraction of a penetration removed per step
-SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # squared residual over squared momentum
+SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual over momentum, both as sums of p^2 / m
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope over initial slope
-SLOW = 1e-9  # largest approach without a collision, over the fastest
+SLOW = 1e-9  # collisions slower than this fraction of the fastest are ignored
 COLLISIONS = 50  # at most, per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
@@ -55,14 +57,14 @@ LINK = np.dtype([
     ("impulse", *_VECTOR), ("hit", *_VECTOR),  # on the first body; by collisions
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
     ("most", *_NUMBER),  # friction bound
-    ("slot", np.int64), ("torque", np.int64),  # of force and torque; torque 0: none
-    ("sign", *_NUMBER),  # 1: they are of the first body, -1: of the second
+    ("slot", np.int64), ("torque", np.int64),  # indices of published force, torque; torque 0: none
+    ("sign", *_NUMBER),  # 1 if they act on the first body, -1 if on the second
 ])  # fmt: skip
 JOINT = np.dtype([
     ("first", np.int64), ("second", np.int64),
     ("at", *_VECTOR), ("end", *_VECTOR),  # initial positions in the first and second body
     ("axes", *_MATRIX),  # initial, as rows
-    ("holds", np.int64, 6),  # displacement along, rotation about each axis
+    ("holds", np.int64, 6),  # 1 if held: displacement along each axis, then rotation about each
     ("spring", np.int64), ("stiffness", *_NUMBER), ("damping", *_NUMBER), ("length", *_NUMBER),
     ("slot", np.int64), ("torque", np.int64),
 ])  # fmt: skip
@@ -82,7 +84,7 @@ class Meeting(NamedTuple):
     first: LinkedPart
     second: LinkedPart
     numbers: np.ndarray  # (2,) mu, restitution
-    slots: np.ndarray  # (3,) of force and torque; 1 if of the first part, else -1
+    slots: np.ndarray  # (3,) indices of force, of torque; 1: on the first part, -1: on the second
 
 
 class NoLinks(NamedTuple):
@@ -94,7 +96,7 @@ class Links(NamedTuple):
 
     touches: tuple[Meeting, ...]
     joints: np.ndarray  # (k,) JOINT
-    published: np.ndarray  # (k, 2) slots of forces and torques
+    published: np.ndarray  # (k, 2) indices of published forces and torques
     rows: np.ndarray  # (n,) LINK
     count: np.ndarray  # (1,) int64
     dt: np.ndarray  # (1,)
@@ -103,7 +105,7 @@ class Links(NamedTuple):
     free: np.ndarray  # (B + 1, 6) int64: index of the unknown, or -1
     u: np.ndarray  # (B + 1, 6) velocities
     old: np.ndarray  # before the step
-    jump: np.ndarray  # by collisions
+    jump: np.ndarray  # velocity change by collisions
     trial: np.ndarray
     rest: np.ndarray
     trial_rest: np.ndarray
@@ -666,7 +668,10 @@ def _approach(links, link, dt):
 
 @noinline
 def _hit(links, link):
-    """Resolve the collision of a contact; friction stops its slip, up to mu times the push."""
+    """Resolve the collision of a contact.
+
+    Friction stops its slip, with an impulse of up to mu times the normal impulse.
+    """
     _set_levers(links, link)
     _set_weight(links, link)
     W, n, r, p = links.weight, link.ways[0], link.slip, link.impulse
@@ -682,7 +687,7 @@ def _hit(links, link):
     if link.mu > 0 and square > 0:
         for k in range(3):
             W[k, 3] = -link.restitution * along * n[k] - r[k]
-            W[k, k] += 1e-12 * trace  # directions that neither can move in
+            W[k, k] += 1e-12 * trace  # regularises directions in which neither body can move
         _solve_three(W, p)
         normal = total = 0.0
         for k in range(3):
@@ -693,7 +698,7 @@ def _hit(links, link):
                 p[k] = n[k] - link.mu * (r[k] - along * n[k]) / sqrt(square)
             rate = _along(links, n, p)
             for k in range(3):
-                # Omit friction that would jam the contact.
+                # Drop friction if it would prevent separation.
                 p[k] = -(1 + link.restitution) * along / rate * p[k] if rate > 0 else push * n[k]
     work = 0.0
     for k in range(3):

@@ -28,20 +28,20 @@ class Surface(NamedTuple):
     low: np.ndarray  # (2 l, d) box corners; the last l nodes are leaves
     high: np.ndarray
     faces: np.ndarray  # (m, d, d): face, corner, axis
-    odd: bool  # faces have no sides: an odd number of crossings encloses
+    odd: bool  # faces are unoriented: inside where a ray crosses an odd number of them
 
 
 class Convex(NamedTuple):
     """Region below planes and within a ball or (infinite) cylinder."""
 
     planes: np.ndarray  # (k, d + 1): inward normals, and their products with a point on the plane
-    across: np.ndarray  # (d,) 1 along axes across which it is round, else 0
+    across: np.ndarray  # (d,) 1 for axes that count in the radius, 0 along a cylinder's axis
     centre: np.ndarray  # (d,)
     radius: float
 
 
 def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surface:
-    """Put `faces` (m, d, d) into a tree, boxes wider by `margin`."""
+    """Build a tree of `faces` (m, d, d), its boxes enlarged by `margin`; `odd` as in `Surface`."""
     count, _, d = faces.shape
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
@@ -317,12 +317,15 @@ class Outside(NamedTuple):
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, negative outside; exact below `reach`."""
+    """Return the depth of `x` in a shape, negative outside. It is exact where below `reach`."""
 
 
 @point_function(otherwise=True)
 def slopes(shape, kin, x, reach, within_and_step):
-    """Return the depth a step before minus a step after `x` along each axis."""
+    """Return depth(x - step e_k) - depth(x + step e_k) for each axis k, about -2 step grad(depth).
+
+    `within_and_step` are the depth at `x`, and the step.
+    """
     return _slopes_across(shape, kin, x, reach, within_and_step[1])
 
 
@@ -410,7 +413,8 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Functions of positions (n, d) and a reach: depths (n,), < 0 outside; distances and their largest
-# components, at most `reach`.
+# Functions of positions (n, d) and a reach. They return, per position (n,): the depth, negative
+# outside; the distance to the nearest face; and the largest component of the vector to it. Each is
+# at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
 offsets = _of_positions(_offset)

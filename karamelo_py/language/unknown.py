@@ -68,7 +68,7 @@ def no_value(name: str, mark: Any) -> ScriptError:
 def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
     kind = "command" if registry.knows("command", name) else "function"
     if name in WORDS:
-        expected = "a number or formula; NULL, INF and EDGE are arguments by themselves"
+        expected = "a number or formula; NULL, INF and EDGE must be whole arguments"
         return ScriptError(f"{name} is not a number", mark=mark, expected=expected)
     if kind == "command" or name in FUNCTIONS:
         expected = f"{name}(...)" if kind == "command" else usage(name)
@@ -78,10 +78,11 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
         return other
     if name == "i":
         return ScriptError(
-            "'i' is the number of a point in Karamelo, which formulas cannot use here",
+            "'i' is the number of a point in Karamelo, and not available in formulas here",
             mark=mark,
             expected="a formula of positions",
-            hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) also scatters over 0 to 1",
+            hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) gives "
+            "pseudo-random numbers between 0 and 1",
         )
     published = [value for value in script.hub.values.names() if value not in SEEDS]
     hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])
@@ -120,7 +121,7 @@ def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None
     if close and not (name in energies and close in script.variables):
         return f"did you mean '{close}'?", close
     if re.match("leq|geq", name):
-        return f"{name[:3]} goes before a bound, in fix velocity_nodes only", None
+        return f"write {name[:3]} directly before a bound, in fix velocity_nodes only", None
     makes = ("", "fix", "compute")
     later = {ID: line for _, kind, ID, line in _ahead(script) if kind in makes}
     if below := nearest(name, later):
@@ -147,9 +148,9 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield later statements: definition, ID and line.
+    """Yield (statement, command or "" for an assignment, ID or name, line) of later statements.
 
-    From `back` statements before the next one, innermost script first.
+    The innermost script comes first, from `back` statements before its next one on.
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
@@ -223,7 +224,7 @@ def listed(names: Iterable[str]) -> str:
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
 
 
-# Shapes that scripts of 2020 name instead of the style region.
+# Shapes that scripts of 2020 name where the style ``region`` is expected.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",

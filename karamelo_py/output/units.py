@@ -87,7 +87,11 @@ def time_text(time: float, unit: str) -> str:
 
 
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
-    """Factor and name of the largest metric unit in which `size` is at least 0.1."""
+    """Return the factor and name of a metric unit that suits `size`, given in `unit`.
+
+    It is the largest metric unit in which `size` is at least 0.1, or else the smallest. `unit`
+    stays, with the factor 1, for a size of 0 or from 0.1 to 10^4, and if it is not metric.
+    """
     metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
     if unit not in metric or not size or 0.1 <= size < 1e4:
         return 1.0, unit

@@ -75,10 +75,11 @@ known_failure(
 
 
 class USLUnlimited(NamedTuple):
-    """usl as first published, without the limit at light nodes.
+    """usl as first published, without usl's limit for nodes of small mass.
 
-    A point that has just entered a cell gives the node ahead little mass but much force f, and so
-    receives the strain f dt / m. For comparison with usl.
+    A point that has just entered a cell gives the far node almost no mass m but a finite force f.
+    The velocity change f dt / m of that node is then huge, and so is the strain increment that the
+    point gets back. This scheme is meant for comparison with usl.
 
     Example
     -------

@@ -16,7 +16,7 @@ from karamelo_py.points import laws
 from karamelo_py.points.frames import inverse_stretch_squared, pulled_back
 from karamelo_py.points.kinematics import Line
 
-# the flow takes the column of a 1D force
+# Heat flow is stored in the column where a 1D force would be.
 HEAT = eq.NodeColumns("sums", lambda kin: 0, pair, lambda kin: of_force(Line()))
 FLOW = eq.NodeColumns("sums", HEAT.end, scalar, lambda kin: of_force(Line()) + 1)
 
@@ -30,7 +30,7 @@ class Capacity(StepField):
 
 
 class Conductance(StepField):
-    """Conductivity times volume."""
+    """Conductivity times volume of a point."""
 
 
 class Volume(StepField):
@@ -38,7 +38,7 @@ class Volume(StepField):
 
 
 class Supply(StepField):
-    """Heat per time supplied by fixes."""
+    """Heat per time that fixes supply to a point."""
 
     columns = ("gamma",)
 
@@ -56,13 +56,16 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # in the order
 
 
 def at_least_round_off(weight):
-    """Avoid 0, as nodes with only a gradient need a temperature."""
+    """Return `weight`, but at least round-off.
+
+    Nodes that a point reaches only by its gradient need a temperature, too.
+    """
     return max(weight, round_off(weight))
 
 
 @eq.reads("mass", "state", "material")
 def content(pt):
-    """Return and store heat capacity, conductivity times volume, and temperature."""
+    """Store and return heat capacity, conductivity times volume, and temperature of a point."""
     (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
@@ -72,7 +75,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # for fixes
+    # initial values, which fixes change
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -112,7 +115,7 @@ class HeatContent(eq.NodalQuantity):
 
 @eq.reads("state", "material", "deformation gradient", "heat gradient", "conductance")
 def flow(pt):
-    """Return heat flow times volume, (d,)."""
+    """Return the heat flow of a point times its volume, (d,)."""
     _, _, f = pt.law_state_F
     against = pulled_back(pt.w.frame, pt.kin, heat_gradient(pt), f)
     return -of_present(pt.p, pt.of(Conductance)[0, pt.p]) * against
@@ -147,7 +150,7 @@ class TemperatureGradient(eq.Task):
         return x - x
 
     def gathered(task, node, total):
-        # no hoop part
+        # a scalar has no hoop component in axisymmetry
         return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
 
     def updated(task, pt, total, totals, fastest):
@@ -174,7 +177,10 @@ class Warming(eq.Task):
         return fma(weight, node.w.nodes.update[node.i, 1], change), mean
 
     def updated(task, pt, total, totals, fastest):
-        """Report the factor by which conduction is faster than in the undeformed body."""
+        """Store the new temperature, and report how much faster conduction is.
+
+        The factor reported compares the deformed with the undeformed body.
+        """
         law, state, f = pt.law_state_F
         T, p = pt.of(Temperature)[0, pt.p], pt.p
         capacity = pt.of(Capacity)[0, p]

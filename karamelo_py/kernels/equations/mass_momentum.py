@@ -11,13 +11,13 @@ from karamelo_py.points.transfers import affine_velocity, nodal_momentum
 
 
 class Normal(SummedField):
-    """Nodal sum of m grad N, which points out of a body."""
+    """Nodal sum of m grad N, which points out of a body (contact)."""
 
     shape = vector
 
 
 class Centre(SummedField):
-    """Nodal sum of mass times position, for gaps."""
+    """Nodal sum of mass times position, to find gaps between solids."""
 
     shape = vector
 
@@ -29,6 +29,7 @@ def rigid_mass(pt):
 
 @eq.reads()
 def position(pt):
+    """Return the position (d,) after the move if centres are needed, else ()."""
     return () if field(pt.w.nodes.fields, Centre) is None else pt.y
 
 
@@ -37,7 +38,7 @@ def momentum(pt, node):
 
 
 def affine_momentum(pt, w):
-    """Return the momentum and its gradient if affine, else ()."""
+    """Return the momentum at the point and its gradient, or () if the transfer is not affine."""
     at_point = pt.mass * pt.v
     if not len(pt.moment):
         return () if nodal_momentum.defined(type(w.transfer)) else (at_point, ())

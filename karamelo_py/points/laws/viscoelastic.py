@@ -154,17 +154,17 @@ class Viscoelastic(NamedTuple):
 
     Notes
     -----
-    Finite linear viscoelasticity (Simo 1987; Simo & Hughes 1998, section 10.4): tau = tau_e - sum
-    (g s - h), with the Kirchhoff stress tau_e of the elastic law, s = dev tau_e, and internal
-    stresses h that follow s and decay: h' = g s' - h/tau. The rate is convected with the body.
-    Steps are exact for a constant rate of s. The relaxation modulus is G(t) = G (1 - sum g (1 -
-    exp(-t/tau))); the volume response is elastic.
+    Finite linear viscoelasticity (Simo 1987; Simo & Hughes 1998, section 10.4): the Kirchhoff
+    stress is k - sum dev(g s - h), where k is the Kirchhoff stress of the elastic law, s = dev k,
+    and the internal stress h of each term follows s and decays with the relaxation time tau: h' = g
+    s' - h/tau. Rates are upper-convected (Oldroyd). Steps are exact for a constant rate of s. The
+    relaxation modulus is G(t) = G (1 - sum g (1 - exp(-t/tau))); the volume response is elastic.
 
     Each branch dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``), with the tangent
     shear modulus G of the elastic law along the last strain increment; this heats a material with a
-    temperature. Small strains store |h|^2/(4 g G) in a branch. A cycle to three times the length
-    dissipates its work within 8 %. Fix initial_stress starts from a relaxed body, with 1 - sum g of
-    the stiffness.
+    temperature. Small strains store |h|^2/(4 g G) in a branch. In a closed cycle to a stretch of 3,
+    the reported dissipation matches the work done to within 8 %. With fix initial_stress the body
+    is fully relaxed, so its shear modulus is (1 - sum g) G.
 
     See Also
     --------

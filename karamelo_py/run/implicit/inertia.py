@@ -38,10 +38,11 @@ class Rest:
 class Motion:
     """Inertia by the Newmark rules and generalized-alpha.
 
-    With alpha, (1 - alpha_m) a' + alpha_m a balances (1 - alpha_f) f' + alpha_f f. Points store a
-    minus the acceleration of the forces, which is stable with the losses of the transfer. `before`
-    (m, d) are the initial residual forces; `fixed` and `prescribed` (m, d) mask held components and
-    give their velocities.
+    Generalized-alpha balances (1 - alpha_m) a' + alpha_m a, times mass, with (1 - alpha_f) f' +
+    alpha_f f (primes: end of the step). Points store the difference between a and the acceleration
+    due to the forces, initially 0, because storing a would be unstable with the losses of the
+    transfer. `before` (m, d) are the residual forces at the beginning; `fixed` and `prescribed`
+    (m, d) mask held components and give their velocities.
     """
 
     def __init__(
@@ -92,7 +93,7 @@ class Motion:
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Forces per mass (m, d) for accelerations `a`."""
+        """Forces per mass (m, d), at the end of the step, that balance accelerations `a` there."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 
@@ -100,7 +101,11 @@ class Motion:
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Work at held nodes by mean forces (m, d), as the trapezoidal rule requires."""
+        """Work done at held nodes in this step, with the mean of the forces at its two ends.
+
+        For a linear body under the trapezoidal rule, it equals the change of the energy. `reaction`
+        (m, d) are the forces of the fixes at the end.
+        """
         old, new, fixed = self.v, self.prescribed, self.fixed
         after = self.mass * self.acceleration(u) - reaction
         moving = 0.5 * self.mass * (new - old) * (new + old)

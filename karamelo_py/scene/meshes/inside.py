@@ -9,14 +9,15 @@ from karamelo_py.script.errors import ScriptError
 
 # Largest distance between equal vertices, relative to the size, because files have few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # positions on a shell that are tested to be in another
-_SETS = 8  # sets of shells that do not overlap
+_SAMPLES = 4000  # sample positions, about, that test whether one shell lies in another
+_SETS = 8  # maximum number of sets of shells that do not overlap
 
 
 class Skin:
     """Sets of `faces` (m, d, d), each closed.
 
-    Inside is what a set encloses, or within `tolerance` of a face; nothing if `open`.
+    A position is inside if a set encloses it or a face is within `tolerance`. With `open`, only
+    positions within `tolerance` of a face are.
     """
 
     def __init__(
@@ -51,7 +52,8 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
     """Outer faces (m, d, d), oriented outwards; in 1D pairs, the lower one first.
 
-    Quadrilaterals are split from the lowest node number.
+    Quadrilaterals are split along the diagonal through their lowest-numbered node, so that
+    neighbouring elements split a common face alike.
     """
     triangles: list[np.ndarray] = []
     for elements in parts:
@@ -72,7 +74,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Simplices (m, d, d); in 3D, lines and nodes are triangles with equal corners."""
+    """Simplices (m, d, d); in 3D, lines and nodes become triangles with repeated corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -113,8 +115,8 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
     """Closed shells of `points` (n, 3), `triangles` (m, 3).
 
-    Shells inside others are cavities; overlapping shells form one body. Raises ScriptError for an
-    edge with an odd number of triangles.
+    Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
+    Raises ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
     for sided in (True, False):  # oriented as in the file; else reoriented
@@ -138,7 +140,8 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     within = _within(shells, lo, hi, tolerance)
     depth = within.sum(axis=1)
     shells = [s[:, ::-1] if n % 2 else s for s, n in zip(shells, depth, strict=True)]
-    # A shell joins the set of the shell around it; outermost ones are apart if boxes overlap.
+    # Nested shells join the set of the outermost shell around them. Outermost shells whose boxes do
+    # not overlap are in the same set, up to `_SETS` sets.
     sets: list[list[int]] = []
     for outer in np.flatnonzero(depth == 0):
         members = [outer, *np.flatnonzero(within[:, outer])]
@@ -153,6 +156,10 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
 
 
 def _closed(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Merge equal vertices, and drop triangles that become degenerate.
+
+    Raises ScriptError if the surface is open.
+    """
     size = np.ptp(points, axis=0).max()
     for spacing in (0.0, _WELD * size):
         same = points if spacing == 0 else np.rint(points / spacing)
@@ -184,12 +191,19 @@ def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (3 m,) of edges, and directions (1 or -1)."""
+    """Return the edge (3 m,) of each triangle side, and the direction (1 or -1) in which it runs.
+
+    Edges are numbered from 0, and equal ones have the same number.
+    """
     low, high, way = _ends(triangles)
     return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
 
 
 def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
+    """Drop repeated triangles, and all of them where two shells touch.
+
+    If none would be left, all are returned.
+    """
     same = np.sort(triangles, axis=1)
     order = np.lexsort(same.T)
     begin = np.flatnonzero(np.r_[True, (np.diff(same[order], axis=0) != 0).any(axis=1)])
@@ -229,7 +243,10 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Number shells by common edges, or if not `sided`, by edges of two triangles."""
+    """Return the shell (m,) of each triangle: triangles with a common edge are in the same one.
+
+    If not `sided`, only edges of exactly two triangles connect them.
+    """
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)
     linked = np.full(len(edge), True) if sided else np.bincount(edge)[edge] <= 2

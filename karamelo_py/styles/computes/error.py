@@ -1,4 +1,4 @@
-"""Computes error and reference."""
+"""Computes error and reference: compare values or fields with formulas or curves."""
 
 from math import inf
 from typing import Any, Literal
@@ -19,7 +19,7 @@ from karamelo_py.script.expressions import Expression
 VECTORS = {"displacement": "u", "velocity": "v"}
 TENSORS = {"stress": "s", "strain": "e"}
 DISPLACEMENTS = ("ux", "uy", "uz")
-VANISHED = 1e-9  # of the largest exact norm so far; smaller values are round-off
+VANISHED = 1e-9  # norms below this fraction of the largest exact norm so far are round-off
 
 
 def column(points: PointTable, name: str) -> np.ndarray:
@@ -48,9 +48,10 @@ class PointField:
 
 
 class Norm:
-    """Norm L1, L2 or max, absolute or relative.
+    """Norm L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    Histories weight differences by the time since the last output.
+    Histories weight differences by the time since the last output, so the number of outputs has no
+    effect.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -84,6 +85,10 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
+        """Return the present norm as `scaled`.
+
+        If the output is new, also update `history` and `largest`.
+        """
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -92,7 +97,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first state has no duration: it counts until the second.
+            # The first output has no preceding interval; its norm is used until the second.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -112,7 +117,7 @@ class Compared:
     """Mix-in for computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
-        """Norms (2,) of differences and exact values, and the remaining sums."""
+        """Norms (2,) of the differences and of the exact values, and the other sums of `sizes`."""
         sums = self.hub.fields.added_up(self)
         largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
         return self.norm.moment(sums, largest), sums[3:]
@@ -157,11 +162,13 @@ class Error(Compared, Compute):
     -----
     With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and its initial
     volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e. ``relative``
-    divides by the same norm of the exact values, or by the largest so far while they vanish.
+    divides by the same norm of the exact values. While they vanish it divides by the largest norm
+    so far, and gives inf if there is none.
 
     Publishes ID, the present error; ID_max, the largest so far; and ID_history, the norm over
-    points and outputs so far, weighted by the time since the previous one. With ``relative`` both
-    norms cover the whole history.
+    points and outputs so far, weighted by the time since the previous one. With ``relative``, the
+    numerator and the denominator of ID_history are both taken over the whole history, so that exact
+    values may vanish at times.
 
     See Also
     --------
@@ -250,7 +257,7 @@ class Reference(Compared, Compute):
     For a value, ID is the norm of the difference over the outputs so far, weighted by the time
     since the previous one, ID_now the present difference, ID_curve the present value of the curve.
     For points, ID and ID_now are the present norm, weighted by initial volumes, ID_curve the mean
-    of the curve.
+    of the curve at the points.
 
     See Also
     --------
@@ -310,7 +317,7 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Magnitudes (2, n) of differences and curve, weights, the curve, and ones."""
+        """Return magnitudes (2, n) of differences and curve; weights, the curve, and ones (n,)."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])

@@ -1,4 +1,4 @@
-"""Compute force_on."""
+"""Compute force_on: force, torque and point of action, on a solid or of fixes."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -44,7 +44,7 @@ class Acting(NamedTuple):
 
 
 class Summand(NamedTuple):
-    """A published force, and names of its torque."""
+    """A published force, and the names of its torque about the origin."""
 
     force: str  # ID of ID_x, ID_y, ID_z
     sign: float = 1.0
@@ -59,7 +59,7 @@ class ForceOn(Compute):
     ----------
     part, more
         A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A fix:
-        its force on its group. Several: their sum.
+        its force on the points or nodes of its group. Several: their sum.
     x, y, z
         Position about which the torque is taken.
 
@@ -80,15 +80,17 @@ class ForceOn(Compute):
     the central axis; a torque about it may remain. With the torque about the origin, the line
     meets y = 0 at x = ID_tz/ID_y.
 
-    Walls (fix velocity_nodes), loads and weight count only if their fixes are named. Forces act at
-    present positions of points and nodes at the beginning of the step (in load steps torques err by
-    the displacement in a step), in tlmpm at initial positions of nodes.
+    Walls (fix velocity_nodes), loads and weight count only if their fixes are named. Lever arms use
+    positions at the beginning of the step: of points their present ones, of nodes their positions
+    in the grid (in tlmpm the initial ones). In load steps torques err by the displacement in a
+    step.
 
     Fixes: velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
     other tools. They must precede this compute. Friction of contact/minimize_penetration acts
     between the centres of points, so the torques on the two solids are not quite opposite. The
-    torque of velocity_particles lacks the angular momentum within points (affine transfers).
+    torque of velocity_particles lacks the angular momentum that affine transfers store within
+    points.
 
     See Also
     --------
