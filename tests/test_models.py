@@ -41,9 +41,13 @@ def test_a_shell_by_three_models(run_script):
 
 @pytest.mark.full
 def test_symmetry_costs_nothing(run_script):
-    """The quarter and the whole ring have the same error, to the digits of the log."""
+    """A quarter of the ring has the error of the whole.
+
+    Not to all digits with FLIP 0.99: rollers also change the velocities that points have beyond the
+    nodes' (`test_walls.py`), which a symmetry plane inside the body does not.
+    """
     quarter, full = (last(run_script, "lame", "err", model) for model in ("quarter", "full"))
-    assert quarter == pytest.approx(full, rel=1e-6)
+    assert quarter == pytest.approx(full, rel=2e-3)
 
 
 @pytest.mark.full
