@@ -133,7 +133,7 @@ def changing_containers() -> set[tuple[str, str]]:
 
 COUNTS = {
     **{f"modules of {name}": lambda name=name: len(modules(name)) for name in STATEMENTS},
-    "containers of the process that change in compiler/": lambda: len(changing_containers()),
+    "mutable module-level containers in compiler/": lambda: len(changing_containers()),
     "functions of kernels and points with more than five parameters": long_signatures,
     "getattr with a default": guesses,
     "Any in run/": untyped_in_run,
@@ -142,7 +142,7 @@ COUNTS = {
     "names that several classes have": lambda: len(shared_class_names()),
     "docstrings that begin with a question": riddles,
     "names imported from private modules of Numba": private_imports,
-    "kinds of errors that mypy passes over, by package": lenient,
+    "mypy error codes disabled per package": lenient,
 }
 
 
