@@ -121,6 +121,89 @@ def test_what_cannot_change_is_said(run_interpreted, line, word, said, place):
     assert "Step " not in done.out
 
 
+VISCOUS = """
+    eos(b, linear, 7850, 160e9)
+    strength(s, plastic, 80e9, 4e8)
+    material(m, eos-strength, b, s)
+    viscosity(newtonian, m, 200)
+    material(r, hyperelastic, 1000, mu/2*(I1*J**(-2/3) - 3) + 5e5*(J - 1)**2, mu=1e5)
+    viscosity(prony, r, g=0.3, tau=1e9)
+    viscosity(newtonian, r, 0)
+    load_path(p, 10, exx=0.02, syy=0, szz=0, duration=1)
+    load_path(q, 1, exy=1e-3, duration=1)
+    element(e, m, p)
+    element(g, r, q)
+"""
+
+
+def test_law_and_viscosity_change_apart(run_interpreted):
+    """Parts within, and each viscosity: the viscous stress is 2 mu D."""
+    script = (
+        VISCOUS
+        + """
+    modify(strength, s, yield_stress=2e8)
+    modify(viscosity, m, mu=400)
+    element(f, m, p)
+    modify(viscosity, r, mu=1e5)
+    element(h, r, q)
+    modify(viscosity, r, g=0.5, tau=1e-9)
+    element(k, r, q)
+    print(e_sxx, f_sxx, g_sxy, h_sxy, k_sxy)
+    """
+    )
+    out = run_interpreted(script).out
+    found = [float(one) for one in re.findall(r"_s[xy]+ = ([-+.e\d]+)", out)]
+    assert found == pytest.approx([4e8, 2e8, 200, 200 + 200, 100 + 200], rel=2e-3)
+
+
+def test_parts_of_a_viscous_law_change_between_runs(run_interpreted):
+    """Held at exx = 4e-3: K exx + 2/3 Y."""
+    script = """
+        method(tlmpm, FLIP, linear, 1)
+        dimension(1, 0, 1, 0.5)
+        region(b, block, 0, 1)
+        eos(e, linear, 1000, 1e6)
+        strength(s, plastic, 5e5, 2e3)
+        material(m, eos-strength, e, s)
+        viscosity(newtonian, m, 1)
+        solid(b, region, b, 2, m, 0.5)
+        region(every, block, INF, INF)
+        group(every, nodes, region, every, all)
+        fix(v, velocity_nodes, every, if(timestep < 4, x0, 0))
+        compute(s, average_stress, all)
+        log_modify(custom, step, s_11)
+        set_output(1)
+        set_dt(1e-3)
+        run(6)
+        modify(strength, s, yield_stress=1e3)
+        run(3)
+        modify(eos, e, K=2e6)
+        run(3)
+    """
+    log = run_interpreted(script).log
+    exact = [4e3 + 2 / 3 * 2e3, 4e3 + 2 / 3 * 1e3, 8e3 + 2 / 3 * 1e3]
+    assert log.s_11[[6, -4, -1]] == pytest.approx(exact, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("line", "word", "said"),
+    [
+        (
+            "modify(material, r, tau=1)",
+            "tau=1",
+            "tau can change only in the viscosity of material 'r'",
+        ),
+        ("modify(material, r, mu=1)", "mu=1", "mu can change only in the viscosity of material"),
+        ("modify(viscosity, r, E=1)", "E=1", "no viscosity with E\nexpected: bulk=..., g=..., mu"),
+        ("modify(viscosity, n, E=1)", "E=1", "material 'n' has no viscosity"),
+    ],
+)
+def test_viscosities_that_cannot_change_are_named(run_interpreted, line, word, said):
+    other = "    material(n, neo-hookean, 1000, 1e6, 0.4)\n    "
+    err = run_interpreted(VISCOUS + other + line + "\n", status=1).err
+    assert said in re.sub(r"\n +.*", "", err) and word in err
+
+
 def test_numbers_from_which_points_began_cannot_change(run_interpreted):
     script = BLOCK.replace(
         "material(m, eos-strength, e, s)", "material(m, cam-clay, 1800, 4e6, 1.0, 0.1, 0.02, 1e5)"

@@ -326,9 +326,11 @@ def test_a_bar_rings_down(run_interpreted):
     assert abs(drift) < 0.3 and log["Ed"][-1] > 0.2 * total[0]
 
 
-def test_a_viscous_bar_rings_down(run_interpreted):
+@pytest.mark.parametrize("law", ["neo-hookean", "linear"])  # with and without F
+def test_a_viscous_bar_rings_down(run_interpreted, law):
     """rho s^2 + pi^2 (K + 4/3 (G + mu s)) = 0 gives frequency and decay (Kelvin and Voigt)."""
-    said = run_interpreted(BAR.replace(PRONY, PRONY.split("viscosity")[0] + VOIGT))
+    text = BAR.replace(PRONY, PRONY.split("viscosity")[0] + VOIGT).replace("neo-hookean", law)
+    said = run_interpreted(text)
     log, m = said.log, 1e6 / 0.6 + 4 / 3 * G
     s = np.roots([1000, pi**2 * 4 / 3 * 500, pi**2 * m])[0]
     total = log["Ek"] + log["Es"]
@@ -375,8 +377,10 @@ def test_metals_and_soils_become_viscous(run_interpreted):
     assert t["stored"][-1] + t["dissipated"][-1] == pytest.approx(t["work"][-1], rel=1e-2)
 
 
-def test_relaxation_below_the_step_is_reported(run_interpreted):
+@pytest.mark.parametrize("more", ["", f"\n    {VOIGT}"])
+def test_relaxation_below_the_step_is_reported(run_interpreted, more):
     text = BAR.replace("g=0.3, tau=0.005", "g=(0.3, 0.2), tau=(1, 1e-7)").replace("0.06)", "1e-3)")
+    text = text.replace("1e-7))", f"1e-7)){more}")
     err = run_interpreted(text).err
     assert "the relaxation time 1e-07 of material 'damper' is below the time step" in err
     line = next(line for line in text.splitlines() if "1e-7" in line)

@@ -19,9 +19,9 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     Parameters
     ----------
     kind
-        ``material``, ``eos``, ``strength``, ``damage`` or ``temperature``.
+        ``material``, ``viscosity``, ``eos``, ``strength``, ``damage`` or ``temperature``.
     ID
-        Name of the material or of the part.
+        Name of the part; of the material, also for its viscosity.
     numbers
         ``name=value`` for each changed constant, named as on the page of the style.
 
@@ -46,9 +46,9 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     --------
     material, strength, run
     """
-    if kind not in ("material", *hub.parts):
-        raise unknown(f"unknown kind '{kind}'", kind, ("material", *hub.parts), argument="kind")
-    catalogue = hub.materials if kind == "material" else hub.parts[kind]
+    if kind not in (kinds := ("material", "viscosity", *hub.parts)):
+        raise unknown(f"unknown kind '{kind}'", kind, kinds, argument="kind")
+    catalogue = hub.parts.get(kind, hub.materials)
     try:
         entry = catalogue[ID]
     except ScriptError as error:
@@ -56,36 +56,40 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
         raise
     if not numbers:
         raise ScriptError("no number changes", argument="ID", expected="name=value, ...")
-    if kind == "material":
-        entry = _owner(entry, numbers)
+    if isinstance(entry, Material):
+        entry = _owner(entry, kind, numbers)
     changed = {entry: _changed(hub, entry, entry.arguments, numbers)}
     for material in hub.materials.values():
-        if entry in _parts(material):
-            values = {name: _now(value, changed) for name, value in material.arguments.items()}
-            changed[material] = _changed(hub, material, values, ())
+        _now(hub, material, changed)
+    # Not materials without their later viscosity, which have its name.
+    changed = {old: new for old, new in changed.items() if _catalogue(hub, old)[old.id] is old}
     for before, after in changed.items():
         if isinstance(after, Material):
             _check(hub, before, after, numbers)
             judge(hub, after)
     for after in changed.values():
-        catalogue = hub.materials if isinstance(after, Material) else hub.parts[after.kind]
-        catalogue[after.id] = after
+        _catalogue(hub, after)[after.id] = after
     for solid in hub.solids.values():
         solid.material = changed.get(solid.material, solid.material)
 
 
-def _parts(material: Material) -> list[MaterialPart]:
-    values: list[Any] = []
-    for value in material.arguments.values():
-        values += value if isinstance(value, tuple) else [value]
-    return [entry for entry in values if isinstance(entry, MaterialPart)]
-
-
-def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
+def _owner(material: Material, kind: str, numbers: tuple[Argument, ...]) -> MaterialPart:
     names = {(argument.keyword() or ("",))[0] for argument in numbers}
-    if names <= set(material.arguments):
-        return material
-    owners = [entry for entry in _parts(material) if names <= _names(entry)]
+    viscous = [part for part in material.parts() if part.kind == "viscosity"]
+    able = [part for part in viscous if names <= _names(part)]
+    if kind == "viscosity":
+        if not able:
+            known = sorted({name for part in viscous for name in _names(part)} - {"material"})
+            message = f"material '{material.id}' has no viscosity"
+            if viscous:
+                message = f"{message} with {' and '.join(sorted(names))}"
+            expected = ", ".join(f"{name}=..." for name in known) or "viscosity(STYLE, ID, ...)"
+            raise ScriptError(message, mark=numbers[0].mark, expected=expected)
+        return able[0]
+    whole = next(part for part in material.parts() if part.kind == "material")
+    if names <= set(whole.arguments):
+        return whole
+    owners = [part for part in whole.parts() if part is not whole and names <= _names(part)]
     if len(owners) > 1:
         lines = " or ".join(f"modify({entry.kind}, {entry.id}, ...)" for entry in owners)
         raise ScriptError(
@@ -94,7 +98,16 @@ def _owner(material: Material, numbers: tuple[Argument, ...]) -> MaterialPart:
             argument="ID",
             expected=lines,
         )
-    return owners[0] if owners else material
+    if able and not owners:
+        line = f"modify(viscosity, {material.id}, ...)"
+        named = " and ".join(sorted(names))
+        message = f"{named} can change only in the viscosity of material '{material.id}'"
+        raise ScriptError(message, mark=numbers[0].mark, expected=line)
+    return owners[0] if owners else whole
+
+
+def _catalogue(hub: Hub, entry: MaterialPart) -> Any:
+    return hub.materials if isinstance(entry, Material) else hub.parts[entry.kind]
 
 
 def _names(entry: MaterialPart) -> set[str]:
@@ -111,9 +124,15 @@ def _changed(hub: Hub, entry: MaterialPart, values: dict, numbers: tuple) -> Mat
     return after
 
 
-def _now(value: Any, changed: dict) -> Any:
+def _now(hub: Hub, value: Any, changed: dict) -> Any:
     if isinstance(value, tuple):
-        return tuple(_now(one, changed) for one in value)
+        now = tuple([_now(hub, one, changed) for one in value])
+        same = all(a is b for a, b in zip(value, now, strict=True))
+        return value if same else now
+    if isinstance(value, MaterialPart) and value not in changed:
+        values = {name: _now(hub, one, changed) for name, one in value.arguments.items()}
+        if any(one is not value.arguments[name] for name, one in values.items()):
+            changed[value] = _changed(hub, value, values, ())
     return changed.get(value, value) if isinstance(value, MaterialPart) else value
 
 

@@ -27,7 +27,7 @@ def viscosity(hub: Hub, style: Annotated[str, StyleOf("viscosity")], *arguments:
 
     Notes
     -----
-    The material retains its ID; ``modify(material, rubber, tau=(0.02, 1))`` changes the viscosity.
+    The material retains its ID; ``modify(viscosity, rubber, tau=(0.02, 1))`` changes it.
     Both styles may be used for one material, prony first.
 
     See Also

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler.fields import Field, tensor
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import I, inv, unit
-from karamelo_py.points.laws import deformation
+from karamelo_py.points.laws import answered, deformation
 
 
 class Updated(NamedTuple):
@@ -25,7 +25,7 @@ class DeformationGradient(Field):
 
     @staticmethod
     def needed(law: NamedTuple) -> bool:
-        return not deformation.defined(type(law))
+        return not answered(law, deformation)
 
 
 class Total(NamedTuple):

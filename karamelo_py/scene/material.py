@@ -1,5 +1,6 @@
 """Named materials and their parts."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from karamelo_py.language import registry
@@ -27,6 +28,14 @@ class MaterialPart(Named):
     @property
     def law(self) -> NamedTuple:
         return self.laws[self.kind]
+
+    def parts(self) -> Iterator["MaterialPart"]:
+        """Yield this and the parts that it was made of, and their parts."""
+        yield self
+        for value in self.arguments.values():
+            for one in value if isinstance(value, tuple) else (value,):
+                if isinstance(one, MaterialPart):
+                    yield from one.parts()
 
 
 class Material(MaterialPart):

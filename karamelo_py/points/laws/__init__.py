@@ -65,6 +65,16 @@ def can(law: NamedTuple, function: Callable) -> bool:
     return any(function.find((kind,)) not in _handing_on for kind in kinds)
 
 
+def answered(law: NamedTuple, function: Callable) -> bool:
+    """Return True if the law answers the point function, alone or by the law that it wraps."""
+    kind = type(law)
+    if not function.defined(kind):
+        return False
+    if function.find((kind,)) not in _handing_on:
+        return True
+    return any(answered(part, function) for part in law if isinstance(part, tuple))
+
+
 _handing_on: set[Callable] = set()
 
 

@@ -201,7 +201,8 @@ class Viscoelastic(NamedTuple):
 def _too_short(branch, scene):
     if scene.simulation.implicit or not branch.tau < scene.simulation.dt:
         return None
-    relaxing = [one.arguments.get("tau", ()) for one in scene.hub.materials.values()]
+    parts = [part for one in scene.hub.materials.values() for part in one.parts()]
+    relaxing = [one.arguments["tau"] for one in parts if "g" in one.arguments]
     times = next(times for times in relaxing if branch.tau in times)
     return {"mark": times.marks[times.index(branch.tau)], "dt": scene.simulation.dt}
 

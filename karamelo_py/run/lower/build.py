@@ -398,9 +398,7 @@ def lower_points(
     here = places if method.frame.moves else places[: kin.dimension]
     x = fields.rows_of_points((2, *here.shape), real)
     x[:] = here
-    # A law that hides the F of its inner law has none.
-    elastic = laws.elastic_law(used) if laws.deformation.defined(type(used)) else used
-    stored = [kind for kind in kinds if kind.needed(elastic)]
+    stored = [kind for kind in kinds if kind.needed(used)]
     points = arrays.Points(
         x=x, home=None if method.frame.moves else places,
         v=joined((np.zeros((kin.dimension, 1)) for _ in solids), real),
