@@ -14,7 +14,7 @@ from karamelo_py.run.step_size import StepSize
 
 
 class Backend(SceneState, Protocol):
-    """A run calls `begin` or `go_on`, `compile`, then `advance`."""
+    """A scene that can be stepped: a run calls `begin` or `go_on`, `compile`, then `advance`."""
 
     steps: StepSize
     energy_watch: EnergyWatch

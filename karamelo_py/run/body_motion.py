@@ -32,7 +32,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocity (3,), I^-1 L; zero about an axis without extent."""
+        """Angular velocity (3,), I^-1 L; zero about an axis without extent across it."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -46,7 +46,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance of the bounding box's ellipsoid from the rotation axis."""
+        """Largest distance from the rotation axis, for an ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)

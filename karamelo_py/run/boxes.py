@@ -1,4 +1,4 @@
-"""Boxes and spans of nodes, and buffers for points."""
+"""Boxes of nodes, spans of node numbers, and buffers for the contributions of points."""
 
 from typing import NamedTuple
 
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """List number and index of each item of k lists."""
+    """Number of the list, and index in it, of each item of k lists."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -128,12 +128,13 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def read_beside(nodes: Nodes) -> list[np.ndarray]:
-    """Arrays that must be zero next to nodes in use."""
+    """Arrays that must be zero at nodes next to the nodes in use."""
     beside = field(nodes.fields, Acceleration)
     return summed(nodes) + ([] if beside is None else [beside])
 
 
 def beyond(contact: Tag) -> int:
+    """Return by how many further cells contact reads sums."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 

@@ -1,4 +1,7 @@
-"""One material point under prescribed strains and stresses."""
+"""One material point under prescribed strains and stresses (commands load_path, element).
+
+It runs the point functions of the law in plain Python, without compilation.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Final strains and stresses of a load path; other strains stay constant."""
+    """Targets at the end of a load path; other strains do not change."""
 
     increments: int
     duration: float
@@ -197,7 +200,10 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """d(Cauchy stress) / d(free strains, engineering shear) (n, m) of the last increment."""
+        """Tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains).
+
+        Shear strains are engineering strains.
+        """
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
         return self._slopes(*self.last, ways)[: len(self.kin.symmetric_names)]
@@ -261,7 +267,8 @@ class Point:
     def _turned(self, angle: float, dt: float) -> np.ndarray:
         """dt grad v (3, 3) of a rotation about z that the law sees as rigid.
 
-        Skew to first order; the second order depends on the law's strain and volume.
+        To first order it is skew. To second order laws differ: their strain follows from the
+        symmetric part, their volume from det F, or all from F.
         """
         if angle == 0:
             return np.zeros((3, 3))

@@ -1,4 +1,4 @@
-"""The energy balance of a run."""
+"""The energy balance of a run: whether it is tracked, its growth, its losses."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ GROWING = 2  # windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name the source of untracked work, or "".
+    """Name the source of work that is not tracked, or "".
 
-    Python fixes declare by `Fix.conserves` that they do no untracked work.
+    Loops sum the work of compiled hooks; Python fixes declare by `Fix.conserves` that they do no
+    other work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -138,7 +139,7 @@ class EnergyWatch:
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
     def grown_little(self) -> bool:
-        """True if the present state shows no fault."""
+        """True if energy and last step show no fault in the present state."""
         watch, heat = self.watch, self.heat
         swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
         if swings or self.has_grown():
@@ -150,6 +151,7 @@ class EnergyWatch:
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
     def growth_since(self, before: float) -> float:
+        """Energy growth relative to `before`; NaN if not tracked."""
         unit = max(abs(before), float(self.watch.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 
@@ -160,6 +162,7 @@ class EnergyWatch:
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:
+        """Measure growth from the present state, after a warning."""
         watch = self.watch
         watch.first_few = watch.first_mean = watch.largest_mean
         watch.windows, watch.grown = 0, 0.0

@@ -1,4 +1,4 @@
-"""Steps of a scene on a GPU."""
+"""Steps of a scene on a GPU: device memory and kernel launches."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: arrays.Setup) -> arrays.Setup:
-    """Remove what a GPU does not use."""
+    """Return the setup without tiles and buffers, which a GPU does not use."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, conduction = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(conduction, heat.Conducting):
@@ -69,9 +69,10 @@ def _no_hook(m, v, star, force, *_):  # loops contain a call that is never made
 
 
 class StepsOnCard:
-    """Steps of a scene on a GPU.
+    """Steps of a lowered scene on a GPU.
 
-    `program`: classes of the scheme and its visits; `hooks`: by row.
+    `program` has the classes of the scheme and its passes, `hooks` the compiled hooks and functions
+    in the order of their table.
     """
 
     def __init__(
@@ -135,7 +136,7 @@ class StepsOnCard:
     def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
-        """Launch ``function(i, fate, *arguments)`` in `count` threads."""
+        """Launch ``function(i, fate, *arguments)`` in `count` threads while steps continue."""
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
@@ -179,6 +180,7 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
+        """Sort a block's points by cell (counting sort, prefix sums by chunks)."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -193,7 +195,7 @@ class StepsOnCard:
         yield self.launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[KernelLaunch]:
-        """Reorder points in memory as threads read them."""
+        """Reorder points in memory as threads read them; not with several corners."""
         if self.corners > 1:
             return
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
@@ -218,6 +220,7 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
+        """Count published values copied per thread: for formulas, one step old."""
         if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max(self._slots_read(), default=0)
@@ -289,7 +292,10 @@ class StepsOnCard:
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, rows: list[int]) -> Iterator[KernelLaunch]:
-        """Clear totals of hooks whose stage repeats within a step."""
+        """Clear totals of hooks whose stage repeats within a step.
+
+        The last time counts.
+        """
         if stage in self._acted:
             for h in rows:
                 if self.table[h].slot >= 0:
@@ -321,6 +327,7 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
+        """Publish a hook's totals right after it, if formulas read hooks."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
@@ -350,11 +357,13 @@ class StepsOnCard:
         self.ordered = -np.inf
 
     def fetch(self) -> None:
+        """Copy the state back except nodes; clock and values are current."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])
 
     def fetch_nodes(self) -> None:
+        """Copy back the nodal output, which steps do not need."""
         self.images.fetch(self._of_nodes())
 
     def _of_nodes(self) -> list[np.ndarray]:
@@ -363,6 +372,7 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
+        """Return the lowest number of a failed point."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
@@ -399,7 +409,7 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Median times of launches."""
+        """Median time of each launch of a step, over a few steps after the last."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

@@ -30,6 +30,10 @@ class LastGood(NamedTuple):
     good: RollbackPoint
 
     def keep_start(self, status: int, *, writes: bool) -> str:
+        """End the outputs of a step that was too large.
+
+        With `writes`, also write the initial state.
+        """
         simulation, good = self.simulation, self.good
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)

@@ -38,9 +38,9 @@ class _Line(NamedTuple):
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Stable step over h/c by the nodes of all solids; inf if unknown.
+    """Stable step over h/c that the nodes of all solids allow; inf if unknown.
 
-    Four digits, so that the order of sums does not matter.
+    It is rounded down to four digits, so that it does not depend on the order of sums.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
@@ -134,7 +134,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Shear over P-wave modulus, at most 1/2."""
+    """Shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -142,7 +142,7 @@ def _shear_share(law: Tag, kin: Tag) -> float:
 
 
 def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
-    """Largest eigenvalue, by Lanczos iteration."""
+    """Largest eigenvalue of a symmetric operator, by Lanczos iteration (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

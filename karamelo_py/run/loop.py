@@ -1,4 +1,8 @@
-"""One run: chunks of steps, output, events."""
+"""One run: steps in chunks, outputs when due, events for listeners.
+
+`output.schedule` writes log and dumps, `run.rollback` checks steps and stops a run, and
+`run.step_size` chooses the step.
+"""
 
 import signal
 import time
@@ -29,7 +33,7 @@ class Interrupted(Exception):
 
 @dataclass(eq=False)
 class RunLoop:
-    """Runs a number of steps, to a time, or by a condition.
+    """Runs a scene for a number of steps, to a time, or by a condition.
 
     With `halve`, a failure returns to the last good state and halves the step.
     """

@@ -30,9 +30,9 @@ RESTRICTIONS = {
 
 
 def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
-    """Delete points that left in a failed step, whose start `repeat` restores.
+    """Delete points that left the domain in a failed step, whose start `repeat` restores.
 
-    The result does not depend on threads or on how a run is divided.
+    The result depends on the state only, not on threads or on how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -58,7 +58,10 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
 
 
 def take_away(hub: Scene, ids: np.ndarray, mark: Mark | None) -> tuple[float, float]:
-    """Delete points (ascending ids); return mass and energy."""
+    """Delete points (ids, ascending); return their mass and energy.
+
+    The energy balance counts the energy as negative work.
+    """
     simulation = hub.simulation
     for body, fix in moved(hub).items():
         if np.any((ids >= body.first_id) & (ids < body.first_id + body.count)):

@@ -1,7 +1,7 @@
-"""Point boxes clipped at the edge of a region.
+"""Volumes and centroids of point boxes clipped at the edge of a region.
 
-The surface in a box is a plane fitted to `Region.depth`; other boxes are halved, up to `HALVED`
-times.
+The surface in a box is a plane, fitted to `Region.depth` at the corners and the centre. Boxes where
+a plane does not fit are halved, up to `HALVED` times.
 """
 
 import itertools
@@ -40,9 +40,10 @@ class Pieces(NamedTuple):
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Mask of boxes of edge `size` around `x` (n, d), and pieces at the region's edge.
+    """Clip boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
 
-    Boxes end at the domain and the region's bounding box, for exact faces along the axes.
+    Boxes end at the domain and at the region's bounding box, so that faces along the axes are
+    exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -69,7 +70,10 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger neighbour (fraction 0 then)."""
+    """Merge small pieces into the nearest larger one in an adjacent box.
+
+    Their fraction becomes 0.
+    """
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -156,9 +160,9 @@ def _measure(
 
 
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Area times outward normal (n, d), and a position (n, d), of the surface in each box.
+    """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
 
-    From covered areas of opposite faces, for an exact sum over boxes.
+    They follow from the covered areas of opposite faces, so that the sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -181,7 +185,10 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction (n,) and centroid (d, n) of a unit cube with mean + slopes (x - 1/2) > 0."""
+    """Fraction (n,) and centroid (d, n) of the part of a unit cube above a plane.
+
+    The part is where mean + slopes (x - 1/2) > 0.
+    """
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
@@ -195,7 +202,11 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`_plane` for slopes -`m` < 0 (d, n): alternating simplices at the corners."""
+    """Solve `_plane` for slopes -`m` < 0 (d, n).
+
+    The part is a simplex at the lowest corner, minus (plus, minus ...) the simplices at the other
+    corners, which lie outside the cube.
+    """
     d = len(m)
     top = mean + m.sum(axis=0) / 2
     fraction, moment = np.zeros(len(mean)), np.zeros(m.shape)

@@ -70,7 +70,7 @@ class SerialComm:
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Words (size,); None if one is late by `patience` seconds."""
+        """Words (size,) of all processes; None if one is late by `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: T | None = None) -> Any:
@@ -83,7 +83,7 @@ class SerialComm:
         return [thing]
 
     def everyone(self, request: str, thing: T) -> list[T]:
-        """Gather objects; raises ScriptError for different requests."""
+        """Gather the objects of all processes; raises ScriptError if their `request` differs."""
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
@@ -98,6 +98,7 @@ class SerialComm:
         return self.scatter(None if gathered is None else make(gathered))
 
     def gather_rows(self, rows: np.ndarray, out: np.ndarray | None, counts: Sequence[int]) -> None:
+        """Concatenate the rows of all processes into `out` of rank 0."""
         assert out is not None
         out[:] = rows
 

@@ -32,8 +32,8 @@ THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 class Domain:
     """A box with a grid of square cells from its lower corner.
 
-    It extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and `hi`
-    (3,) are 0 in unused directions. Without `h` the first solid sets it.
+    The grid extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and
+    `hi` (3,) are 0 in unused directions. Without `h`, the first solid sets the cell size.
     """
 
     thin = False
@@ -72,11 +72,12 @@ class Domain:
         return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Thickness, or length or area per angle, at `x` (n, d)."""
+        """Factor of volumes at `x` (n, d): the thickness, or the length or area per angle."""
         hoops = self.kin.hoops
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
+        """Mask (n,) of the positions `x` (n, >= dimension) in the closed box."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance

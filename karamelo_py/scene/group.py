@@ -22,8 +22,9 @@ NOTHING_THERE = "fixes of this group have no effect there"
 class AnyGroup(Named):
     """A group of points or nodes; `all` includes later ones.
 
-    Subclasses have ``total()``, ``chosen()``, the members other than `all`, and ``add(region,
-    solids)``, which returns the number added (0: region unknown).
+    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members other
+    than `all`; and ``add(region, solids)``, which returns the number added, 0 if the region is not
+    known yet.
     """
 
     kind = ""
@@ -106,7 +107,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """One bit per point, in whole 64-bit words."""
+        """Membership of `count` points, one bit each, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -148,7 +149,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by position, stored as a definition for later grids."""
+    """Nodes by position, stored as a definition, so that later grids have members, too."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
@@ -181,7 +182,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """Refuse a group that looks like a wall past an upper edge."""
+        """Refuse a group that looks like a wall at an upper edge but lies past it."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -217,7 +218,7 @@ class NodeGroup(AnyGroup):
 
 
 def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:
-    """Nodes inside the periodic cell, and a period apart; ascending."""
+    """Nodes inside the periodic cell, together with those a period apart; ascending."""
     places = lattice.places(numbers)
     for k in domain.periodic:
         period = domain.cells_of_period(k)

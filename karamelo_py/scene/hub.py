@@ -27,7 +27,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts in creation order."""
+    """Named parts in creation order, which get ``id`` and ``mark``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -313,6 +313,7 @@ class Hub:
             self.console.warn(text)
 
     def rehearse(self) -> None:
+        """Try the rest of the script once, before the first expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
             other = self.rehearsal() if self.interpreter.has_more else self

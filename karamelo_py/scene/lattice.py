@@ -21,9 +21,9 @@ class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
     It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
-    cell centres; nodes added for `least_nodes` have no mass. Numbers begin at `first` and
-    `first_cell`; `shape` and `cells` (3,) are 1 in unused directions. Raises ScriptError for more
-    than `MAX_NODES` nodes.
+    cell centres; nodes added for `least_nodes` per direction have no mass. Numbers of nodes begin
+    at `first`, of cells at `first_cell`; `shape` and `cells` (3,) count them, with 1 in unused
+    directions. Raises ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -86,13 +86,13 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cells (n, d), the nearest outside the grid."""
+        """Cells (n, d) of positions; outside the grid, the nearest ones."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
 
     def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
-        """Nodes (k, n) at `steps` along each axis from the first node of `cells`."""
+        """Numbers (k, n) of nodes at `steps` along each axis from the first node of `cells`."""
         shape = np.array(self.shape[: self.dimension])
         places = (
             np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
@@ -137,7 +137,10 @@ def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Indices (m, d), last axis fastest, m about CHUNK / `weight`."""
+    """Yield indices (m, d) from `first` to `last`, the last axis fastest.
+
+    About CHUNK / `weight` indices come at a time.
+    """
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 

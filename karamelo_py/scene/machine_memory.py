@@ -29,16 +29,16 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Memory in bytes, swap included."""
+    """Bytes, swap included; `free` omits caches that the system does not report (ZFS)."""
 
     free: float
     whole: float
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Memory with caches and swap; None if unknown.
+    """Memory with caches and swap; None if the system does not report it.
 
-    Limits of machine, containers, jobs (cgroups) and processes (ulimit -v) count.
+    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) all count.
     """
     import psutil
 
@@ -136,10 +136,10 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Room for points with `state` state variables.
+    """Room for points whose law has `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers; the last good state
-    has a position, a velocity and the state.
+    A point has two positions, a velocity, a mass, the state and three integers. The stored last
+    good state of a run has a position, a velocity and the state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

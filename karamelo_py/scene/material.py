@@ -8,9 +8,9 @@ from karamelo_py.language.arguments import Named
 
 
 class MaterialPart(Named):
-    """A law or component of a law, of a `kind` such as ``eos``.
+    """A named law or component of a law, of a `kind` such as ``eos`` and a `style`.
 
-    `made` is the law, or `laws` by kind if there are several; `given` are its arguments.
+    `made` is the law, or `laws` by kind if the style has several; `given` are its arguments.
     """
 
     def __init__(

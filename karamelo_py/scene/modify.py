@@ -159,6 +159,7 @@ class Fix(Publisher):
 
     @property
     def of_bodies(self) -> bool:
+        """True if the fix moves, touches or links rigid bodies."""
         return self.moves is not None or self.touches is not None or self.links
 
     @property
@@ -166,9 +167,9 @@ class Fix(Publisher):
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mask (m, k) and values of prescribed components of `nodes` at `x` (m, d).
+        """Mask (m, k) of the prescribed components of `nodes` at `x` (m, d), and their values.
 
-        Implicit schemes call this instead of hooks.
+        Implicit schemes call this instead of the hooks of the fix. The default reads `formulas`.
         """
         acts = np.isin(nodes, self.nodes)
         mask = np.outer(acts, [formula is not None for formula in self.formulas])
@@ -179,14 +180,14 @@ class Fix(Publisher):
         return mask, values
 
     def points_within(self) -> np.ndarray | None:
-        """Members on which the fix acts; None: all."""
+        """Numbers of the points of the group on which the fix acts; None for all."""
         return None
 
     def defined(self) -> None:
         """Called when the fix has its ID."""
 
     def deleted(self) -> None:
-        """Raises ScriptError if other fixes need it."""
+        """Called before the fix is deleted; raises ScriptError if other fixes need it."""
 
     def seconds(self) -> float:
         """Estimated core seconds per step, for ``check``."""
@@ -224,10 +225,10 @@ def _is_nothing(formula: Expression | None) -> bool:
 def per_direction(
     hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False, around: bool = False
 ) -> tuple:
-    """Require one formula (or NULL, unless `all_given`) per direction.
+    """Require one formula (or NULL, unless `all_given`) per direction of the domain.
 
-    Further ones may be NULL or zero, as in published inputs. With `around`, a third component acts
-    around the axis of bodies that twist.
+    Further components may be NULL or zero, as in published inputs. With `around`, a third component
+    acts around the axis of bodies that twist.
     """
     domain = hub.require_domain()
     d, twists = domain.dimension, isinstance(domain.kin, Twisted)

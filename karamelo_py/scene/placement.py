@@ -38,7 +38,7 @@ class Placement(NamedTuple):
 
 
 class Filled:
-    """Positions (n, d) in a box of cells, computed from bits."""
+    """Selected positions (n, d) in a box of cells, computed on request from bits."""
 
     def __init__(self, first: list[int], last: list[int], corner: np.ndarray, h: float,
                  places: np.ndarray):  # fmt: skip
@@ -64,7 +64,7 @@ class Filled:
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Positions (n,) `step` (n, d) away in the regular pattern, or -1."""
+        """Numbers (n,) of the positions `step` (n, d) away in the equidistant pattern, or -1."""
         cell, index_in_cell = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
@@ -122,10 +122,10 @@ def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Latt
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of `ppc` points along a unit cell, and lengths: (ppc,).
+    """Positions of `ppc` points along a unit cell, from its centre, and lengths, both (ppc,).
 
-    ``gauss``: Gauss-Legendre. Karamelo's default: equally spaced, but for 3 rounded Gauss points
-    with equal lengths.
+    ``gauss`` is Gauss-Legendre. The default is Karamelo's: equally spaced, but for 3 its rounded
+    Gauss points, with equal lengths.
     """
     if rule == "gauss":
         places, weights = np.polynomial.legendre.leggauss(ppc)
@@ -244,7 +244,7 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Lower bound of the number of points, by a growing sample."""
+    """Lower bound of the number of points, by a sample that grows until it decides on `most`."""
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
     places, inside, whole = 0, 0, math.prod((size / spacing).tolist())

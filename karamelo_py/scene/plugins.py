@@ -173,6 +173,7 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
 
 
 def misfit(function: Callable, count: int) -> str:
+    """Reason why a function cannot be called with `count` arguments, or ""."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:
@@ -265,6 +266,7 @@ def _wrong_size(kind: type[Field], domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
+    """Present use of a column, unless by this field (None: a law)."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -309,7 +311,10 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert exceptions to ScriptErrors that name the plug-in (else `usual`)."""
+    """Convert exceptions in the code of plug-ins to ScriptErrors.
+
+    They name the plug-in, or else the `usual` part.
+    """
     try:
         yield
     except faults.KNOWN:

@@ -1,4 +1,4 @@
-"""Base class of regions."""
+"""Base class of regions: inside test, bounding box, inversion."""
 
 import math
 from collections.abc import Sequence
@@ -60,15 +60,17 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
+        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
     def sheet(self) -> np.ndarray | None:
-        """Simplices (m, d, d) of a named set of faces."""
+        """Simplices (m, d, d) of a named set of faces, which has no volume; None otherwise."""
         return None
 
     @property
     def flat(self) -> bool:
+        """True if some part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -85,14 +87,15 @@ class Region(Named):
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
+        """Mask (n,) of the positions `x` (n, >= d) in the region."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Distance (n,) of `x` (n, >= d) from the surface, negative outside, without `exterior`.
+        """Distance (n,) of `x` (n, >= d) from the surface, negative outside; ignores `exterior`.
 
-        A lower bound up to `reach`, linear near plane parts. The default tests `contains` along the
-        axes, and misses shapes thinner than `reach`.
+        It is a lower bound, up to `reach`, and linear near plane parts of the surface. The default
+        tests `contains` along the axes, and misses shapes thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -109,7 +112,10 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
-        """Mask (n,) of positions where `other` has the same surface, if known."""
+        """Mask (n,) of positions where the surface of `other` is this one.
+
+        None if that is not known.
+        """
         return None
 
     def shape(self) -> Any:
@@ -133,6 +139,7 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
+    """Refuse a lower end (argument number `argument`) above the upper end."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

@@ -113,7 +113,10 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Store the points; raises ScriptError for none, too many, or left of the axis."""
+        """Store the points.
+
+        Raises ScriptError for none, too many, or points left of the axis.
+        """
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -163,6 +166,7 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
+        """Positions (n, d); computed on each access for large solids."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Script argument: a file or dump, or arrays passed to `Simulation`."""
+    """Script argument: columns of a file or dump, or of arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 
@@ -64,9 +64,9 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_xyz(path: Path) -> dict[str, np.ndarray]:
-    """Last frame of an .xyz file.
+    """Last frame of an .xyz file: positions, velocities and masses.
 
-    Rows are an element, x, y, z, or the Properties of extended XYZ.
+    Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
     """
     lines = read_text(path).rstrip().splitlines()
     begin, first = 0, 0
@@ -97,7 +97,10 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Columns by commas, semicolons or blanks, named by the first row, else "1", "2", ..."""
+    """Columns separated by commas, semicolons or blanks; # begins a comment line.
+
+    The first row names them, else they are "1", "2", ...
+    """
     rows = []
     try:
         lines = read_text(path).splitlines()

@@ -21,7 +21,10 @@ class HeightsFile(InputFile):
 
 
 class Raster(NamedTuple):
-    """Heights (ny, nx) at the centres of square cells, from the south; NaN: unknown."""
+    """Heights (ny, nx) at the centres of square cells, rows from the south.
+
+    They are NaN where unknown.
+    """
 
     corner: np.ndarray  # (2,) lower corner
     cell: float
@@ -90,7 +93,7 @@ def _of_geotiff(path: Path) -> Raster:
 
 
 def read_profile(path: Path) -> np.ndarray:
-    """Return positions, ascending, and heights (n, 2)."""
+    """Read positions and heights (n, 2), along increasing positions."""
     profile = np.column_stack([*read_table(path).values()][:2])
     if profile.shape[1] < 2 or len(profile) < 2 or (np.diff(profile[:, 0]) <= 0).any():
         raise ScriptError(
@@ -102,7 +105,7 @@ def read_profile(path: Path) -> np.ndarray:
 
 
 def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.ndarray:
-    """Segments (m, 2, 2) around the ground, counter-clockwise."""
+    """Segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
     x, z = np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([z[:1], z, z[-1:]])
     corners = np.column_stack([np.append(x, ends)[::-1], np.append(z, [bottom] * 2)[::-1]])
     corners[:2] = corners[1::-1]  # the bottom from left to right
@@ -110,7 +113,10 @@ def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.n
 
 
 def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.ndarray:
-    """Outward triangles (m, 3, 3) around the ground below heights (ny, nx)."""
+    """Triangles (m, 3, 3) around the ground below heights (ny, nx).
+
+    Seen from outside, they are counter-clockwise.
+    """
     ny, nx = z.shape
     top = np.stack([*np.meshgrid(x, y), z], axis=2)
     low = top.copy()
@@ -127,5 +133,6 @@ def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.n
 
 
 def _halves(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> list[np.ndarray]:
+    """Divide quadrilaterals (..., 3) along the diagonal a-c."""
     flat = [corner.reshape(-1, 3) for corner in (a, b, c, d)]
     return [np.stack([flat[k] for k in of], axis=1) for of in ((0, 1, 2), (0, 2, 3))]

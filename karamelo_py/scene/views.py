@@ -1,6 +1,7 @@
 """Views of nodes and points for Python hooks.
 
-Changes are written back when the hook returns; other fields are read-only.
+Arrays have a row per node or point of the group. Changes, by assignment or in place, are written
+back when the hook returns; other fields are read-only.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -186,7 +187,7 @@ class NodesView(View):
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over all processes."""
+        """Sum terms (n,) or (n, k) over the group's nodes of all processes."""
         terms = np.asarray(terms, float)
         local = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.points.summed(terms[local])
@@ -238,7 +239,7 @@ class NodesView(View):
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d) before the momentum update, or those that deform points."""
+        """Velocities (n, d) before the momentum update, or those that deform the points."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -256,7 +257,7 @@ class NodesView(View):
 
     @Shown
     def velocity_update(self) -> np.ndarray:
-        """v* (n, d) after the momentum update (``post_update_grid_state``)."""
+        """Velocities v* (n, d) after the momentum update (``post_update_grid_state``)."""
         return self._vectors("velocity" if self._on_velocity else "update")[self.index]
 
     @velocity_update.writer
@@ -272,8 +273,9 @@ class NodesView(View):
 class PointsView(View):
     """Points of a group at one stage of a step, ordered by id.
 
-    With `Fix.point_by_point`, local points in storage order, with read-only positions, before the
-    first step (`in_steps` False) only some at a time.
+    If hooks treat each point separately (`Fix.point_by_point`), they are local points in storage
+    order, in `pieces` of blocks with rows, and their positions are read-only. Before the first step
+    (`in_steps` False) these are only some of the points.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -311,7 +313,7 @@ class PointsView(View):
         return numbers
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Exact sum of terms (n,) or (n, k) over the group; collective."""
+        """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
         if not self._in_steps:
             raise ValueError(
                 "points.total(terms) is known only in steps; before the first, points come in "
@@ -350,7 +352,7 @@ class PointsView(View):
 
     @Shown
     def position(self) -> np.ndarray:
-        """Positions (n, d); corners of convected domains follow."""
+        """Positions (n, d); corners of convected domains move with the points."""
         return self._rows.take(self._place)
 
     @position.writer
@@ -395,10 +397,11 @@ class PointsView(View):
         return self._rows.take(_declared(kind, "point", NO_HEAT))[:, 0]
 
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
-        """Set stored velocity gradients (APIC, TPIC ...).
+        """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
-        ``gradient(moves, step)`` returns derivatives (n, d) of a velocity `component` in grid
-        coordinates (reference positions if not `moves`).
+        ``gradient(moves, step)``, called if there are any, returns derivatives (n, d) of a velocity
+        `component` in coordinates of the grid (reference positions if not `moves`). `step` is much
+        smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -421,7 +424,7 @@ class PointsView(View):
             kept[here, rows] = moment[here]
 
     def set_stress(self, components: dict[str, np.ndarray]) -> None:
-        """Set Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
+        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
         columns = [components.get(name, 0.0) for name in names]
@@ -441,7 +444,10 @@ class PointsView(View):
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` for points with this `law`."""
+        """Call ``kernel(matter, rows, numbers)`` with the number of each point from `values` (n,).
+
+        Only points whose law is a `law` are included.
+        """
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -450,7 +456,7 @@ class PointsView(View):
             kernel(arrays.matter_of(s.kin, block), np.asarray(rows), numbers)
 
     def set_column(self, name: str, values: np.ndarray) -> None:
-        """Set position, velocity, stress, T, or a declared field (n,)."""
+        """Set a dump column (n,): position, velocity, stress, T, or a declared field."""
         d, hub = self._simulation.kin.dimension, self._simulation.hub
         attribute, k = VECTORS.get(name, ("", 0))
         kind, column = declared_columns(hub, "point_fields").get(name, (None, 0))
@@ -502,9 +508,9 @@ def set_columns(
     ids: np.ndarray | None = None,
     mark: Mark | None = None,
 ) -> None:
-    """Set columns of points (ids from 0) between steps, to numbers or (n,).
+    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
 
-    Raises ScriptError for derived columns, wrong shapes and infinite values.
+    Raises ScriptError for derived columns, wrong shapes, and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

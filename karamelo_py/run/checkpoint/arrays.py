@@ -1,4 +1,4 @@
-"""The state of a simulation as named arrays."""
+"""The state of a simulation as named arrays: to return to, write and read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
 def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the used part of arrays that a step changes and the next one needs."""
+    """Yield the used part of every array that a step changes and the next one needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
@@ -63,7 +63,11 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Nodes with recent contact, and its memory."""
+    """Nodes where contact acted lately, and its memory of them.
+
+    One process looks at all nodes, since liquids may return to nodes not in use now. Several list
+    the nodes in use.
+    """
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
         return {}
@@ -84,9 +88,9 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield the content of a restart file for the present or `kept` state.
+    """Yield the content of a restart file for the present state, or the `kept` one.
 
-    Collective: rank 0 gets the bits of a serial run.
+    Collective: rank 0 gets the arrays, in the order and with the bits of a serial run.
     """
     if not kept:
         simulation.bring()
@@ -119,7 +123,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state with normalised digits of exact sums."""
+    """Yield a state as stored in files, with the digits of exact sums normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})

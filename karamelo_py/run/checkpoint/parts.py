@@ -142,7 +142,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A value that no file can store, with its warning."""
+    """A copy of a value that no file can store, with the warning for it."""
 
     kept: object
     fault: ScriptError
@@ -230,7 +230,10 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Store the last good state; `forget` other steps' parts."""
+        """Make the present state the last good one.
+
+        With `forget`, the states of parts at other steps are dropped.
+        """
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -245,12 +248,14 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
+        """Return to that state; with `cut`, outputs are cut there and continue."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
+        """Repeat the steps up to `end` with the states of parts; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

@@ -46,7 +46,10 @@ READ_AT_ONCE = 1 << 22  # bytes
 
 
 class Restarts(Rhythmic):
-    """Writes restart files; the step number replaces the first ``*`` in the name."""
+    """Writes restart files during a run.
+
+    The step number replaces the first ``*`` in the name.
+    """
 
     mark: Mark | None = None
     style = ""
@@ -127,7 +130,10 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Raise ScriptError if the arrays of points and nodes (`large`), or others, are altered."""
+    """Raise ScriptError if arrays of a file do not have their checksums.
+
+    The arrays of points and nodes (`large`), or the others, are compared; processes divide them.
+    """
     import h5py
 
     with h5py.File(path, "r", locking=False) as root, path.open("rb") as file:
@@ -227,7 +233,10 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore a file's state, also as last good state; with `outputs`, files continue."""
+        """Restore the state of the file; with `outputs`, these continue in their files.
+
+        Within a run, `point` becomes the last good state.
+        """
         check(hub, self)
         simulation, content = hub.simulation, self.content
         comm = hub.settings.comm

@@ -13,9 +13,10 @@ from karamelo_py.scene.modify import Fix
 
 
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
-    """Conduct heat for `dt`, before points are strained; raises `Singular`.
+    """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
-    C (T' - T) / dt = q - K T'. The split from an adiabatic step is of first order (Armero & Simo
+    With nodal capacities C and conductances K, C (T' - T) / dt = q - K T'. It is linear, so one
+    solution is exact. The split from an adiabatic step is of first order in the step (Armero & Simo
     1992); in this order a load step ends in equilibrium.
     """
     s, mode = equations.s, equations.mode

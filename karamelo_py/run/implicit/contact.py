@@ -77,19 +77,23 @@ class Contact:
         return stiffness * self._around(self.equations.positions[self.first, 0], h)
 
     def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """Return length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Mask (c,) of pairs touching in the last step; with -1, of sticking ones."""
+        """Mask (c,) of pairs in contact at the end of the last step.
+
+        With `sign` -1, only the pairs that stuck.
+        """
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
         last = sign * last if sign else np.abs(last)
         return (last > 0) & (last >= step)
 
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
-        """Compute forces and derivatives after displacements (m, d).
+        """Compute forces after nodal displacements (m, d), and their derivatives.
 
-        With `supposed`, contact and sticking are from the last step.
+        If `supposed`, contact and sticking come from the last step, as no displacements are known.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -103,8 +107,10 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Return mapping on Coulomb's cone (Simo & Laursen 1992, "An augmented Lagrangian treatment
-        of contact problems involving friction").
+        """Compute the drag and its derivatives by return mapping of friction.
+
+        Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
+        "An augmented Lagrangian treatment of contact problems involving friction").
         """
         k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
         glued = np.isinf(self.mu)
@@ -147,13 +153,17 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Remove normal approach velocities from `v` (m, d), by `inverse` masses (m, d)."""
+        """Remove the relative normal velocities of pressed pairs from `v` (m, d).
+
+        This conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
+        """
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Add the effect of initial contact to accelerations (m, d).
+        """Add the effect of contact at the beginning of the step to accelerations (m, d).
 
-        Pairs that approach or stuck are stopped; others slide with velocities `v` (m, d).
+        It stops touching pairs that approach, and all that stuck; others slide with velocities `v`
+        (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # others may separate

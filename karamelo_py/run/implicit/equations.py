@@ -55,12 +55,13 @@ class Moduli(NamedTuple):
 
 
 class Equations:
-    """Forces at the nodes of a step, and derivatives.
+    """Forces at the nodes of a step, and their derivatives.
 
-    At `nodes` (m,) in stencils, `mass` (m,) is 0 with gradients only, `places` (m, d) are grid
-    indices, `per_node` is the number of unknowns (d, and an angle about the axis), `deforming` (m,)
-    masks nodes of deforming points (`blocks` with stencils `parts`), `led` (m,) nodes of rigid
-    points with `velocity_of_rigid` (m, d). `cached` is from the last step.
+    `nodes` (m,) are in stencils of points. `mass` (m,) is 0 where there are gradients only,
+    `places` (m, d) are grid indices, `per_node` is the number of unknowns at each (d, and the angle
+    of a rotation around the axis). `deforming` (m,) masks nodes of points that deform (`blocks`,
+    with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
+    d). `cached` is from the previous step, or empty.
     """
 
     def __init__(self, s: Setup, mode: Tag, cached: dict[str, np.ndarray], stabilised: bool):
@@ -140,6 +141,10 @@ class Equations:
         return seen
 
     def _find_pairs(self, stabilised: bool) -> None:
+        """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
+
+        They include the pairs of the ghost stabilisation, and each node with itself.
+        """
         d, k, m = self.d, self.per_node, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
         row = 2 * reach + 1
@@ -199,9 +204,10 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
-        """Largest move, in cells, of a node towards others.
+        """Largest move, in cells, of a node towards others that move differently.
 
-        Those move differently by more than rotation or strain, or are `fixed` (nodes, d).
+        Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
+        `fixed` (nodes, d) without points.
         """
         cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -324,10 +330,10 @@ class Equations:
         return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
-        """Ghost penalty (m, m) on gradient jumps at the border of bodies.
+        """Matrix (m, m) that penalises gradient jumps at the border of bodies.
 
-        Unit: the mean modulus. Nodes have volume means of their points, differences the smallest of
-        their nodes.
+        It is in units of the mean modulus: at a node the volume mean over its points, for a
+        difference the smallest of its nodes.
         """
         lines, size, D = self.differences
         weights = size**self.d
@@ -349,8 +355,8 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
 
-        With a linear basis, these are gradient jumps across faces of border cells (Coombs 2023);
-        with splines they hold border nodes.
+        With a linear basis they are the gradient jumps across faces of border cells (Coombs 2023).
+        Splines have no such jumps, but the differences still hold their border nodes.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)
@@ -378,7 +384,7 @@ class Equations:
         return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-        """Nodes next to `corner` along an axis (rows, 3), or -1."""
+        """Nodes next to corners along an axis (rows, 3); -1 if not in use."""
         shifts = np.array([-1, 0, 1])
         steps = self._steps(g)
         first = self.s.grids.first[g] + (corner * steps).sum(1)

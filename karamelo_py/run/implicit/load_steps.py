@@ -63,6 +63,7 @@ class LoadSteps:
         self.seconds: dict[str, float] = {}  # by stage
 
     def advance(self, hooks: Tag, count: int) -> int:
+        """Take up to `count` load steps; return the status, as `run_steps` does."""
         control = self.simulation.setup.control
         step, motion, energy = control.step[0], control.motion[0], control.energy[0]
         s, mode = self.simulation.setup, self.simulation.mode
@@ -174,7 +175,10 @@ class LoadSteps:
         return time
 
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
-        """Take a substep; return corrections and residual. Raises `Failed` before points move."""
+        """Take a substep, with the loads at its end; return corrections and residual.
+
+        Raises `Failed` without equilibrium; the points have not moved then.
+        """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
         time = float(control.values[TIME])
@@ -230,6 +234,7 @@ class LoadSteps:
             ) from None
 
     def _forces(self, hooks: Tag) -> np.ndarray:
+        """Sum mass, momentum and forces at the nodes; return the forces (nodes, d)."""
         simulation = self.simulation
         s = simulation.setup
         simulation.clear_forces()
@@ -250,10 +255,10 @@ class LoadSteps:
     def _equilibrium(
         self, hooks: Tag, dt: float, before: np.ndarray | None, after: np.ndarray
     ) -> "Equilibrium":
-        """Find the displacements in equilibrium.
+        """Find the displacements at which forces balance.
 
-        `before` (None without inertia), `after`: forces of the present stress and loads at
-        beginning and end.
+        `before` (None without inertia) and `after` are the nodal forces of the present stress and
+        the loads at the beginning and at the end.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -332,7 +337,11 @@ class LoadSteps:
             raise self._error(trouble.message, trouble.fix, trouble.mark)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
-        """Publish reactions; set nodal velocities and forces on rigid solids."""
+        """Let fixes publish the reactions at their nodes; set nodal velocities.
+
+        Fixes get the velocity that a node would have without them. Rigid solids take the remaining
+        forces.
+        """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
         mass = result.equations.mass[:, None]
@@ -409,7 +418,7 @@ class LoadSteps:
         )
 
     def refuse_all_loose(self) -> None:
-        """Raise ScriptError if no node near points is held."""
+        """Refuse, before any step, a scene in which fixes hold no node near points."""
         s, bound = self.simulation.setup, np.any(self.fixed_nodes(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         can_move = free_from(s.kin) < s.kin.dimension

@@ -38,11 +38,11 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would move `at` times as far as allowed."""
+    """Points would move `at` times as far as allowed at once."""
 
 
 class Loose(Failed):
-    """The equations are singular at node `at`."""
+    """The equations are singular: hardly anything holds node `at`."""
 
 
 class Wrong(Failed):
@@ -54,10 +54,11 @@ class Broken(Failed):
 
 
 class Newton:
-    """The balance of forces, and its solution.
+    """The balance of forces after displacements, and its solution.
 
-    `free` (m, d) masks unknowns, `external` (m, d) are all but internal forces, `pushing` are
-    contact and tools; `fixed` returns the held components (nodes, d).
+    `free` (m, d) masks the unknown components, `external` (m, d) are all forces but internal ones,
+    `pushing` are contact and tools. `seconds` collects the time of the stages stress, assembly and
+    solution; `fixed` returns the components (nodes, d) that fixes hold.
     """
 
     def __init__(
@@ -94,8 +95,8 @@ class Newton:
     ) -> tuple[np.ndarray, int, float]:
         """Return displacements (m, d), the number of corrections and the residual.
 
-        `jump` (m, d): prescribed components. Raises `Failed` without convergence, `Broken` if
-        `interrupted(corrections, residual)`.
+        `jump` (m, d) has the prescribed components. Raises `Failed` if the iterations do not
+        suffice, and `Broken` if `interrupted`, called with corrections and residual, returns True.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -137,15 +138,19 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
-        """Norm of forces, and of torques over the largest radius."""
+        """Norm of the forces; torques count with the largest radius as lever."""
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
+        """Estimate the rounding of forces: of strains relative to 1, and of u."""
         far = np.abs(u) + self.spacing / self.lever
         return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
-        """Change of displacements (m, d), as accurate as needed (Eisenstat & Walker 1996)."""
+        """Solve the linear equations for the change of all displacements (m, d).
+
+        The accuracy is what retains quadratic convergence (Eisenstat & Walker 1996).
+        """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):
             equations.linearise(self.dt, self.ghost)

@@ -43,9 +43,9 @@ def is_wet(equations: Equations) -> bool:
 
 
 class Seepage:
-    """Nodal pressures `p` (m,), and their equations.
+    """Nodal pressures `p` (m,) of a step, and their equations.
 
-    Point arrays have an entry per wet point, in the order of `wet`.
+    Arrays of points have one entry per wet point, in the order of `wet`: blocks and their stencils.
     """
 
     def __init__(self, equations: Equations, hooks: Tag, dt: float):
@@ -141,7 +141,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Volume (m,) supplied to nodes; stores the mass rate, as `MakeFlux` does."""
+        """Volume (m,) given to nodes; stores the mass per time, as `MakeFlux` does."""
         flux = field(self.equations.s.nodes.fields, GivenFlux)
         if flux is None:
             return np.zeros(self.m)
@@ -233,7 +233,10 @@ class Seepage:
         return x[: len(b)]
 
     def _change(self, step: np.ndarray) -> None:
-        """Add `step` to pressures, through the saturation exp(p/a) where pores empty."""
+        """Add a change of the pressures.
+
+        Where pores empty, the change is made in the saturation exp(p/a).
+        """
         a, whole = self.softest, self.p + step
         S = np.exp(np.minimum(self.p, 0) / a)
         left = np.where(self.p < 0, S * (1 + step / a), 1 + whole / a)
@@ -245,6 +248,7 @@ class Seepage:
         return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:
+        """Write the water of the points; let fixes publish what left through their nodes."""
         first = 0
         for block, seen in self.wet:
             some = slice(first, first := first + len(seen.count))

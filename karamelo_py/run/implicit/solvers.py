@@ -16,11 +16,11 @@ MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
 
 
 class Singular(Exception):
-    """Something is loose, or a limit load is reached."""
+    """No solution: something is not held, or a limit load is reached."""
 
 
 class Unconverged(Exception):
-    """1 % or more of the residual remains."""
+    """Multigrid leaves more than 1 % of the residual."""
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
@@ -83,8 +83,9 @@ def amg(
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
     `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: the near null space of
-    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy`: final residual over b. `kept`
-    stores the hierarchy, reused while few iterations suffice.
+    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual over b.
+    The hierarchy takes most of the time, so it is stored in `kept` and reused for similar matrices
+    while few iterations suffice.
     """
     import pyamg
 

@@ -107,7 +107,10 @@ def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
-    """Refuse bodies displaced from their state; warn of rotation without a fix."""
+    """Refuse bodies whose points are not where the state of the fix has them.
+
+    Warn of rigid solids that rotate without a fix: their points fly straight on.
+    """
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     x, v = np.full((2, count, d), np.nan)
     for block in blocks:
@@ -169,7 +172,7 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
 
 
 def _driven(hub: Hub, moving: list[RigidBody]) -> set:
-    """Return the bodies on which something acts."""
+    """Return the bodies on which something acts, directly or through contacts and joints."""
     driven = set()
     for fix in moving:
         if fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix):

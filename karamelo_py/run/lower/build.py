@@ -58,7 +58,7 @@ SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
 
 
 class State(NamedTuple):
-    """All points after a run, by id: (components, N)."""
+    """State of all points after a run, ordered by id; arrays (components, N)."""
 
     count: int  # type: ignore[assignment]  # number of points, N
     present: np.ndarray  # (N,) bool, False for deleted points
@@ -215,9 +215,9 @@ def lower(
     hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
-    """Make the arrays of a run, continuing the state of earlier points.
+    """Make the arrays of a run from the scene, continuing the state of earlier points.
 
-    With `ids` (first, end), only those points, with the tiles of a process.
+    With `ids` (first, end), these are only those points, with the tiles of a process of `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -348,7 +348,7 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[arrays.Points]:
-    """Points `ids` (ascending) in their initial state, by block."""
+    """Points `ids` (ascending) in their initial state, as in the blocks of `setup`."""
     span = int(ids[0]), int(ids[-1]) + 1
     real = PRECISIONS[hub.settings.precision]
     kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")

@@ -81,7 +81,10 @@ def memory_there(simulation: SceneState) -> int:
 
 
 def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
-    """Yield errors for everything that no GPU supports, without `setup` only some."""
+    """Yield an error for everything in a scene that no GPU supports.
+
+    Without `setup`, checks that need arrays are skipped.
+    """
     scheme = hub.update.scheme
     from karamelo_py.run.gpu import Card  # registers its rows
 

@@ -213,7 +213,11 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Call a hook; check that processes agree, since collective calls would deadlock."""
+    """Call a hook; if each process calls it for its points, check that all agree.
+
+    Collective calls must match, else processes deadlock; published values must be equal, else they
+    are partial sums.
+    """
     try:
         hook(view)
         if fix.point_by_point:

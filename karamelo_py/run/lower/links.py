@@ -181,7 +181,7 @@ def balls_of(region: Region, h: float) -> np.ndarray:
 
 
 def _planes(shape: Tag, sign: float) -> Iterator[np.ndarray]:
-    """Outward normals and offsets of plane faces (d + 1,)."""
+    """Outward normals of plane faces, and their products with a position, (d + 1,) each."""
     if isinstance(shape, Outside):
         yield from _planes(shape.inner, -sign)
     elif isinstance(shape, Convex):

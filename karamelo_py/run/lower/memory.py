@@ -1,4 +1,7 @@
-"""Memory of a scene or a process's part."""
+"""Memory of a scene or a process's part of it; scenes that do not fit are refused.
+
+Only the minimum that a run needs is compared, so nothing that would run is refused.
+"""
 
 import gc
 from math import ceil
@@ -62,7 +65,7 @@ def _held(item: object, seen: set[int]) -> int:
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     """Bytes of array rows in ascending spans (k, 2).
 
-    Linux uses pages of 2 MiB for large arrays.
+    For large arrays Linux uses pages of 2 MiB, which include gaps between used nodes.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row

@@ -54,6 +54,7 @@ class PoreWater(NamedTuple):
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
+        """Name the drainage of a solid in a time, across its shortest side."""
         law, kin = solid.material.whole, Space()
         M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag

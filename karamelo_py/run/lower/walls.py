@@ -44,9 +44,10 @@ def with_walls(fixes: list[Fix], lattices: list[Lattice], basis: NamedTuple) -> 
 
 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield direction and upper cells (n, d) of walls.
+    """Yield the direction of walls, and the cells (n, d) above them.
 
-    Held faces are no walls within a block of held nodes.
+    A face is a wall if its nodes are held, except within a block of held nodes, where the next
+    faces on both sides are held, too. The ends of the grid are walls anyway.
     """
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]
@@ -68,7 +69,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
 
 
 def mark_sides(hub: Hub, s: Setup) -> None:
-    """Mark nodes at edges of grids and held ones."""
+    """Mark the nodes at edges of grids, and the nodes that fixes hold in this run (`Sides`)."""
     sides = field(s.nodes.fields, Sides)[:, 0]
     if sides.any():  # pages that are never written take no memory
         sides[:] = 0

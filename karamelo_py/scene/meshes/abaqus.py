@@ -1,4 +1,4 @@
-"""Meshes in Abaqus or CalculiX decks.
+"""Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
 Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX CrunchiX
 manual).
@@ -77,7 +77,10 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 
 
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
-    """Elements (n, count), with continued lines."""
+    """Elements (n, count); lines continue until they have `count` numbers.
+
+    Extra numbers on the last line, such as inner nodes of C3D8I, are ignored, as in CalculiX.
+    """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
         return flat.reshape(-1, count)

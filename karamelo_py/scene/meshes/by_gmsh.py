@@ -26,6 +26,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
+    """Open a model; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -45,7 +46,10 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Initialize Gmsh without its reset of SIGPIPE, which would end programs."""
+    """Initialize Gmsh without its reset of SIGPIPE.
+
+    After the reset, a closed pipe or a closed live page would end the program.
+    """
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
@@ -104,6 +108,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
+    """Read a mesh; errors of Gmsh become ValueError."""
     with alone(path, "" if path.suffix.lower() in READS else ".msh") as link:
         try:
             with _model(link) as gmsh:

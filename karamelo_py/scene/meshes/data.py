@@ -60,7 +60,10 @@ class Mesh(NamedTuple):
     left_out: dict[str, int]  # number of other elements by type, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of an element set, outer faces of a node set, or all; raises ScriptError."""
+        """Cells of an element set, outer faces of a node set, or all cells.
+
+        Raises ScriptError if the group is unknown or empty.
+        """
         if group is None:
             masks = [np.ones(len(cells.nodes), bool) for cells in self.cells]
         else:

@@ -52,7 +52,10 @@ def included(keyword: DeckKeyword, name: str, above: tuple[Path, ...]) -> Path:
 
 
 def table_of(keyword: DeckKeyword, least: int, most: int, widths: Sequence[int] = ()) -> np.ndarray:
-    """Numbers (n, most) by commas, or in columns of `widths`; default 0."""
+    """Numbers (n, most) of the data lines, separated by commas or in columns of `widths`.
+
+    Omitted numbers are 0.
+    """
     ends = list(itertools.accumulate(widths))
     starts = [0, *ends[:-1]]
     rows = []
@@ -106,7 +109,10 @@ class DeckPart:
         self.places.append(places)
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ascending node numbers (n,) and positions; the last definition counts."""
+        """Ascending node numbers (n,) and their positions.
+
+        The last definition of a node counts.
+        """
         if not self.numbers:
             return np.empty(0, np.int64), np.empty((0, 3))
         numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
@@ -131,7 +137,7 @@ def into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
 
 
 def into_by_owner(sets: SetItems, owners: np.ndarray, numbers: np.ndarray) -> None:
-    """Add numbers (n,) to the sets of owners (n,), such as parts."""
+    """Add numbers (n,) to the sets of their owners (n,), such as parts or properties."""
     order = np.argsort(owners, kind="stable")
     names, first = np.unique(owners[order], return_index=True)
     for name, of in zip(names, np.split(numbers[order], first[1:]), strict=True):
@@ -172,14 +178,17 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, as functions that list numbers of the mesh."""
+    """Sets by name, as functions that list numbers of the mesh.
+
+    They are functions because a deck may have many sets.
+    """
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)
         self.numbering: dict[str, Numbering] = {}
 
     def add(self, name: str, instance: str, items: SetItems | np.ndarray, key: str = "") -> None:
-        """Add items, or the set `key` of items, of an instance."""
+        """Add items, or the set `key` of items, by numbers of an instance."""
         numbering = self.numbering.get(instance, NO_NUMBERS)
 
         def listed() -> np.ndarray:

@@ -87,10 +87,10 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Elements of `dimension` in a mesh or its `group`, by type.
+    """Elements of `dimension` in a mesh or its `group`, one item per type.
 
-    `lower` accepts groups of lower dimension. Raises ScriptError without elements, for unsupported
-    types, and off z = 0 in 2D or the x axis in 1D.
+    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
+    no elements, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -144,6 +144,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
+    """Natural coordinates of the nodes, or only of the corners if the others are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -195,7 +196,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements, as older formats have for two groups."""
+    """Drop repeated elements: older formats repeat the elements of two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -216,10 +217,10 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Orient elements; return them, volumes (n,) and centroids (n, d).
+    """Elements with positive orientation, volumes (n,) and centroids (n, d).
 
-    Integrals of det J and x det J are exact. Raises ScriptError for flat or twisted elements; a few
-    curved ones may be twisted near an edge.
+    Integrals of det J and x det J are exact, also with curved edges and warped faces. Raises
+    ScriptError for a flat or twisted element; a few curved ones may be twisted near an edge.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -265,6 +266,7 @@ def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.n
 
 @lru_cache
 def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Weights (q,), shape functions (q, c) and slopes (q, c, d) at Gauss points."""
     shape = SHAPES[name]
     exponents = _exponents(name, len(reference))
     order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with merged corners
@@ -289,6 +291,7 @@ def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shape functions (q, c) of nodes at `reference`, and slopes (q, c, d), at `points`."""
     if name == "pyramid":
         return _of_pyramids(points)
     exponents, inverse = _coefficients(name, reference)

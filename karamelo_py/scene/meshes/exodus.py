@@ -38,6 +38,7 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
+    """Arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:
@@ -62,7 +63,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Read a file; raises KeyError or OSError for others."""
+    """Read blocks, side sets and node sets; raises KeyError or OSError for other files."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

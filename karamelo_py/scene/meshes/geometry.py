@@ -62,7 +62,10 @@ class _Token(NamedTuple):
 
 
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
-    """Refuse a geometry that does more than describe a shape, or if trusted, ends the program."""
+    """Raise ScriptError for a geometry that does more than describe a shape.
+
+    If `trusted`, refuse only what ends the program.
+    """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)
     if not trusted:

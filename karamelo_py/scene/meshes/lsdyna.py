@@ -1,4 +1,8 @@
-"""Meshes in LS-DYNA keyword decks (LS-DYNA Keyword User's Manual, volume I)."""
+"""Meshes in LS-DYNA keyword decks: nodes, solids, shells, parts and sets.
+
+Numbers are in columns, in long columns or separated by commas (LS-DYNA Keyword User's Manual,
+volume I).
+"""
 
 import re
 from collections.abc import Iterator
@@ -59,7 +63,10 @@ def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[DeckKeyword]
 
 
 def _table(keyword: DeckKeyword, count: int, width: int = 10, ids: int = 1) -> np.ndarray:
-    """Numbers (n, count): `ids` columns of 8 or 10, then `width`; 20 if long."""
+    """Numbers (n, count): `ids` columns of 8 or 10, the others of `width`.
+
+    In long decks all columns have 20 characters.
+    """
     is_long = "LONG" in keyword.options
     widths = [20] * count if is_long else [*[8 if width != 10 else 10] * ids, *[width] * count]
     lines = [line for line in keyword.lines if line.strip()]

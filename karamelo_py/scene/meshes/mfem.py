@@ -34,7 +34,10 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Numbers of second-order nodes by corners: edges, faces, elements, as they appear."""
+    """Numbers of second-order nodes, from `first` on, by the corners between which they lie.
+
+    Edges, quadrilateral faces and elements follow each other, each in the order of appearance.
+    """
     numbers: dict[frozenset[int], int] = {}
     faces = {**FACES, "triangle": (), "quad": (), "line": ()}
     bottom, top, *others = FACES["hexahedron"]
@@ -52,7 +55,7 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Read a mesh, with attributes as groups; raises ValueError."""
+    """Read a mesh, with attributes as groups; raises ValueError for unsupported content."""
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
         head = text.strip().splitlines()[0]

@@ -1,4 +1,7 @@
-"""Meshes in Nastran bulk data (MSC Nastran Quick Reference Guide)."""
+"""Meshes in Nastran bulk data: nodes in any coordinate system, solids, properties as groups.
+
+Entries are in small or large fields or separated by commas (MSC Nastran Quick Reference Guide).
+"""
 
 import re
 from collections import defaultdict
@@ -137,6 +140,7 @@ class _Systems:
     def places(
         self, entry: _Entry, number: int, x: np.ndarray, above: tuple[int, ...] = ()
     ) -> np.ndarray:
+        """Positions (n, 3) in the basic system of coordinates `x` in a system."""
         number = self.default if number < 0 else number
         if not number:
             return x

@@ -9,7 +9,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Read polygons as triangles, objects and groups as sets."""
+    """Read a file: polygons become triangles, objects and groups become sets."""
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}
@@ -49,7 +49,7 @@ def read_obj(path: Path) -> Mesh:
 
 
 def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
-    """Divide a polygon from a corner that sees all of it."""
+    """Divide a polygon into a fan of triangles from a corner that sees all of it."""
     count = len(corners)
     for start in range(count):
         fan = [

@@ -1,7 +1,7 @@
-"""Entry point for mesh files.
+"""Entry point for mesh files: chooses the reader.
 
-Gmsh reads its own formats, MED, UNV and CGNS, and meshes geometries; meshio reads formats without a
-reader here.
+Decks of Abaqus, LS-DYNA and Nastran, Exodus, MFEM and OBJ have readers here. Gmsh reads its
+formats, MED, UNV and CGNS, and meshes geometries; meshio reads the rest.
 """
 
 import contextlib
@@ -166,7 +166,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _read_all(path: Path) -> None:
-    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries crash."""
+    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries print or crash."""
     import h5py
 
     def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -278,6 +278,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
+    """An exception as one line; meshio hides that no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
