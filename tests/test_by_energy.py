@@ -506,6 +506,8 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ('"k*(I1 - 3)"', "unknown name 'k'", "k=..., after the formula"),
         ("k*(I1 - 3), k=mu, c9=1", "no argument is named 'c9'", "rho=..., energy=..., fibre="),
         ("k*(I1 - J), k=-mu, J=1", "J is a variable of the formula", "by another name"),
+        ("PI*(I1 - 3), PI=3", "'PI' is the number pi", "a name that is free"),
+        ("exp*(I1 - 3), exp=3", "'exp' is a function", "a name that is free"),
         ('k*(I1 - 3), k="mu"', 'k = "mu" is not a number', "a number"),
         ("k*(I1 - 3), k=1, k=2", "k is given twice", ""),
         ("log(I1 - 3)", "no value at rest", ""),

@@ -848,6 +848,9 @@ def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
             for law in ("own", "energy")
         )
         np.testing.assert_allclose(own, energy, rtol=1e-8, atol=1e-2)
+    (tmp_path / "in.file").write_text(lines[0].replace("1000", "-1000"), "utf-8")
+    done = karamelo_py(site, tmp_path, "in.file")
+    assert done.returncode == 1 and "'rho' must be a number above 0" in done.stderr
 
 
 MUD = """

@@ -289,6 +289,24 @@ def test_warm_polymers_relax_sooner():
     assert laws.temperature(law, SPACE, state) - 383 == pytest.approx(lost / 2e6, rel=1e-3)
 
 
+def test_the_temperature_of_a_point(run_interpreted):
+    """The branch is gone where a is 1e-9; far below Tr it holds, with a warning."""
+    script = """
+        material(r, neo-hookean, 1000, 1e6, 0.4, 2000, 0.2)
+        viscosity(prony, r, g=0.3, tau=1, wlf=(17.44, 51.6, 293))
+        load_path(p, 1, exy=5e-4, duration=1)
+        element(e, r, p)
+        element(f, r, p, T=350)
+        print(e_sxy, f_sxy, f_T)
+    """
+    said = run_interpreted(script)
+    found = [float(one) for one in re.findall(r"_(?:sxy|T) = ([.\d]+)", said.out)]
+    assert found == pytest.approx([1e-3 * G, 0.7e-3 * G, 350], rel=1e-3)
+    assert said.err.count("the point starts at the temperature 0") == 1
+    script = script.replace(", 2000, 0.2", "").replace(", wlf=(17.44, 51.6, 293)", "")
+    assert "'r' has no temperature" in run_interpreted(script, status=1).err
+
+
 PRONY = """material(damper, neo-hookean, 1000, 1e6, 0.4)
     viscosity(prony, damper, g=0.3, tau=0.005)"""
 VOIGT = "viscosity(newtonian, damper, mu=500)"
@@ -398,7 +416,8 @@ def test_relaxation_below_the_step_is_reported(run_interpreted, more):
         ("prony, rubber, g=(0.3, x), tau=(1, 2)", "x is not a number above 0"),
         ("prony, rubber, g=(0.6, 0.4), tau=(1, 2)", "no stiffness would remain"),
         ("prony, wood, g=0.3, tau=1", "no isotropic elastic solid"),
-        ("prony, damper, g=0.3, tau=1", "no isotropic elastic solid"),
+        ("prony, damper, g=0.3, tau=1", "has viscosity prony already"),
+        ("prony, thick, g=0.3, tau=1", "before viscosity(newtonian, ...)"),
         ("prony, nothing, g=0.3, tau=1", "unknown material"),
         ("prony, rubber, g=0.3, tau=1, wlf=(17, 52, 300)", "no temperature that could shift times"),
         ("prony, warm, g=0.3, tau=1, wlf=(17, 52)", "'(17, 52)' is no shift"),
@@ -428,6 +447,7 @@ def test_constants_that_no_body_has(run_interpreted, line, says):
         ("stiff, 2, 9", "no energy that could soften"),
         ("warm, 2, 9", "no energy that could soften"),
         ("wood, 2, 9", "no isotropic elastic solid"),
+        ("damper, 2, 9", "mullins, ...) of the material without viscosity"),
     ],
 )
 def test_rubber_that_cannot_soften(run_interpreted, line, says):

@@ -10,10 +10,12 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.laws import can, constrained_velocity
+from karamelo_py.points.laws import can, constrained_velocity, law_parts
 from karamelo_py.points.laws.doubts import doubts
 from karamelo_py.points.laws.placed import place_of
+from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.laws.thin import ThinInLargeIncrements
+from karamelo_py.points.laws.viscoelastic import Wlf
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.run.lower.check_plugins import try_law
 from karamelo_py.scene.hub import Catalogue, Hub
@@ -216,6 +218,7 @@ def element(
         "3D", "plane-strain", "plane-stress", "axisymmetric", "1D", "uniaxial-stress"
     ] = "3D",
     tangent: bool = False,
+    T: float | None = None,
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
 
@@ -237,6 +240,8 @@ def element(
     tangent
         Print derivatives of the Cauchy stress with respect to the strains and shear angles (twice
         the tensor strains) of the last increment.
+    T
+        Temperature at the start.
 
     Example
     -------
@@ -270,13 +275,19 @@ def element(
     if place_of(material.whole):
         message = f"the directions of material '{material.id}' differ from point to point"
         raise ScriptError(message, argument="material", expected="directions given by numbers")
+    if T is not None and not can(material.whole, initial_heat):
+        message = f"material '{material.id}' has no temperature"
+        raise ScriptError(message, argument="T", expected="a material with cp, or leave out T")
+    if T is None and any(isinstance(one, Wlf) for one in law_parts(material.whole)):
+        hint = f"element({ID}, ..., T=293)"
+        hub.warn("the point starts at the temperature 0, which shifts its relaxation", hint=hint)
     law, kin = material.filled, KINEMATICS.get(kinematics)
     if kinematics == "uniaxial-stress":
         refuse_flattening(material, "kinematics", "3D with syy=0 and szz=0")
     if kin is None:
         law = ThinInLargeIncrements(material.whole)
         kin = PlaneStrain() if kinematics == "plane-stress" else Line()
-    point = Point(law, kin)
+    point = Point(law, kin, T)
     paths = (first, *more)
     for number, path in enumerate(paths):
         _check_components(path, point, kinematics, number)

@@ -32,7 +32,7 @@ def _table(column: Sequence, real: type) -> Any:
     return np.array(column, real)
 
 
-def law_on(law: Any, h: float, T0: float | None) -> Any:
+def law_on(law: Any, h: float | None, T0: float | None) -> Any:
     """Set the fields ``cell_size`` and ``initial_temperature`` of a law and its parts."""
     values = {"cell_size": h, "initial_temperature": T0}
 

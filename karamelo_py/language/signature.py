@@ -40,7 +40,7 @@ from karamelo_py.language.kinds import (
     kind_of,
 )
 from karamelo_py.language.scene import Scene
-from karamelo_py.language.unknown import renamed
+from karamelo_py.language.unknown import check_name, renamed
 from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 __all__ = [
@@ -255,6 +255,11 @@ def _bind(
         elif word in by_name:
             bound[word] = [value]
         elif formula:
+            try:
+                check_name(word)
+            except ScriptError as error:
+                error.mark = argument.mark
+                raise
             numbers[word] = value
         else:
             raise explain.unknown_keyword(word, argument, expected, name)
@@ -299,7 +304,8 @@ def _joined(expected: list[Parameter]) -> str:
             open_brackets += 1
         else:
             text += shown
-    return text + "]" * open_brackets
+    numbers = "[, number=...]" if any(p.kind.with_numbers for p in expected) else ""
+    return text + "]" * open_brackets + numbers
 
 
 # Families without a command: the one that names their styles.

@@ -15,6 +15,7 @@ import numpy as np
 
 from karamelo_py.compiler import on_numbers
 from karamelo_py.compiler.slopes import Dual, slopes_of
+from karamelo_py.kernels.laws import law_on
 from karamelo_py.language.arguments import Named
 from karamelo_py.output.files import savefig, whole
 from karamelo_py.output.plots import blank_figure, tidy
@@ -101,9 +102,11 @@ def stress_after(law, kin, state, dl, dt):
 
 
 class Point:
-    def __init__(self, law: NamedTuple, kin: NamedTuple):
-        self.law, self.kin = law, kin
-        self.state = laws.initial_state(law, kin, 1.0)
+    def __init__(self, law: NamedTuple, kin: NamedTuple, T: float | None = None):
+        self.law, self.kin = law_on(law, None, T), kin
+        self.state = laws.initial_state(self.law, kin, 1.0)
+        if T is not None:
+            self.state = laws.with_temperature(self.law, kin, self.state, T)
         self.strain = np.zeros(6)  # sum of symmetric parts of dt grad v
         self.time = 0.0
         self.work = 0.0  # per reference volume

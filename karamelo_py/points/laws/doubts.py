@@ -56,9 +56,12 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
         law = law.elastic
     if (lam := parameter(law, "lam")) < 0:
         nu = lam / (2 * (lam + law.G))
+        likely = f"{-nu:.3g}" if -nu < 0.5 else "from 0 to 0.5"
+        if isinstance(law, ByEnergy):
+            likely = f"a bulk modulus above {2 / 3 * law.G:.3g} (it is {lam + 2 / 3 * law.G:.3g})"
         yield (
             f"its Poisson's ratio is {nu:.3g}: a bar of it swells when it is pulled",
-            f"{-nu:.3g}, unless it is auxetic",
+            f"{likely}, unless it is auxetic",
         )
     if isinstance(law, ByEnergy) and (unstable := first_instability(law, turning)):
         path, stretch = unstable

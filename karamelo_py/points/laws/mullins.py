@@ -21,6 +21,7 @@ SPACE = Space()
 class HyperelasticMaterial(ElasticMaterial):
     script_kind = "the ID of a hyperelastic material"
     purpose = "soften"
+    order = "material(ID, mullins, ...) of the material without viscosity, then viscosity"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:

@@ -24,7 +24,8 @@ from karamelo_py.points.kinematics import (
     tensor,
     tr,
 )  # fmt: skip
-from karamelo_py.points.laws import Absent, law_traits
+from karamelo_py.points.laws import Absent, law_parts, law_traits
+from karamelo_py.points.laws.newtonian import Newtonian
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError
 
@@ -36,10 +37,14 @@ SMALL = 0.01  # step over relaxation time below which a series is exact
 class ElasticMaterial:
     script_kind: ClassVar[str] = "the ID of an elastic material"
     purpose: ClassVar[str] = "relax"
+    order: ClassVar[str] = "one viscosity(prony, ...), before viscosity(newtonian, ...)"
 
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         material = look_up(hub.materials, argument)
+        if viscous := [type(one) for one in law_parts(material.whole) if type(one) in VISCOUS]:
+            message = f"material '{material.id}' has viscosity {VISCOUS[viscous[0]]} already"
+            raise ScriptError(message, mark=argument.mark, expected=cls.order)
         if not law_traits(material.whole).rebounds or not is_isotropic(material.whole):
             raise ScriptError(
                 f"material '{material.id}' is no isotropic elastic solid, whose stress could "
@@ -215,6 +220,9 @@ known_failure(
     "{dt:.4g}: that part of the stress never acts",
     cure="leave the term out, with a softer elastic law",
 )
+
+
+VISCOUS = {Viscoelastic: "prony", Newtonian: "newtonian"}
 
 
 class State(NamedTuple):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, det, inv, tr
 from karamelo_py.points.laws.elastic import of_deformation
+from karamelo_py.points.laws.parameters import AboveZero
 
 
 @of_deformation
@@ -16,8 +17,8 @@ class BlatzKo(NamedTuple):
 
     in_lanes = True  # several points at once
 
-    rho: float
-    mu: float
+    rho: AboveZero
+    mu: AboveZero
 
 
 @laws.kirchhoff_stress.on(BlatzKo)
