@@ -10,12 +10,11 @@ from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.signature import Argument, Positive, style_of
 from karamelo_py.language.unknown import longer
 from karamelo_py.points.kinematics import Axisymmetric, Line, PlaneStrain, Space
-from karamelo_py.points.laws import can, constrained_velocity, law_parts
+from karamelo_py.points.laws import can, constrained_velocity, law_parts, law_traits
 from karamelo_py.points.laws.doubts import doubts
 from karamelo_py.points.laws.placed import place_of
 from karamelo_py.points.laws.temperatures import initial_heat
 from karamelo_py.points.laws.thin import ThinInLargeIncrements
-from karamelo_py.points.laws.viscoelastic import Wlf
 from karamelo_py.run.element import COMPONENTS, NORMAL, LoadPath, Point, Response, Unreachable
 from karamelo_py.run.lower.check_plugins import try_law
 from karamelo_py.scene.hub import Catalogue, Hub
@@ -278,7 +277,7 @@ def element(
     if T is not None and not can(material.whole, initial_heat):
         message = f"material '{material.id}' has no temperature"
         raise ScriptError(message, argument="T", expected="a material with cp, or leave out T")
-    if T is None and any(isinstance(one, Wlf) for one in law_parts(material.whole)):
+    if T is None and any(law_traits(one).by_temperature for one in law_parts(material.whole)):
         hint = f"element({ID}, ..., T=293)"
         hub.warn("the point starts at the temperature 0, which shifts its relaxation", hint=hint)
     law, kin = material.filled, KINEMATICS.get(kinematics)

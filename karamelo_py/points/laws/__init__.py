@@ -31,6 +31,7 @@ class LawTraits(NamedTuple):
     of_solids: bool = False  # eos that holds solids together
     burns: bool = False  # products of an explosive
     fluid: bool = False  # eos of a liquid or gas
+    by_temperature: bool = False  # needs a temperature from its solid
     least_density: float = 10.0  # kg/m^3; less suggests wrong units
 
 

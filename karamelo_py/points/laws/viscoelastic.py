@@ -24,7 +24,7 @@ from karamelo_py.points.kinematics import (
     tensor,
     tr,
 )  # fmt: skip
-from karamelo_py.points.laws import Absent, law_parts, law_traits
+from karamelo_py.points.laws import Absent, LawTraits, law_parts, law_traits
 from karamelo_py.points.laws.newtonian import Newtonian
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError
@@ -76,6 +76,7 @@ class Wlf(NamedTuple):
     """Shift of relaxation times with temperature; script argument (C1, C2, Tr)."""
 
     in_lanes = True
+    traits = LawTraits(by_temperature=True)
     script_kind = "the constants (C1, C2, Tr)"
 
     C1: float
