@@ -123,7 +123,10 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show progress, and the activity `within` a step; `fraction`: None if unknown."""
+        """Show progress, and the activity `within` a step; fast enough to call in each step.
+
+        `fraction` is None if the end is unknown (run_until, run_while).
+        """
         now = time.perf_counter()
         pause = REDRAW if self._progress is not None else REPORT
         if now - self._shown < pause or not self._running:

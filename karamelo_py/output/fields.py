@@ -83,13 +83,13 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: PointGroup) -> np.ndarray:
-        """Return 0-based ids of existing points."""
+        """Return the 0-based ids of existing points."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
 
     def total(self, name: str, group: PointGroup | None = None) -> float:
-        """Exact sum over a group or all points."""
+        """Sum a quantity of `SUMMED` exactly over a group or all points."""
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
@@ -119,10 +119,10 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Exact sums of terms over a part's group.
+        """Sum terms exactly over the points of a part's group.
 
-        ``owner.name(points, *arguments)`` returns terms (k, n), or the number of sums, the sum (n,)
-        of each term, and terms.
+        ``owner.name(points, *arguments)``, called with tables of some points, returns rows of terms
+        (k, n), or the number of sums, the sum (n,) of each term, and terms.
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(owner.group):
@@ -157,7 +157,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Points within `half` (n, d) of one of `x` (n, d) along all axes."""
+        """Numbers of the points within `half` (n, d) of one of `x` (n, d) along all axes."""
         size, numbers = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -216,6 +216,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
+        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -223,6 +224,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
+        """True if a dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -285,7 +287,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial energy of a gas, subtracted to save digits."""
+    """Initial energy of a gas; stored energy is relative to it, to retain digits."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
@@ -305,7 +307,10 @@ SUMMED = {
 
 
 class ColumnFormula:
-    """Script argument: a formula of columns, groups and solids (1 or 0), time and values."""
+    """Script argument: a formula of dump columns, groups and solids, time and values.
+
+    Groups and solids are 1 for their points, else 0.
+    """
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
     MOST = 6

@@ -64,7 +64,10 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open at byte `start` (0: new); errors restore the file, plus `tail`."""
+    """Open at byte `start` (0: a new file).
+
+    An error truncates the file to `start`, and appends `tail`.
+    """
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
             file.seek(start)
@@ -181,7 +184,7 @@ class Frames:
 
 
 class Claim:
-    """Lock of a folder or file."""
+    """Lock of a folder or file that one program writes, until `release` or its end."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
@@ -192,7 +195,7 @@ _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDi
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock a path; None if another program has locked it."""
+    """Lock a path, if the system can; None if another program has locked it."""
     try:
         import fcntl
 

@@ -1,7 +1,7 @@
-"""Read HDF5 files that were not closed.
+"""Read HDF5 files that were not closed: being written, left by a killed program, or damaged.
 
-HDF5 opens them only in SWMR mode, which retries damaged data for years. Here the header is read as
-if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
+HDF5 opens them only in SWMR mode, which retries damaged data for minutes to years. Here the header
+is read as if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
 """
 
 from __future__ import annotations
@@ -22,7 +22,10 @@ _MASK = 0xFFFFFFFF
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open a file at its present content; OSError if truncated or damaged."""
+    """Open a file at its present content.
+
+    Raises OSError if it is not HDF5, truncated or damaged.
+    """
     import h5py
 
     with path.open("rb", buffering=0) as raw, h5py.File(_Closed(raw), "r") as root:

@@ -48,6 +48,7 @@ class Log(Rhythmic):
         return self.hub.folder / self.file
 
     def begin(self) -> None:
+        """Write the header to a new file, and always to the terminal."""
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
         headings = [column.heading for column in self.columns]

@@ -18,7 +18,7 @@ from karamelo_py.points.laws import can, constrained_velocity
 
 
 class NodeTable(NamedTuple):
-    """Nodes with consecutive numbers; without mass, they are at rest."""
+    """Columns of nodes with consecutive numbers; nodes without mass are at rest."""
 
     hub: Scene
     ids: np.ndarray
@@ -72,10 +72,10 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 
 
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Kind of each node along an axis.
+    """Kind of each node along one axis.
 
-    Splines: -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge. Bernstein: 1 in
-    the middle of a cell. Otherwise 0.
+    Splines have -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
+    Bernstein nodes are 1 in the middle of a cell. All others are 0.
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
@@ -92,7 +92,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Loads on nodes, and on points by the basis."""
+    """Loads of fixes on nodes, and of fixes on points, transferred by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -172,7 +172,10 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """Sums of N times a value (nodes, 2): whole units, and the remainder."""
+    """Sums of N times a value over local points, (nodes, 2).
+
+    The columns have whole units, and the remainder.
+    """
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))
     terms = [(block, BROUGHT[name](simulation, block)) for block in s.blocks]

@@ -69,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Scatter with linear weights; `at` is in cells."""
+    """Sums at nodes of points at `at` (in cells), with linear weights."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -92,7 +92,10 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Lines (m, 2) of zero depth, with `fine` steps on the long side."""
+    """Lines (m, 2) of zero depth between the corners `lo` and `hi` (2,).
+
+    There are `fine` steps on the long side.
+    """
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -103,7 +106,8 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Lines (m, 3) on a tool's surface between two corners (3,).
 
-    Sections across each axis: at the ends, where faces meet, and between on curved surfaces.
+    They are sections across each axis: at the ends, where faces meet, and between if the surface is
+    curved. A box gets its edges, a ball circles.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -125,6 +129,7 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
+    """Depths on a lattice tightly around the surface between corners (3,); None without one."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -158,6 +163,7 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
+    """Lines (m, 3) on the surface, except on planes that cut it off."""
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(ends[0], ends[1], BETWEEN + 2)
@@ -183,7 +189,7 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and slight bends."""
+    """Sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections of slight bends."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
@@ -213,9 +219,9 @@ def _section(depth: Depth, axis: int, height: float, x: np.ndarray) -> np.ndarra
 
 
 class Front:
-    """Height nearest to the eye by cell, from projected points x (n, 3).
+    """Height of the surface nearest to the eye in each cell, from projected points x (n, 3).
 
-    A point fills adjacent cells; up to twice as many `gaps` are closed.
+    A point fills its cell and the adjacent ones; up to twice as many `gaps` are closed.
     """
 
     def __init__(self, x: np.ndarray, low: np.ndarray, high: np.ndarray, cell: float, gaps: int):

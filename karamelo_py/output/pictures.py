@@ -107,9 +107,9 @@ class DrawnPoints(Artist):
 
 
 class Picture:
-    """Axes and colour bar, with points on top.
+    """Axes, labels and colour bar, with the points of a state on top.
 
-    Pixels of the axes, which take longest, are stored until the limits change.
+    Matplotlib spends most time on axes: their pixels are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -142,9 +142,13 @@ class Picture:
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark ends that values exceed."""
+        """Mark the ends of the colour bar that values exceed."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
+        """Label lengths in a unit that suits the numbers.
+
+        Without a unit, a power of 1000 is used.
+        """
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -257,7 +261,7 @@ class Picture:
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Reserve room for the widest labels."""
+        """Reserve room for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         for _ in range(2):  # the aspect ratio moves the axes
@@ -292,7 +296,10 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Extend limits to finite values, rounded outwards to 2^k / 8 to change rarely."""
+    """Limits grown to the finite values.
+
+    They are rounded outwards to 2^k / 8, so that they change rarely.
+    """
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     if limits is not None:
@@ -490,6 +497,7 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
+        """Mask of points that are not completely hidden: the surface of a large body."""
         # An adjacent cell lies within a point's circle, which lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5

@@ -65,6 +65,7 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
+        """Gather a field; zero for deleted points."""
         local = [(piece.places, piece.taken(of(piece.block.points))) for piece in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -79,7 +80,10 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components), initial where laws lack it, or None."""
+        """A declared field (n, components), with initial values where laws lack it.
+
+        None if no block stores it.
+        """
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
             return None
@@ -101,7 +105,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Copies of arrays (0 for deleted points) and columns in order."""
+    """Arrays (copies; 0 for deleted points) and columns of points in order."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -165,9 +169,9 @@ class PointTable:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """Sums N v (X - x), (n, d d), for transfers that store them.
+        """Sums N v (X - x), (n, d d), for transfers that store them, else None.
 
-        In the total frame, X - x is F times the reference arm.
+        In present coordinates: in the total frame, the arms X - x are F times the reference arms.
         """
         rows = self._rows
         have = [
@@ -188,7 +192,7 @@ class PointTable:
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """A column (n,) of existing points; 0 if the scene lacks it."""
+        """A column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -240,11 +244,13 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.
 
 
 def named_sets(hub: Scene) -> list[str]:
+    """Columns that are 1 for the points of a group or solid, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
+    """1 for points (0-based, (n,)) of a group or solid, else 0."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -260,7 +266,10 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of positions, or half a step earlier without rates."""
+    """Velocities (d, n) at the time of positions if rates are stored.
+
+    Otherwise they are half a step earlier.
+    """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
         return points.v
@@ -327,7 +336,10 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 
 
 def _total_stress(k: int, table: PointTable) -> np.ndarray:
-    """Stress of soil and water (n,) (Bishop 1959)."""
+    """Stress of soil and water (n,).
+
+    The fraction of p that acts is the saturation (Bishop 1959).
+    """
     load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
     return table._exported[:, k] - load
 

@@ -71,6 +71,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
+        """Return the number or word; the first NaN is reported."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
@@ -104,7 +105,7 @@ class Quantity:
 
 
 class Caption:
-    """Text with ``{name}`` or ``{formula}`` for numbers, and ``{{`` for a brace."""
+    """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
     PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathtext in dollars
 

@@ -1,6 +1,6 @@
-"""The record of runs, run.json next to the log (docs/run-record.md).
+"""The record of a script's runs: run.json next to the log (fields: docs/run-record.md).
 
-Banner and closing table are printed from it. Infinite numbers and NaN are null.
+Banner and closing table are printed from it; studies read it. Numbers that are not finite are null.
 """
 
 import hashlib

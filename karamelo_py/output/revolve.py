@@ -17,9 +17,10 @@ VECTORS = {
 def revolved(
     names: tuple[str, ...], column: Callable[[str], np.ndarray], angle: float
 ) -> list[np.ndarray]:
-    """Columns (n,) of a copy at an angle from x to z.
+    """Columns (n,) of a copy at an angle from x to z, in 3D.
 
-    `column`: columns of the half plane. Positions and tensors also rotate by twist.
+    `column` gives the columns of the half plane. Positions and tensors also rotate by twist;
+    reference positions do not.
     """
     made: dict[str, np.ndarray] = {}
     twist = column("twist")

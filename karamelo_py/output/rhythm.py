@@ -15,7 +15,10 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """An interval in time; `passed` counts multiples of `span`."""
+    """Output at the first step from each multiple of `span` on.
+
+    `passed` counts the multiples written.
+    """
 
     def __init__(self, span: float):
         self.span = span
@@ -37,10 +40,11 @@ class Rhythmic:
         raise NotImplementedError
 
     def take_part(self) -> None:
+        """Write on a rank other than 0."""
         self.write()
 
     def finish(self) -> None:
-        """Complete the files at the end of each run, also of a failed one."""
+        """Complete the files at the end of each run, including failed ones."""
 
     @property
     def passed(self) -> int | None:
@@ -77,7 +81,10 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """First step that may be due; half of long intervals unless `fixed`."""
+    """First step that may be due.
+
+    Unless `fixed`, it is after half of a longer interval, as steps may grow.
+    """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every
     left = ((every.now(time) + 1) * every.span - time) / dt

@@ -20,7 +20,9 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    Due are the first and last state of runs, and multiples of `every` in absolute steps or time.
+    The first and last state of every run are due, and multiples of `every` in absolute steps or
+    time, so that further runs continue the sequence. No state is written twice to a file, and
+    nothing in a rehearsal.
     """
 
     def __init__(self, hub: Scene):
@@ -116,7 +118,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Complete the outputs of an aborted run; errors become warnings."""
+        """Complete plots, dumps and log of an aborted run; errors become warnings."""
         if self.hub.rehearsing:
             return
         try:
@@ -165,7 +167,7 @@ def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """True if `path`, whose first ``*`` becomes a number, can name `other`."""
+    """True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

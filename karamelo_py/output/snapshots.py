@@ -27,7 +27,7 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield snapshots from the `first` on; raises ScriptError."""
+    """Yield snapshots from the `first` on; raises ScriptError if the file is no dump."""
     readers: dict[str, Callable[[Path, int], Iterator[Snapshot]]] = {
         ".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd,
     }  # fmt: skip
@@ -87,7 +87,7 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
 
 
 def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
-    """Add id, type and x, y, z from LAMMPS's columns."""
+    """Add id, type and x, y, z from LAMMPS's unwrapped (xu) or scaled (xs) columns."""
     count = len(next(iter(columns.values()), ()))
     columns.setdefault("id", np.arange(1.0, count + 1))
     columns.setdefault("type", np.ones(count))

@@ -42,7 +42,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Yield rows in blocks: integers, the rest with nine digits."""
+    """Yield rows as text in blocks: integers, the rest with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -70,8 +70,10 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(table, start, text, at):
     """Write rows up to the first number that Python must format.
 
-    Returns its index, or the count, and the end of the text. `table`: numbers (rows, columns), the
-    same memory as integers, a mask of integer columns. `text` has `NUMBER_BYTES` per number.
+    Returns the index of that number, or the count, and the end of the text. `table` has the numbers
+    (rows, columns), the same memory as integers, and a mask of integer columns. `start` is the
+    index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and continues
+    at `at`.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -107,7 +109,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write nine digits and return their end, or `at` if undecided."""
+    """Write nine significant digits and return their end, or `at` if undecided."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)
@@ -151,7 +153,10 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Nine digits of x > 0 as an integer (0 if undecided), and its power of ten."""
+    """Nine digits of x > 0 as an integer (0 if undecided), and the power of ten of the first.
+
+    `binary` is the power of two of x.
+    """
     exponent = binary * 315653 >> 20  # log10(2) * 2^20
     exponent += x >= POWERS[index(exponent + 1 - FIRST), 0]
     k = DIGITS - 1 - exponent
@@ -168,6 +173,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
+    """The eight digits of n < 10^8, by halves, quarters, eighths."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

@@ -15,9 +15,10 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write `path` with the ending .vtkhdf: views of the dump's data.
+    """Write `path` with the ending .vtkhdf: positions, columns and vectors of its points.
 
-    VTK does not draw deleted points, whose positions are NaN.
+    The file has no data, only views of the dump. VTK does not draw deleted points, whose positions
+    are NaN.
     """
     import h5py
 

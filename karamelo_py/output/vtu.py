@@ -1,6 +1,7 @@
 """Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-Rows arrive with all columns: compressed blocks wait in temporary files.
+The file has one array after another, but rows arrive with all columns: compressed blocks wait in
+unnamed temporary files until the last row.
 """
 
 import sys
@@ -29,7 +30,7 @@ ARRAYS = {
 
 
 def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
-    """Arrays whose components are among `names`, or 0 in this dimension."""
+    """Arrays whose components are all among the columns `names`, or 0 in this dimension."""
 
     def vanishes(name: str) -> bool:
         axes = {"xyz123".index(axis) % 3 for axis in name[1:]}
@@ -81,7 +82,10 @@ class Column:
 
 
 class Vtu:
-    """Points with columns `names`, and cells."""
+    """Points with columns `names`, and cells.
+
+    The temporary files in `folder` are as large as the file.
+    """
 
     def __init__(self, names: Iterable[str], folder: Path):
         self.points = Column("Points", folder)

@@ -13,6 +13,10 @@ from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 
 def _first_bad(simulation: SceneState) -> tuple | None:
+    """Return the first bad value of this process, None without one.
+
+    It comes as ((fix, formula, point or node), value, position).
+    """
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):
         over = simulation.step > 0 and fix in simulation.begun

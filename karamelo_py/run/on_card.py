@@ -26,10 +26,11 @@ def alike(hooks: Tag, others: Tag) -> bool:
 
 
 class SimulationOnCard(Simulation):
-    """Takes the steps on a GPU; the rest runs on the CPU.
+    """Takes the steps on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays, with points in GPU order and tiles out of date. `changed` and `sort`
-    send them again.
+    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so that
+    arrays are sent again. Fetched points are in GPU order and tiles out of date: users of tiles
+    sort first.
     """
 
     states_every = 1000  # states must be fetched
@@ -63,6 +64,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
+        """Nodes after the last step; fetched on access only, as they may be many."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False

@@ -20,10 +20,11 @@ RETURNS = 2  # per state before an energy gain; two halvings without effect are 
 
 
 class Stopped(ScriptError):
-    """A run failed, and its last good state is written."""
+    """A run failed on all processes; its last good state is written."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
+    """Decide what follows `status` or `grown` energy, after `returns` to the last good state."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -35,9 +36,9 @@ class RollBack:
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state or a file's, which may be `ruined`.
+        """Begin with the present state, or with the state of a file, which may be `ruined`.
 
-        `looks`: a condition may read values between any two steps.
+        `looks`: a condition may read the values of parts between any two steps.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
@@ -49,6 +50,7 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
+        """Store the present state if due and good; else note the memory of parts."""
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
             return  # only the first state is good
         step = self.simulation.step
@@ -61,7 +63,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Handle the `status` of steps; return False if the run went back."""
+        """Handle steps that ended with `status`; return False if the run went back."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, self._repeat):
             self._keep()
@@ -120,6 +122,7 @@ class RollBack:
         present.give(self.hub)
 
     def _points_only_leave(self) -> bool:
+        """True if points leave without an energy gain: smaller steps do not help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
         if not (moves and len(simulation.leaving()) and watch.grown_little()):
@@ -134,9 +137,10 @@ class RollBack:
         return kept
 
     def _stop(self, status: int) -> NoReturn:
-        """Write the last good state and raise the user's error.
+        """Return to the last good state, write it, and raise the user's error.
 
-        If the step was too large from the start, only the initial state is good.
+        After an energy gain it is the last state before the gain; log and dumps end with the last
+        faultless state. If the step was too large from the start, only the initial state is good.
         """
         simulation = self.simulation
         too_large = self.too_large and simulation.steps.too_large

@@ -209,7 +209,7 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort by tile, after exchange with other processes."""
+        """Sort the points by tile, after handing over those in other processes' tiles."""
         self.setup = self.domain.migrate(self.setup)
         domain = self.hub.domain
         if domain.periodic:
@@ -224,6 +224,7 @@ class SceneArrays:
             self.sort()
 
     def bring(self) -> None:
+        """Bring the whole state here, with points in the order of their tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
         if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift
@@ -231,7 +232,7 @@ class SceneArrays:
             self.sort()
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes, unless a step has."""
+        """Map the present state to the nodes unless a step has done so."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -248,6 +249,7 @@ class SceneArrays:
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
+        """Copy all arrays that a step changes, and the published values; see `copied`."""
         self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 

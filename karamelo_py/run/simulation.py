@@ -1,4 +1,4 @@
-"""Time integration of a lowered scene."""
+"""Time integration of a lowered scene: chunks of compiled steps, controlled from Python."""
 
 from __future__ import annotations
 
@@ -39,9 +39,10 @@ TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # of deleted points
 
 
 class Simulation(SceneArrays):
-    """Steps a scene or subdomain on the CPU.
+    """Steps a scene, or one process's subdomain, on the CPU.
 
-    See `run.on_card` for GPUs, `run.implicit.load_steps` for Newton's method.
+    Subclasses override how: on a GPU (`run.on_card`), or by Newton's method
+    (`run.implicit.load_steps`).
     """
 
     states_every = 100  # steps between stored states
@@ -106,9 +107,9 @@ class Simulation(SceneArrays):
         self.steps.measured = self.energy_watch.followed = False
 
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
-        """Delete points (ascending ids); return their mass and energy.
+        """Delete points (ascending ids), without renumbering; return their mass and energy.
 
-        The balance counts the energy as work.
+        The energy balance books their energy as work.
         """
         group = ParticleGroup(self.hub)
         group.take([ids])
@@ -128,7 +129,8 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change velocities and positions by block.
+        `prepare` may change their velocities and positions, block by block. The energy balance
+        books their energy as work.
         """
         if self.comm.leads:  # the next sort hands them over
             blocks = []
@@ -156,15 +158,16 @@ class Simulation(SceneArrays):
 
     @property
     def scheme(self) -> Tag:
+        """The scheme of the steps, another one if fixes lead points that deform."""
         scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
         led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
         leading = scheme.traits.leading
         return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
-        """Take up to `count` steps; return DONE or why it stopped.
+        """Take up to `count` steps, to the end time at most; return DONE, or why it stopped.
 
-        Load steps end if `between(progress)` returns True.
+        Load steps call `between` with a progress message, and end if it returns True.
         """
         self.between = between
         self.control.motion[0].wrong = 0  # from earlier steps

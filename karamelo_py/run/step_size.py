@@ -1,4 +1,4 @@
-"""The step size: a policy per run, applied by the clock."""
+"""The step size: a policy chosen once per run, applied by the clock of the kernels."""
 
 from __future__ import annotations
 
@@ -48,6 +48,7 @@ class StepPolicy(NamedTuple):
         return cls(asked, asked, 1.0, fixed, heat or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
+        """Clock fields after a `path` of the points, in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
@@ -63,12 +64,13 @@ Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Last steps of motion and contact, and path."""
+    """Last steps, of motion and of contact, and path: for the next lowering."""
     step = control.step[0]
     return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
+    """Set the clock of new arrays, continuing after the `last` steps."""
     step, heat = control.step[0], control.heat[0]
     if last is not None:
         step.last_dt, step.last_contact_dt, control.motion[0].path = last
@@ -79,7 +81,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Chooses the steps; only this code writes them to the clock."""
+    """Chooses the steps; the only Python code that writes them to the clock."""
 
     policy: StepPolicy
 
@@ -96,7 +98,7 @@ class StepSize:
         self._choose()
 
     def begun(self) -> None:
-        """Choose the first step again, after initial values are set."""
+        """Choose the first step again, as initial values may change the fastest point."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
@@ -195,7 +197,7 @@ class StepSize:
 
     @property
     def limit_moving(self) -> float:
-        """Stable step of points that cross cells, to which a script refers."""
+        """Stable step of points that cross cells, the basis of a script's fractions."""
         step, rate = self.step, self.motion.rate
         waves = step.courant_moving * step.spacing / rate if rate > 0 else np.inf
         return float(min(waves, self.control.heat[0].heat_limit))

@@ -1,4 +1,4 @@
-"""Tiles of grids, to sort points and to sum on threads."""
+"""Grids cut into tiles: their points, the nodes these reach, the nodes in use."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -54,7 +54,7 @@ DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts points by tile, and finds the nodes in reach."""
+    """Sorts a setup's points by tile, and finds the nodes that each tile may reach."""
 
     threads = 1
     mode: Serial | Threaded = Serial()
@@ -132,14 +132,17 @@ class Tiles:
                     array[: self.rows] = 0
 
     def unsort(self, control: Control, *, limit: float | None = None) -> None:
-        """Sort before the next step; `limit` replaces the drift limit."""
+        """Sort the points before the next step; `limit` replaces the drift limit."""
         motion = control.motion[0]
         motion.drift = np.inf
         if limit is not None:
             motion.drift_limit = limit
 
     def sort(self, s: Setup) -> None:
-        """Sort by tile, find nodes in use, and zero the sums at others."""
+        """Sort all points by tile, find the nodes in use, and zero the sums at all others.
+
+        The next step zeroes used nodes; boxes are zero between steps.
+        """
         before = grid_boxes.used(s.spans)[1:].copy()
         motion = s.control.motion[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (MOST_DRIFT, SORT_STEPS)
@@ -154,6 +157,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
+        """Bound of the distance in cells from present positions to nodes, until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
             at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
@@ -233,6 +237,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
+        """Divide as `_parts_to_sum`, for few points: one set, one part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -244,9 +249,10 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Spans and ranges of nodes in boxes, and the parts to sum.
+        """Spans and ranges of the nodes that boxes reach, and the parts to sum.
 
-        Nodes go to the thread whose points reach most of them, for its cache.
+        Nodes follow the sets of points that reach most of them: a thread finds its contributions in
+        its caches, and fetching them from the caches of another takes longer than the sum.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
@@ -279,9 +285,10 @@ class Tiles:
         return grid_boxes.joined_spans(local), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """First tile of nodes (n,) in the same set.
+        """First of the tiles of nodes (n,) in the same set as each.
 
-        Long tiles join those in the same rows: gaps of some thousand bytes are twice as slow.
+        Access with gaps of some thousand bytes takes twice as long, so one thread has one set, and
+        long tiles join tiles in the same rows of nodes.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -328,6 +335,7 @@ class Tiles:
         return boxes, grid_boxes.Reached(box, tile, begin, end, np.prod(end - begin + 1, axis=1))
 
     def _number(self, s: Setup, boxes: grid_boxes.Boxes) -> tuple[np.ndarray, ...]:
+        """Assign buffer rows to boxes: return the row of node 0, and strides (k, d)."""
         steps = grid_boxes.steps_of(boxes.hi - boxes.lo + 1)
         ends = np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1))
         begins = np.concatenate([[0], ends])[:-1]
@@ -354,10 +362,13 @@ class Tiles:
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        """Note nodes in use."""
+        """Note the tiles of nodes in use, and their nodes from `begin` to `end`."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
-        """Return `Buffers.parts` of nodes (k, d) from `begin` to `end`."""
+        """`Buffers.parts` of the nodes (k, d) from `begin` to `end` of the grids.
+
+        Their rows in boxes are `first` + sum of `steps` (k, d) times indices.
+        """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
         parts[:, 9] = CLEAR
@@ -416,9 +427,11 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Sets (n,) of tiles with about equal numbers of used nodes (n, 10).
+    """Set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    Neighbours with equal `beside` (n,) get the same set.
+    `parts` (n, 10) are the used nodes of each tile (see `Buffers`). A set gets the tiles whose
+    middle, counted in nodes, lies in its equal part. Neighbours with equal `beside` (n,) get the
+    set of the first one.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -434,7 +447,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Beginnings (size,) of about equal sets of tiles with point ranges (T, 2)."""
+    """Where nearly equal sets of tiles with point ranges (T, 2) begin: (size,)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
@@ -444,6 +457,6 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
 
 
 def one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Shift ranges (k, 2) to follow each other."""
+    """Shift ranges (k, 2) so that each begins at the end of the one before."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)

@@ -41,6 +41,7 @@ class Timings:
             yield
 
     def on_start(self, _: str) -> None:
+        """Note that a kernel is compiled here, or by another process that this one waits for."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

@@ -37,7 +37,10 @@ def launched() -> tuple[int, int]:
 
 
 class MpiComm(SerialComm):
-    """The processes of a run; `ends` reports an error and ends them."""
+    """All processes of a run, through mpi4py; the first writes.
+
+    `ends` reports an error and ends all of them.
+    """
 
     parted = False
     _ends: Callable[[BaseException], None] | None = None
@@ -143,6 +146,7 @@ class MpiComm(SerialComm):
             request.Free()
 
     def fail(self, error: BaseException) -> None:
+        """End all processes because of an error that cannot be raised here."""
         if self._ends is not None:
             self._ends(error)
             return
@@ -154,7 +158,10 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """Check that processes begin the same run; one reports a difference, the others quit."""
+    """Check that all processes begin the same run.
+
+    If not, one reports the difference and the others quit.
+    """
     comm = hub.settings.comm
     present = [hub.mark and (hub.mark.file, hub.mark.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))

@@ -31,11 +31,13 @@ from karamelo_py.scene.lattice import Lattice
 
 
 def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) -> np.ndarray:
-    """Recursive bisection across the longest direction; returns the part (T,).
+    """Divide tiles by recursive bisection across the longest direction; return the part (T,).
 
-    Berger & Bokhari (1987), "A partitioning strategy for nonuniform problems on multiprocessors",
-    IEEE Transactions on Computers C-36, 570-580. `places` (T, d) are lower corners, `work` (T,)
-    integers. The last direction is cut only if `rows` times as long as others.
+    After Berger & Bokhari (1987), "A partitioning strategy for nonuniform problems on
+    multiprocessors", IEEE Transactions on Computers C-36, 570-580. A layer of tiles whose work must
+    be divided is cut across the next longest direction. `places` (T, d) are lower corners, `work`
+    (T,) integers; tiles without work fill the parts. The last direction is cut only if `rows` times
+    as long as the others.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -72,7 +74,7 @@ class Needs(NamedTuple):
     hi: np.ndarray  # (k, d)
 
     def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Intersect boxes (m, d) in tiles (m,) with these: indices, first, last."""
+        """Intersect boxes (m, d) in tiles (m,) with these; return indices, first and last nodes."""
         at = np.minimum(np.searchsorted(self.tile, tile), len(self.tile) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.tile[at] == tile) & (low <= high).all(axis=1))
@@ -164,6 +166,7 @@ class SharedTiles(Tiles):
         return s._replace(blocks=blocks)
 
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
+        """Join the points that stay and those that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
         # Fresh memory would take longer than the rest of a sort.
         arrays = []

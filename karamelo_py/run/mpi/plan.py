@@ -1,4 +1,4 @@
-"""Predicted division of a scene among processes."""
+"""The division of a scene among processes, predicted by one: memory, messages per step."""
 
 from typing import NamedTuple
 

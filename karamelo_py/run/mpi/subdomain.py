@@ -25,7 +25,7 @@ LEARN_EVERY = 100  # steps between checks of the balance
 
 
 class Load:
-    """Time spent on each block's points, and on the rest but waiting."""
+    """Time in sweeps over each block's points, and in everything else but waiting."""
 
     def __init__(self, blocks: int):
         # Per step, of a point of each block and of a node in reach.

@@ -1,4 +1,4 @@
-"""A whole scene gathered at the first process."""
+"""A whole scene gathered at the first process, for functions of all points."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A Python fix moved points to other processes."""
+    """A Python fix moved points to other processes: begin the step again."""
 
 
 class Whole:
@@ -33,9 +33,9 @@ class Whole:
         self.tiles.threads, self.tiles.mode = simulation.threads, simulation.mode
 
     def act(self, function: Callable[[Setup], None]) -> None:
-        """Call a function of the whole scene on rank 0, and send its changes.
+        """Call a function of the whole scene on rank 0, and send its changes to all ranks.
 
-        Raises `PointsMoved`, after which the step begins again.
+        Raises `PointsMoved` if it moved points; the step must then begin again.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
