@@ -100,16 +100,24 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    count: np.ndarray  # (3,) int64: occupied tiles, parts, parts that others await
+    # (3,) int64: occupied tiles, parts of the points, parts that other processes wait for
+    count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
-    order: np.ndarray  # (T + 1,) int64: occupied tiles as visited
+    order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
-    grid: np.ndarray  # (T + 1,) int64
-    number: np.ndarray  # (T + 1,) int64
+    grid: np.ndarray  # (T + 1,) int64: grid of the k-th occupied tile
+    number: np.ndarray  # (T + 1,) int64: its number
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes in reach
-    rows: np.ndarray  # (T + 1, r, 2) int16: first, last node in row i ny + j of the box, if refined
-    buffer: np.ndarray  # (T + 1, 5) int64: range in the buffers; Grid.first, step_x, step_y there
-    report: np.ndarray  # (T + 1, 14): largest move, rate, failed point + 1; energies
+    # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i ny + j), from the
+    # row's first; last < first if empty; r = 0 if boxes are not refined
+    rows: np.ndarray
+    # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x and step_y of its
+    # nodes there
+    buffer: np.ndarray
+    # (T + 1, 14): largest move, largest rate, failed point + 1; at looks also kinetic and stored
+    # energy, number of the solid (-1: several), mass, momentum, elastic energy, and this times
+    # velocity
+    report: np.ndarray
 
 
 CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
@@ -165,12 +173,13 @@ def matter_of(kin: Tag, block: Block) -> Matter:
 
 
 def some_of(block: Block, rows: np.ndarray) -> Block:
+    """Return the block with the points `rows` in this order, not yet sorted."""
     arrays = (some_points(array, rows) for _, array in arrays_of(block.points))
     return block._replace(points=made_of(block.points, map(as_rows_of_points, arrays)))
 
 
 def joined_points(points: Points, parts: Sequence[Sequence[np.ndarray]]) -> Points:
-    """Return points like `points` from `parts`, lists of all their arrays."""
+    """Return points like `points`, from `parts` with all their arrays, one after another."""
     count = sum(arrays[0].shape[-1] for arrays in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype.type) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
@@ -404,6 +413,7 @@ class Setup(NamedTuple):
 
 
 def with_items(of, /, **items):
+    """Return a NamedTuple, or a `hold` tuple, with `items` replaced."""
     pairs = zip(of._fields, of, strict=True)
     return type(of)(*[items.get(name, item) for name, item in pairs])
 

@@ -14,25 +14,31 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
+    """Return dt, the time that points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return the last dt; tiny instead of 0 without one, as laws divide by it."""
+    """Return dt of the previous step.
+
+    Without one it is tiny, not 0, because laws divide by it.
+    """
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
-    """Return the time that forces act, between mid-steps.
+    """Return the time that forces act, between the middles of the last and this step.
 
-    In the first step it is dt, or dt / 2 if initial velocities are not half a step old.
+    In the first step it is dt, as if initial velocities were half a step old, or dt / 2 if they are
+    not.
     """
     return real(s.control.step[0].kick, s.nodes.sums[0, MASS])
 
 
 def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
+    """Return the reference velocity (d,) for speeds, in the type of `template`."""
     return vector(kin, [real(motion.common[0, k], template) for k in range(kin.dimension)])
 
 
@@ -139,6 +145,7 @@ def take_reports(control: Control) -> None:
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
+    """Accept the reports of a sweep; return whether no point failed."""
     read_reports(s)
     take(s.control)
     return s.control.motion[0].wrong == 0
@@ -158,6 +165,7 @@ def move_check(s: Setup) -> MoveCheck:
 
 
 def checked_move(check, points, p):
+    """Return the move of point `p` in cells, and whether it is allowed."""
     frame, kin, grids, now, stride = check
     grid = record(grids, index(points.grid[p]))
     y = load_vector(kin, points.x[1 - now], p)

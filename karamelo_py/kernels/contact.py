@@ -166,6 +166,7 @@ def _yielding(contact, n, k, per_mass):
 
 @noinline
 def _led(contact, kin, n):
+    """Return True if the velocity is prescribed, so that faces retain their directions."""
     led = False
     for k in range(kin.dimension):
         led = led or _immovable(contact, n, k)
@@ -333,6 +334,7 @@ def _left(pair, push):
 
 @noinline
 def _reach(bodies, outward, n, where, side):
+    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
     contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
@@ -403,7 +405,10 @@ def _last_contact(bodies, pair):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity beyond what closes the gap in this step; 0 if apart."""
+    """Return the approach velocity in excess of closing the gap in this step.
+
+    It is 0 if the bodies remain apart.
+    """
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -428,7 +433,7 @@ def _excess_of(bodies, pair, where):
 
 @noinline
 def _friction_of(yielding, friction, push, slide, share):
-    """Return the tangential impulse per sliding speed, and whether it stops sliding."""
+    """Return the tangential impulse per sliding speed, and whether it stops all sliding."""
     compliance = dot(slide, slide, yielding)
     if not compliance > 0:
         return 0.0, False
@@ -513,6 +518,10 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _work_on(bodies, n, k, impulse, per_mass):
+    """Return the work of a rigid body's impulse.
+
+    It is taken with the mean of a node's velocities in the step.
+    """
     _, kin, nodes = bodies
     if _immovable(bodies.contact, n, k):
         return 0.0

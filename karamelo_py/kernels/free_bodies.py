@@ -62,6 +62,10 @@ def _free_way_to_faces(shape, kin, x, reach):
 
 @noinline
 def _touched(shape, kin, x, about):
+    """Return the depth at `x`, and the unit direction out.
+
+    The direction is 0 if there is none or the surface is not close.
+    """
     close, ball, reach, step, _ = about
     within = depth(shape, kin, x, close)
     if within <= -close:
@@ -87,6 +91,10 @@ def _touched_faces(shape, kin, x, about):
 
 @noinline
 def _list_point(body, surface, s, block, p):
+    """Put a contact of point `p` with a surface into the next record.
+
+    Returns whether it touches.
+    """
     kin, points, d = s.kin, block.points, s.kin.dimension
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
@@ -150,6 +158,7 @@ def _list_points(body, surface, s, block, number):
 
 @noinline
 def _hold(s, slot, x, c, force):
+    """Add a component of a force to the reaction of the fix that holds a node at `x`."""
     values, turning = s.control.values, s.bodies.torques[slot]
     values[slot + c] += force
     if turning:
@@ -261,10 +270,10 @@ def _add_links(body, s):
 
 @noinline
 def _follow(s, n, again):
-    """Let a body's node follow the surface it touches, in the deforming velocity.
+    """Let a node of a body follow the surface that it touches, in the deforming velocity.
 
-    A light body may be faster until the gap is closed; straining the surface by its velocity would
-    add more energy than the body has. `again`: v* of this step is known.
+    A light body may be faster than the surface until the gap is closed: straining the surface by
+    the body's velocity would add more energy than the body has. `again`: v* of this step is known.
     """
     contact, nodes = s.contact, s.nodes
     for body in s.bodies.bodies:

@@ -112,7 +112,8 @@ def is_last(s):
 class Stage:
     """A pass over the points, as thread functions.
 
-    `columns` are the (array, column, adds) of nodes that it sums, the nodes of a cell in `parts`.
+    `columns` are (array, column, whether it adds) of the node columns that it sums; the nodes of a
+    cell are summed in `parts`.
     """
 
     def __init__(self, row: Any, s: Any):
@@ -302,6 +303,7 @@ def _steps_to(s, grid, k):
 
 
 def _with_cell(totals, cells, cell, first, step):
+    """Add a cell's sums, from rows `first`, `first` + `step`, ... of its box."""
     box = cells.box[index(max(cell, 0))]
     occupied = (box >= 0) & (cell >= 0)
     at = index(max(box, 0))
@@ -333,7 +335,10 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Sum the items before one of a level; `above` is the begin of the next level, or -1."""
+    """Sum the items before one of a level.
+
+    `above` is where the next level begins, or -1.
+    """
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):

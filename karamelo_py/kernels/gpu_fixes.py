@@ -93,6 +93,7 @@ def work_of_loads(i, fate, s, about, target):
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
+    """Return the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):
@@ -215,6 +216,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
+    """Publish totals of hooks; `which` is a range, and whether before the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):
@@ -264,6 +266,7 @@ def add_work_at_node(i, fate, s, copies):
 
 
 def add_work(i, fate, s, block, copies):
+    """Add a point's work of forces, and its energy of rotation or of water in its pores."""
     if isinstance(block.laws, Saturated):
         relative = field(block.points.fields, RelativeVelocity)
         energy = watch.water_energy(s.kin, known_to_laws(block.points), block.laws, relative, i)

@@ -241,11 +241,13 @@ def _published(hooks, h):
 
 
 def _torque_of(hooks, slot):
+    """Return the first row of the torque of the force in rows from `slot` on, or 0."""
     return hooks.torques[slot] if slot >= 0 else NONE
 
 
 @noinline
 def _add_torque(call, q, c, slot, force):
+    """Add the torque of component `c` of a force at the `q`-th chosen member."""
     positions, row = call.hooks.scratch, _torque_of(call.hooks, slot)
     if row > 0 and force != 0:
         x = (positions[0, q], positions[1, q], positions[2, q])
@@ -548,7 +550,7 @@ def without_whole(hooks):
 
 
 def known_to_hooks(nodes):
-    """Omit other fields, which would recompile the loop."""
+    """Return the fields that the loop uses; others would have it compiled again."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 

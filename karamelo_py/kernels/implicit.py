@@ -50,7 +50,7 @@ class Seen(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes seen by one point: blocks of K, row by row."""
+    """Pairs of nodes seen by one point: the blocks of K, row by row."""
 
     codes: np.ndarray  # (m,) int64 grid positions, whose differences identify pairs
     middle: int  # column of difference 0 in `rank`

@@ -28,6 +28,7 @@ def _lanes_with(parts, laws, mass):
 
 
 def points_from(lanes: Tag, q: int, end: int) -> Index:
+    """Return point `q`, or the points in lanes from there, before `end`."""
     if isinstance(lanes, OneByOne):
         return index(q)
     return group(lanes, q, min(lanes.width, end - q))
@@ -49,6 +50,7 @@ def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
 
 
 def zero_of(lanes: Tag, template: Number) -> Number:
+    """Return 0 in the type of `template`, or in lanes of it."""
     return (
         template - template if isinstance(lanes, OneByOne) else spread(lanes, template - template)
     )

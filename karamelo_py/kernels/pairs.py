@@ -152,7 +152,10 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover with cells where the bodies may touch; return the cell width, 0 if nowhere."""
+    """Cover with cells where the bodies may touch.
+
+    Returns the width of a cell, 0 if they touch nowhere.
+    """
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -235,8 +238,8 @@ def _add(bodies, i, j, force, total):
 def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points; return 1 if they touch, else 0.
 
-    For friction on `i`, `cells.contact` sums load, normal force, and stiffness times tangential
-    velocity.
+    For the friction on `i`, `cells.contact` sums load, normal force, and each partner's stiffness
+    times tangential velocity.
     """
     kin, contact = push.kin, cells.contact
     force, d = _push_between(push, bodies, i, j), kin.dimension
@@ -272,6 +275,7 @@ def _rub(push, bodies, i, contact):
 
 @noinline
 def _pass_on(push, bodies, cells, i, j):
+    """Apply a partner's part of the friction of `i`, proportional to its load."""
     kin, contact, d = push.kin, cells.contact, push.kin.dimension
     square = _push_between(push, bodies, i, j).squared()
     if square > 0:

@@ -202,6 +202,7 @@ def _set_levers(links, link):
 
 @noinline
 def _relative(links, link, u, k):
+    """Return component `k` of A U_a - B U_b."""
     A, B, r = links.levers[0], links.levers[1], 0.0
     for c in range(6):
         r += A[k, c] * u[link.first, c] - B[k, c] * u[link.second, c]
@@ -210,7 +211,7 @@ def _relative(links, link, u, k):
 
 @noinline
 def _set_weight(links, link):
-    """Set W = A M^-1 A^T + B M^-1 B^T."""
+    """Set W = A M^-1 A^T + B M^-1 B^T, the change of relative velocity per impulse."""
     W = links.weight
     for k in range(3):
         for j in range(3):
@@ -308,6 +309,7 @@ def _speed(links, body):
 
 @noinline
 def _apart(links, a, b):
+    """Return the distance between the spheres about two bodies; negative if they overlap."""
     x, y, square = links.states[a].x, links.states[b].x, 0.0
     for c in range(3):
         square += (x[c] - y[c]) ** 2
@@ -441,7 +443,10 @@ def _set_spring(links, link, joint, way, times):
 
 @noinline
 def _set_impulse(links, link, u, bounded):
-    """Set the impulse of a link at velocities `u`; `bounded` uses an earlier friction bound."""
+    """Set the impulse of a link at the velocities `u`.
+
+    With `bounded`, friction is limited by the normal impulse of an earlier pass.
+    """
     _set_levers(links, link)
     for k in range(3):
         link.slip[k], link.impulse[k] = _relative(links, link, u, k), 0.0
@@ -470,7 +475,7 @@ def _set_impulse(links, link, u, bounded):
 
 @noinline
 def _slope_of(link, k, j, bounded):
-    """Return -dp_k/dr_j of a link."""
+    """Return -dp_k/dr_j of a link whose impulse is known."""
     if link.kind != CONTACT:
         total = 0.0
         for i in range(3):
@@ -549,6 +554,10 @@ def _add_body(links, body, n, bounded):
 
 @noinline
 def _try(links, bodies, fraction, bounded):
+    """Try `fraction` of the step in the last column of the slope.
+
+    Returns the square of the residual.
+    """
     m = links.slope.shape[0]
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -594,6 +603,7 @@ def _descend(links, bodies):
 
 @noinline
 def _iterate(links, bodies, bounded):
+    """Take Newton steps, halved if needed; return whether they have converged."""
     m, energy = links.slope.shape[0], 0.0
     size = _residual(links, bodies, links.u, links.rest, bounded)
     for body in bodies:
@@ -764,6 +774,7 @@ def _collide(links, bodies, dt):
 
 @noinline
 def find(links, bodies, control, kin):
+    """List the links of this step; return whether there are any."""
     dt, values = control.values[arrays.DT], control.values
     links.count[0], links.dt[0] = 0, dt
     for i in range(links.published.shape[0]):

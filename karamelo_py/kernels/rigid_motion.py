@@ -109,6 +109,7 @@ class FreeBody(NamedTuple):
 
 
 def index_of(field: str) -> int:
+    """Return the index of a field of STATE in `FreeBody.numbers`."""
     return STATE.fields[field][1] // 8  # type: ignore[index]
 
 
@@ -253,6 +254,7 @@ def set_lever(body, x):
 
 @noinline
 def velocity_there(body, u, k):
+    """Return component `k` of A U."""
     v = 0.0
     for a in range(6):
         v += body.solution.lever[k, a] * u[a]
@@ -261,7 +263,10 @@ def velocity_there(body, u, k):
 
 @noinline
 def _set_impulse(body, u, i, dt, bounded):
-    """Set the impulse of contact `i` at `u`; `bounded` friction uses an earlier pass's bound."""
+    """Set the impulse of contact `i` at the velocities `u`.
+
+    With `bounded`, friction is limited by the normal impulse of an earlier pass.
+    """
     c = body.contacts[i]
     slip, normal = c.slip, c.normal
     set_lever(body, c.at)
@@ -345,6 +350,7 @@ def solve_system(J):
 
 @noinline
 def _iterate(body, dt, bounded):
+    """Take Newton steps, halved if needed; return whether they have converged."""
     work = body.solution
     M, J, energy = work.mass, work.slope, 0.0
     size = residual(body, dt, work.u, work.residual, bounded)
@@ -406,6 +412,7 @@ def solve(body, dt):
 
 @noinline
 def _value(body, values, k):
+    """Return the present value of formula `k` of a body, 0 if there is none."""
     evaluate, programs, code, numbers, scratch = body.formulas
     program = programs[k]
     if program.begin < 0:
@@ -445,6 +452,7 @@ def start_step(body, control):
 
 @noinline
 def _velocities_of(body, momentum):
+    """Solve M U = P for the free components of U; the others are prescribed."""
     work = body.solution
     M, J = work.mass, work.slope
     for a in range(6):
@@ -522,5 +530,9 @@ def _set_angle(state, dt, dimension):
 
 @noinline
 def _about_origin(body, k):
+    """Return the torque of contact about the origin.
+
+    It is taken with the position of the centre before this step.
+    """
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

@@ -49,12 +49,15 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Return a clamped cell, as a hook may have moved the point anywhere."""
+    """Return the cell of a point at `at` cells, clamped to the grid.
+
+    A hook may have moved the point anywhere.
+    """
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 def _seen(grid, around, g, direction, at):
-    """Return the first and last node in reach of a point at `at` cells."""
+    """Return the first and last node that a point of grid `g`, at `at` cells, may see."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]

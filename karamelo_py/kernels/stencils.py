@@ -24,6 +24,7 @@ from karamelo_py.points.kinematics import from_columns
 
 
 def _beside(a, b):
+    """Concatenate `a`, padded with zeros to four components, and `b`."""
     return (*a, *((a[0] - a[0],) * (4 - len(a))), *b)
 
 

@@ -36,6 +36,7 @@ def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[An
 
 
 def arrays_given(quantities: tuple, kin: Tag) -> int:
+    """Encode the arrays of the quantities: 1 sums + 2 velocities + 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields

@@ -60,7 +60,7 @@ class AtNodes(NamedTuple):
 
 
 class Gather(NamedTuple):
-    """Grid to points, over a fraction of dt."""
+    """Grid to points: a task for a fraction of dt."""
 
     task: NamedTuple
     share: float = 1.0

@@ -44,6 +44,7 @@ class Touch(NamedTuple):
 
 
 def direction_of(falls, step):
+    """Return the unit direction of depth differences over two steps; 0 if level."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 

@@ -57,7 +57,7 @@ def solid_of(firsts, number):
 
 
 def energies_of(kin, points, laws, p):
-    """Return mass, velocity, kinetic energy, elastic energy, elastic plus dissipated energy."""
+    """Return mass, velocity, kinetic, elastic, and elastic plus dissipated energy of a point."""
     law, state = state_at(kin, points, laws, p)
     mass = real(of_present(p, points.mass[p]), 0.0)
     v = tuple([real(x, 0.0) for x in load_vector(kin, points.v, p)])
@@ -150,7 +150,10 @@ def _take_work_at_nodes(spans, work, control):
 
 
 def sum_energies(s, mode):
-    """Sum energies and work in the clock, without rigid bodies."""
+    """Sum kinetic, stored plus dissipated energy, and work in the clock.
+
+    Rigid bodies are omitted.
+    """
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
@@ -281,11 +284,12 @@ def growth(first, later, unit):
 
 
 def keeps(first, later, unit, within=WITHIN):
-    """Return False for NaN too."""
+    """Return True if growth is within a fraction of the unit, False for NaN."""
     return later - first <= within * unit
 
 
 def unit_of(energy):
+    """Return the largest energy, with a limited part of drift."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 

@@ -207,12 +207,16 @@ def reads(*names: str) -> Callable:
 
 
 def is_apart(w):
+    """Return True for rigid points with separate sums."""
     return laws.is_rigid(w.laws) and field(w.nodes.fields, RigidSums) is not None
 
 
 @reads("mass")
 def mass(pt):
-    """Return the mass, 0 for rigid points with separate sums."""
+    """Return the mass given to the common sums.
+
+    It is 0 for rigid points with separate sums.
+    """
     m = of_present(pt.p, pt.w.points.mass[pt.p])
     return m - m if is_apart(pt.w) else m
 
@@ -224,6 +228,7 @@ def v(pt):
 
 @reads("moment")
 def moment(pt):
+    """Return the tensor stored with the velocity, or ()."""
     return pt.load(Moment, zero_moment(pt.w.transfer, pt.w.kin, pt.dt))
 
 

@@ -22,7 +22,7 @@ class VolumeRatio(StepField):
 
 
 class NodalMean(SummedField):
-    """Weighted sum and weights at a node, then the mean."""
+    """Weighted sum and weights at a node, then the mean (volume ratios, temperatures)."""
 
     shape = pair
 
@@ -69,6 +69,7 @@ class FBarOfSoil(FBar):
 
 @eq.reads("mass", "state", "material", "volume ratio")
 def volumes(pt):
+    """Return the volume after and before the trial increment."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     return volume * pt.of(VolumeRatio)[0, pt.p], volume
@@ -81,6 +82,7 @@ class Volumes(eq.NodalQuantity):
 
 
 def mean_stress(pt):
+    """Return volume times mean Kirchhoff stress, and present volume."""
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()
@@ -89,6 +91,7 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
+    """Return -V (averaged - the point's mean stress), a tensor."""
     _, _, f = pt.law_state_F
     V_tau, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - V_tau

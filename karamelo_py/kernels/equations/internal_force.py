@@ -25,11 +25,11 @@ class Force(StepField):
 
 
 class Lever(Field):
-    """Contact at a point's surface: sqrt(f r) n (d,), and its distance r along n; 0: no contact.
+    """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
 
-    The force f n at x - r n acts like a force at x plus the stress f r n n / V. Then follow
-    stiffness over mass, depth, the damping part of f, the depth due to `follow_strain`, and the
-    last increment of strain along n.
+    The force f n at x - r n acts like a force at x and the stress f r n n / V. The value 0 means no
+    contact. Then follow stiffness over mass, depth, the damping part of f, the depth that is due to
+    `follow_strain`, and the last increment of strain along n.
     """
 
     shape = staticmethod(lambda kin: kin.dimension + 6)
@@ -99,6 +99,7 @@ def force_around(kin, pt):
 
 @eq.reads("force")
 def force_on_point(pt):
+    """Return the force (d,) of fixes and rotation, or ()."""
     force, around = pt.load(Force, pt.v), force_around(pt.kin, pt)
     if not len(force):
         return around
@@ -109,6 +110,7 @@ def force_on_point(pt):
 
 @eq.reads()
 def V_mean_stress(pt):
+    """Return V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
     return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
 
 
@@ -118,7 +120,10 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Return the force and its slope, if gradients are moments of weights (MLS), else ()."""
+    """Return the force at the point and its slope.
+
+    This is where gradients are moments of weights (MLS); otherwise it returns ().
+    """
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

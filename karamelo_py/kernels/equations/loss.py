@@ -168,6 +168,7 @@ def _before(node, template):
 
 
 def _gone(pt, v, moment):
+    """Return the kinetic energy per mass that a point lost to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

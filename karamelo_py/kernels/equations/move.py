@@ -19,7 +19,7 @@ from karamelo_py.points.kinematics import dot
 
 
 class VelocityBefore(Field):
-    """Velocity before the last step; NaN initially and after a reflection."""
+    """Velocity before the last step; NaN if there is none, and after a reflection."""
 
     shape = vector
     start = nan
@@ -91,6 +91,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
+    """Return the location `new` with moved corners, by gathered velocities if known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

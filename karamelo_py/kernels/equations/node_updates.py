@@ -21,6 +21,7 @@ def node_task(tag: Any) -> Any:
 
 
 def per_mass(nodes: Nodes, n: Index, template: Number) -> Number:
+    """Return 1 / mass of a node, or 0 without mass."""
     mass = nodes.sums[n, arrays.MASS]
     return real(1, template) / mass if mass > 0 else real(0, template)
 

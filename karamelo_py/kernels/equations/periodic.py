@@ -42,6 +42,7 @@ def position_on(axis, n):
 
 @counts.on(Seam)
 def _counts_seam(ranks, n):
+    """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
         position = position_on(axis, n) - GHOSTS
@@ -79,6 +80,7 @@ class JoinVelocity(NamedTuple):
 
 
 def _is_lowest(axis, nodes, n):
+    """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
     position = position_on(axis, n)

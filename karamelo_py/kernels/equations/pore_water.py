@@ -84,13 +84,13 @@ class WaterSums(SummedField):
 
 
 class PoreSums(SummedField):
-    """Volume, pore volume, volume times pressure and times unseen pressure, drag."""
+    """Nodal sums: volume, volume of pores, volume times pressure, its unseen part, drag."""
 
     shape = numbers(5)
 
 
 class PoreForce(SummedField):
-    """Pressure force (d,) and area (d,)."""
+    """Force of the pressure (d,), and outward area (d,)."""
 
     shape = numbers(0, 2)
 
@@ -108,17 +108,17 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux per area (d,), two outflows, and the node's mean and unseen pressure.
+    """Mass flux per area (d,); two outflows; two pressures.
 
-    The outflow through a closed node, per volume, stays in the points; that through an open node is
-    a mass per time.
+    The outflow through a closed node, per volume, stays in the points; the outflow through an open
+    node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
     """
 
     shape = numbers(4, 1)
 
 
 class GivenPressure(StepField):
-    """Prescribed nodal pressure, NaN if none; 1 if water may only leave."""
+    """Prescribed pressure at a node (NaN: none); 1 if water may only leave there."""
 
     shape = pair
     start = float("nan")
@@ -277,6 +277,7 @@ class WaterMomentumAgain(eq.NodalQuantity):
 
 
 def _taken_up(b):
+    """Return exp(-b), and (1 - exp(-b)) / b."""
     e = exp(-b)
     return e, (1 - e) / b if b > SMALL else 1 - 0.5 * b * (1 - b / 3)
 
@@ -313,7 +314,10 @@ def _is_closed(nodes, kin, n, rim):
 
 
 def _by_pressure(nodes, kin, n, rim):
-    """Return the pressure force on the water (d,), and the boundary pressure."""
+    """Return the force of the pressure on the water (d,), and the boundary pressure.
+
+    That is the prescribed one at an open node, the mean one elsewhere at the rim, else 0.
+    """
     sums, force = field(nodes.fields, PoreSums), field(nodes.fields, PoreForce)
     p, d = real(0, sums[n, 0]), kin.dimension
     if _is_open(nodes, n):
@@ -325,6 +329,7 @@ def _by_pressure(nodes, kin, n, rim):
 
 
 def _mass_given(nodes, kin, n, V):
+    """Return the mass of water that a node gets per time; store it by `WAYS`."""
     supply, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
     whole, squared = real(0, V), real(0, V)
     if supply is None:

@@ -115,6 +115,7 @@ class TrialStrainOfLastStep(TrialStrain):
 
 
 def _maps_again(task, w):
+    """True if forces act on points that moved, whose velocity was mapped to the nodes again."""
     before = task.of_last_step or task.of_load_step or task.in_move
     return not before and field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
 
@@ -150,6 +151,7 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
+    """Return the cells by which a point's domain reaches further."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 

@@ -45,7 +45,7 @@ class VelocityAround(Field):
 
 
 class AngleAround(Field):
-    """Angle of rotation in radians."""
+    """Angle by which a point has rotated, in radians."""
 
     columns = ("twist",)
 
@@ -97,7 +97,7 @@ TORQUE = eq.NodeColumns(SumsAround, lambda kin: 2, lambda kin: 1, lambda kin: 3)
 def rotation(pt, r):
     """Return inertia, angular velocity and its moment (or ()) of a point at radius r.
 
-    Both components of a plane have the same values, as transfers map vectors.
+    Velocity and moment are in both components of a plane, as transfers map vectors.
     """
     omega = pt.of(VelocityAround)[0, pt.p] / r
     moment = pt.load(MomentAround, (r, r))
