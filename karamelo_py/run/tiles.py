@@ -447,7 +447,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Where nearly equal sets of tiles with point ranges (T, 2) begin: (size,)."""
+    """Beginnings (size,) of nearly equal sets of tiles with point ranges (T, 2)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
