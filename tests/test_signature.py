@@ -204,7 +204,7 @@ def test_classes_defaults_varargs_and_keywords(hub):
     assert (style.group.name, style.vx.constant, style.vy, style.velocity) == ("g", 1.0, None, ())
     style = call(hub, Style, "g, 1, NULL, time, NULL, glue = h")
     assert style.vy is None
-    named = call(hub, Style, "vx=1, g, glue=h")
+    named = call(hub, Style, "glue=h, g, vx=1")
     assert (named.group.name, named.vx.constant, named.vy, named.glue.name) == ("g", 1, None, "h")
     assert len(style.velocity) == 2
     assert style.glue.name == "h"
@@ -218,6 +218,8 @@ def test_classes_defaults_varargs_and_keywords(hub):
         ("g 1", "vx is missing", 3),
         ("g, 1, vw=2", "no argument is named 'vw'", 9),
         ("g, 1, glue=a, glue=b", "glue is given twice", 17),
+        ("g, 1, vx=2", "vx is given twice: by position and as vx=", 9),
+        ("g, vy=1, 2", "2 has no name, and follows vy=...", 12),
         ("broken, 1", "it is broken", 11),
         ("gone, 1", "x.txt: No such file", None),
         ("g, 1, 2, foo", "unknown name 'foo'", 12),

@@ -19,6 +19,8 @@ from karamelo_py.app.cli import main
 from karamelo_py.app.plot import read_log
 from karamelo_py.app.studies import case, records, study, variables, warm
 from karamelo_py.app.studies.case import Launch
+from karamelo_py.language.interpreter import Interpreter
+from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 # A block in free flight: its velocity is 3 times the word's factor, and it leaves where it is told.
@@ -284,6 +286,31 @@ def test_variables_of_included_scripts_count(tmp_path):
         variables.ScriptFiles(tmp_path / "in.main").check(["k"])
     with pytest.raises(ScriptError, match="has no such variable"):
         variables.ScriptFiles(tmp_path / "in.main").check(["speed"])
+
+
+FORMULA = 'material(r, hyperelastic, rho=2, energy="mu/2*(I1 - 3) - mu*log(J)"{})'
+
+
+@pytest.mark.parametrize(
+    ("script", "names", "refused"),
+    [
+        (FORMULA.format(", mu=4e5"), [], ["mu", "rho"]),
+        ("mu = 4e5\n" + FORMULA.format(""), ["mu"], []),
+        ("mu = 4e5\n" + FORMULA.format(", mu=mu"), ["mu"], []),
+        ("rho = 2\n" + FORMULA.format(", mu=rho").replace("rho=2", "rho=rho"), ["rho"], ["mu"]),
+    ],
+)
+def test_names_of_arguments_are_no_variables(tmp_path, script, names, refused):
+    (tmp_path / "in.a").write_text(script, encoding="utf-8")
+    variables.ScriptFiles(tmp_path / "in.a").check(names)
+    for name in refused:
+        with pytest.raises(ScriptError, match="has no such variable") as caught:
+            variables.ScriptFiles(tmp_path / "in.a").check([name])
+        assert f"on a line of its own, and {name}={name} in material" in caught.value.hint
+        run = Interpreter(Hub(), {name: "1"}).run_text
+        with pytest.raises(ScriptError, match="the script has no variable") as caught:
+            run(script)
+        assert f"on a line of its own, and {name}={name} in material" in caught.value.hint
 
 
 def test_the_time_that_remains_grows_as_the_runs_do():

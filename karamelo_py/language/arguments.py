@@ -65,7 +65,13 @@ class Argument:
         meaningful = not names or any(self._interpreter.knows(name) for name in names)
         return None if meaningful else self.text
 
+    def refuse_name(self) -> None:
+        if named := self.keyword():
+            message = f"{named[0]}= is not possible here"
+            raise ScriptError(message, mark=self.mark, code="by-position", name=named[0])
+
     def words(self, literals: Sequence[str] = ()) -> str:
+        self.refuse_name()
         if self.text in literals:
             return self.text
         quoted = _QUOTED.fullmatch(self.text)
@@ -89,6 +95,7 @@ class Argument:
             raise ScriptError(
                 "NULL cannot be used here", mark=self.mark, expected="a number or a formula"
             )
+        self.refuse_name()
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def take(self, numbers: dict[str, Argument]) -> list[str]:
@@ -180,6 +187,7 @@ class Named:
 
 
 def look_up(catalogue: Any, argument: Argument):
+    argument.refuse_name()
     word = argument.word()
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"

@@ -72,19 +72,33 @@ def _filled(
 
 
 def unknown_keyword(
-    word: str, argument: Argument, expected: Sequence[Parameter], owner: str
+    word: str, argument: Argument, expected: Sequence[Parameter], owner: str, form: str
 ) -> ScriptError:
-    by_name = [p.name for p in expected if p.keyword]
+    by_name = [p.name for p in expected if not p.variadic]
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
     hint = turned or meant(word, by_name) or longer or table()["otherwise"].get(owner)
-    if expected and not (hint or by_name):
-        hint = f"leave out '{word} ='; a comparison is written =="
-    choices = ", ".join(f"{p.name}=..." for p in expected if not p.variadic)
+    choices = ", ".join(f"{n}=..." for n in by_name)
+    if not hint and any(p.variadic for p in expected):
+        choices, hint = form, f"arguments of {owner} are given by position"
+    elif not hint and argument.knows(word):
+        hint = "a comparison is written =="
     message = f"no argument is named '{word}'"
     mark = argument.mark
     code = "arguments"
     return ScriptError(message, mark=mark, expected=choices, hint=hint, code=code, name=word)
+
+
+def after_named(argument: Argument, before: str, form: str) -> ScriptError:
+    message = f"{argument.text} has no name, and follows {before}=..."
+    hint = "arguments by position come first, then those by name"
+    return ScriptError(message, mark=argument.mark, expected=form, hint=hint, code="arguments")
+
+
+def by_position(word: str | None, expected: Sequence[Parameter], name: str) -> str:
+    if any(p.name == word for p in expected):
+        return f"{word} is given by position, without its name"
+    return f"arguments of {name} are given by position"
 
 
 def swapped(

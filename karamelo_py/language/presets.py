@@ -3,9 +3,11 @@
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from karamelo_py.language import registry, signature
 from karamelo_py.language.unknown import check_name
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.expressions import Value
@@ -14,6 +16,35 @@ from karamelo_py.script.reading import read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 _WORD = r"[^\W\d]\w*"
+_NAMED = re.compile(rf"\s*({_WORD})\s*=(?!=)(.*)", re.DOTALL)
+
+
+def names_in(statement: Statement) -> tuple[set[str], dict[str, str]]:
+    """Return the names that a statement reads, and hints for names of its arguments.
+
+    A formula reads its own numbers (``mu=4e5``) before variables, also in quotes.
+    """
+    codes, name = [statement.raw.code], ""
+    if isinstance(statement, Assignment):
+        codes = [statement.right.code]
+    elif isinstance(statement, CommandCall):
+        codes, name = [raw.code for raw in statement.arguments], statement.name
+    codes = [re.sub(r'("[^"\n]*")|#[^\n]*', r"\1", code) for code in codes]
+    named = {m[1]: m[2] for code in codes if (m := _NAMED.match(code))} if name else {}
+    styles = [word for code in codes[:2] if registry.knows(name, word := code.strip())]
+    expected = []
+    with suppress(TypeError):  # a broken style
+        expected = signature.parameters(registry.find(name, styles[0])) if styles else []
+    formula = any(p.kind.with_numbers for p in expected)
+    own = named.keys() - {p.name for p in expected} if formula else set()
+    values = [m[2] if name and (m := _NAMED.match(code)) else code for code in codes]
+    read: set[str] = set()
+    for code, value in zip(codes, values, strict=True):
+        words = set(re.findall(_WORD, value if formula else re.sub(r'"[^"\n]*"', " ", value)))
+        numbers = code != value and code.split("=")[0].strip() in own
+        read |= words if numbers else words - own
+    hint = "write {0} = {1} on a line of its own, and {0}={0} in {2}(...)"
+    return read, {word: hint.format(word, of.strip(), name) for word, of in named.items()}
 
 
 class Presets(dict[str, str]):
@@ -95,14 +126,18 @@ class Presets(dict[str, str]):
             return
         words = set(re.findall(_WORD, " ".join(self.values())))
         assigned: dict[str, None] = {}
-        for script in filter(None, scripts):
-            code = script[0].raw.source.text
-            words.update(re.findall(_WORD, re.sub(r'"[^"\n]*"|#[^\n]*', " ", code)))
-            assigned |= {s.name: None for s in script if isinstance(s, Assignment)}
+        hints: dict[str, str] = {}
+        for statement in chain(*filter(None, scripts)):
+            read, named = names_in(statement)
+            words |= read
+            hints |= named
+            if isinstance(statement, Assignment):
+                assigned[statement.name] = None
         for name in self:
-            if name not in words:
-                message = f"-var {name}: the script has no variable '{name}'"
-                raise unknown(message, name, assigned)
+            if name not in words and name not in assigned:
+                error = unknown(f"-var {name}: the script has no variable '{name}'", name, assigned)
+                error.hint = hints.get(name, error.hint)
+                raise error
 
     def _scripts(
         self, statements: list[Statement], folder: Path, outer: tuple[Path, ...] = ()

@@ -151,6 +151,9 @@ def call(
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
                 wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"
             wrong.mark = wrong.mark or explain.guilty(wrong, arguments, bound)
+            if wrong.code == "by-position" and not wrong.command:
+                wrong.message = explain.by_position(wrong.name, expected, name)
+                wrong.expected, wrong.code = syntax(target, name), "arguments"
             wrong.command = wrong.command or name
         raise
 
@@ -249,9 +252,14 @@ def _bind(
     for argument in arguments:
         word, value = argument.keyword() or ("", argument)
         if not word or (passed_on and word not in by_name):
+            if before := next((p.name for p in slots if p.name in bound), None):
+                raise explain.after_named(argument, before, syntax(target, name))
             positional.append(argument)
         elif word in bound or word in numbers:
             raise ScriptError(f"{word} is given twice", mark=argument.mark)
+        elif word in (p.name for p in slots[: len(positional)]):
+            message = f"{word} is given twice: by position and as {word}="
+            raise ScriptError(message, mark=argument.mark, expected=syntax(target, name))
         elif word in by_name:
             bound[word] = [value]
         elif formula:
@@ -262,7 +270,7 @@ def _bind(
                 raise
             numbers[word] = value
         else:
-            raise explain.unknown_keyword(word, argument, expected, name)
+            raise explain.unknown_keyword(word, argument, expected, name, syntax(target, name))
     slots = [p for p in slots if p.name not in bound]
     needed = sum(not (p.optional or p.variadic) for p in slots)
     missing = [p.name for p in expected if p.keyword and not p.optional and p.name not in bound]
@@ -275,7 +283,7 @@ def _bind(
     if formula and numbers:
         for word in bound[formula][0].take(numbers):
             wrong = next(one for one in arguments if (one.keyword() or ("",))[0] == word)
-            raise explain.unknown_keyword(word, wrong, expected, name)
+            raise explain.unknown_keyword(word, wrong, expected, name, syntax(target, name))
 
 
 def convert(hub: Scene, parameter: Parameter, argument: Argument, number: int | None = None) -> Any:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, NoReturn
 from karamelo_py.app.options import LIVE, VARIABLE, above_zero, positive
 from karamelo_py.app.studies.case import Launch
 from karamelo_py.language import registry
+from karamelo_py.language.presets import names_in
 from karamelo_py.output.quantity import KEYWORDS
 from karamelo_py.output.units import Units
 from karamelo_py.script.errors import ScriptError, meant, plural, unknown
@@ -28,7 +29,6 @@ from karamelo_py.script.terms import number_of
 VALUES = "NAME=value,value,... or NAME=first:last:count"
 QUEUES = {"slurm": "SLURMCluster", "pbs": "PBSCluster", "lsf": "LSFCluster", "sge": "SGECluster"}
 WHERE = f"local, tcp://HOST:PORT of a Dask scheduler, {', '.join(QUEUES)}, or mpi"
-_NAME = re.compile(r"[^\W\d]\w*")
 _MOST = 100_000
 
 
@@ -178,19 +178,20 @@ class ScriptFiles:
     def check(self, names: Iterable[str]) -> None:
         read: set[str] = set()
         assigned: set[str] = set()
+        hints: dict[str, str] = {}
         for statement in (each for statements in self.statements.values() for each in statements):
-            codes = [statement.raw.code]
+            words, named = names_in(statement)
+            read |= words
+            hints |= named
             if isinstance(statement, Assignment):
                 assigned.add(statement.name)
-                codes = [statement.right.code]
-            elif isinstance(statement, CommandCall):
-                codes = [raw.code for raw in statement.arguments]
-            code = re.sub(r"#[^\n]*", "", ", ".join(codes))
-            read.update(_NAME.findall(re.sub(r'"[^"]*"', "", code)))
         for name in names:
             if name not in read and self.all_known:
                 fault = "sets it and never reads it" if name in assigned else "has no such variable"
-                raise unknown(f"-var {name}: {self.path} {fault}", name, sorted(assigned & read))
+                message = f"-var {name}: {self.path} {fault}"
+                error = unknown(message, name, sorted(assigned & read))
+                error.hint = error.hint if name in assigned else hints.get(name, error.hint)
+                raise error
 
     def logged(self) -> list[str] | None:
         """The log columns that the script names; None with includes."""
