@@ -147,7 +147,7 @@ COMMANDS = [
     ("fix(f, body_force, all, 0, dt=3)", 28, "arguments of fix body_force are given by position"),
     ("fix(f, body_force, all, 0, dt=3)", 28, "fix(ID, body_force, group, bx[, by[, bz]])"),
     ("region(r, block, xlo=0, 1, 0, 1)", 18, "expected: region(ID, block, xlo, xhi"),
-    ("region(ID=r, block, 0, 1)", 8, "ID is given by position, without its name"),
+    ("region(ID=r, block, 0, 1)", 8, "ID of region: given by position, without a name"),
     ("material(m2, neo-hookean, 1000, 0.3, rho=7850)", 38, "rho is given twice: by position and"),
     ("material(m2, linear, E=1000, 1, 0.3)", 30, "arguments by position come first"),
     ("strength(s, plastic, G=1e9, Y=1e7)", 29, "expected: G=..., yield_stress=..., H=..."),

@@ -92,12 +92,9 @@ def _owner(material: Material, kind: str, numbers: tuple[Argument, ...]) -> Mate
     owners = [part for part in whole.parts() if part is not whole and names <= _names(part)]
     if len(owners) > 1:
         lines = " or ".join(f"modify({entry.kind}, {entry.id}, ...)" for entry in owners)
-        raise ScriptError(
-            f"several parts of material '{material.id}' have "
-            + " and ".join(f"'{name}'" for name in sorted(names)),
-            argument="ID",
-            expected=lines,
-        )
+        several = " and ".join(f"'{name}'" for name in sorted(names))
+        message = f"several parts of material '{material.id}' have {several}"
+        raise ScriptError(message, argument="ID", expected=lines)
     if able and not owners:
         line = f"modify(viscosity, {material.id}, ...)"
         named = " and ".join(sorted(names))

@@ -67,8 +67,7 @@ class Argument:
 
     def refuse_name(self) -> None:
         if named := self.keyword():
-            message = f"{named[0]}= is not possible here"
-            raise ScriptError(message, mark=self.mark, code="by-position", name=named[0])
+            raise ScriptError("no name", mark=self.mark, code="by-position", name=named[0])
 
     def words(self, literals: Sequence[str] = ()) -> str:
         self.refuse_name()
@@ -92,9 +91,8 @@ class Argument:
 
     def value(self, hub: Scene | None) -> Value:
         if self.is_null:
-            raise ScriptError(
-                "NULL cannot be used here", mark=self.mark, expected="a number or a formula"
-            )
+            message, expected = "NULL cannot be used here", "a number or a formula"
+            raise ScriptError(message, mark=self.mark, expected=expected)
         self.refuse_name()
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
@@ -191,9 +189,8 @@ def look_up(catalogue: Any, argument: Argument):
     word = argument.word()
     if word is None:
         article = "an" if catalogue.kind[0] in "aeiou" else "a"
-        raise ScriptError(
-            f"'{argument.text}' is not the ID of {article} {catalogue.kind}", mark=argument.mark
-        )
+        message = f"'{argument.text}' is not the ID of {article} {catalogue.kind}"
+        raise ScriptError(message, mark=argument.mark)
     try:
         return catalogue[word]
     except ScriptError as error:

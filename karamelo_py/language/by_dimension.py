@@ -66,13 +66,10 @@ class Forms:
             verb = "is" if got == 1 else "are"
             other = f"{plural(got, 'argument')} {verb} the form for {fitting[0]}D"
             hint = other if missing else f"{other}; here {hint}"
-        raise ScriptError(
-            message,
-            mark=gap.mark if gap else None if missing else arguments[len(names)].mark,
-            expected=self.line(dimension),
-            hint=f"is a comma missing in '{gap.text}'?" if gap else hint,
-            code="arguments",
-        )
+        mark = gap.mark if gap else None if missing else arguments[len(names)].mark
+        hint = f"is a comma missing in '{gap.text}'?" if gap else hint
+        line = self.line(dimension)
+        raise ScriptError(message, mark=mark, expected=line, hint=hint, code="arguments")
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
         names = self.names[dimension]
@@ -107,13 +104,9 @@ class Forms:
         word, choices = argument.word(), self.words[name]
         if word in choices:
             return word
-        raise ScriptError(
-            f"{name} must be one of {', '.join(choices)}",
-            mark=argument.mark,
-            expected=self.line(dimension),
-            hint=meant(word, choices) if word else None,
-            code="argument",
-        )
+        message, hint = f"{name} must be one of {', '.join(choices)}", meant(word or "", choices)
+        line, mark = self.line(dimension), argument.mark
+        raise ScriptError(message, mark=mark, expected=line, hint=hint, code="argument")
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:

@@ -89,18 +89,6 @@ def unknown_keyword(
     return ScriptError(message, mark=mark, expected=choices, hint=hint, code=code, name=word)
 
 
-def after_named(argument: Argument, before: str, form: str) -> ScriptError:
-    message = f"{argument.text} has no name, and follows {before}=..."
-    hint = "arguments by position come first, then those by name"
-    return ScriptError(message, mark=argument.mark, expected=form, hint=hint, code="arguments")
-
-
-def by_position(word: str | None, expected: Sequence[Parameter], name: str) -> str:
-    if any(p.name == word for p in expected):
-        return f"{word} is given by position, without its name"
-    return f"arguments of {name} are given by position"
-
-
 def swapped(
     hub: Scene, expected: list[Parameter], bound: dict[str, list[Argument]], wrong: Parameter
 ) -> str | None:

@@ -267,12 +267,9 @@ class Interpreter:
                 kind = "function" if name in FUNCTIONS else "command"
                 message = f"'{name}' is a {kind}, too; {means}, and the {kind} cannot be called"
                 self.hub.warn(message, hint=None)
-            if name in FIRST:
-                message = f"'{name}' is a coordinate of points before the first step, too; {means}"
-                self.hub.warn(message, hint="choose another name")
-            if name in self.hub.values:
-                message = f"'{name}' is a value of a fix or a compute; {means}"
-                self.hub.warn(message, hint="choose another name")
+            other = "a coordinate of points before the first step, too" if name in FIRST else ""
+            if other := other or ("a value of a fix or a compute" * (name in self.hub.values)):
+                self.hub.warn(f"'{name}' is {other}; {means}", hint="choose another name")
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:

@@ -112,11 +112,9 @@ class OutputFile:
         try:
             os.fsencode(name)
         except UnicodeEncodeError:
-            raise ScriptError(
-                f"{name} cannot be the name of a file here, where names of files are in {encoding}",
-                mark=argument.mark,
-                hint="the environment variable PYTHONUTF8=1, or another name",
-            ) from None
+            message = f"{name} cannot be the name of a file here, where these are in {encoding}"
+            hint = "the environment variable PYTHONUTF8=1, or another name"
+            raise ScriptError(message, mark=argument.mark, hint=hint) from None
         # A run makes the folder of -out; `check` may not find it.
         made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
@@ -132,9 +130,8 @@ class OutputFile:
 def _file_name(argument: Argument) -> str:
     name = argument.words()
     if not name.strip() or "\0" in name or name == NULL:
-        raise ScriptError(
-            "a file name is missing", mark=argument.mark, expected="the name of a file"
-        )
+        message, expected = "a file name is missing", "the name of a file"
+        raise ScriptError(message, mark=argument.mark, expected=expected)
     return os.path.expanduser(name)
 
 

@@ -1,7 +1,7 @@
 """Command-line variables, which override assignments."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
 from pathlib import Path
@@ -16,35 +16,37 @@ from karamelo_py.script.reading import read_script
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 _WORD = r"[^\W\d]\w*"
-_NAMED = re.compile(rf"\s*({_WORD})\s*=(?!=)(.*)", re.DOTALL)
+_NAMED = re.compile(rf"({_WORD})\s*=(?!=)\s*(.*)", re.DOTALL)
 
 
-def names_in(statement: Statement) -> tuple[set[str], dict[str, str]]:
-    """Return the names that a statement reads, and hints for names of its arguments.
+def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None], dict[str, str]]:
+    """Return names that statements read, assign, and hints for names of arguments.
 
     A formula reads its own numbers (``mu=4e5``) before variables, also in quotes.
     """
-    codes, name = [statement.raw.code], ""
-    if isinstance(statement, Assignment):
-        codes = [statement.right.code]
-    elif isinstance(statement, CommandCall):
-        codes, name = [raw.code for raw in statement.arguments], statement.name
-    codes = [re.sub(r'("[^"\n]*")|#[^\n]*', r"\1", code) for code in codes]
-    named = {m[1]: m[2] for code in codes if (m := _NAMED.match(code))} if name else {}
-    styles = [word for code in codes[:2] if registry.knows(name, word := code.strip())]
-    expected = []
-    with suppress(TypeError):  # a broken style
-        expected = signature.parameters(registry.find(name, styles[0])) if styles else []
-    formula = any(p.kind.with_numbers for p in expected)
-    own = named.keys() - {p.name for p in expected} if formula else set()
-    values = [m[2] if name and (m := _NAMED.match(code)) else code for code in codes]
     read: set[str] = set()
-    for code, value in zip(codes, values, strict=True):
-        words = set(re.findall(_WORD, value if formula else re.sub(r'"[^"\n]*"', " ", value)))
-        numbers = code != value and code.split("=")[0].strip() in own
-        read |= words if numbers else words - own
-    hint = "write {0} = {1} on a line of its own, and {0}={0} in {2}(...)"
-    return read, {word: hint.format(word, of.strip(), name) for word, of in named.items()}
+    assigned: dict[str, None] = {}
+    hints: dict[str, str] = {}
+    for statement in statements:
+        name = statement.name if isinstance(statement, CommandCall) else ""
+        raws = [*statement.arguments] if isinstance(statement, CommandCall) else [statement.raw]
+        if isinstance(statement, Assignment):
+            assigned[statement.name] = None
+            raws = [statement.right]
+        codes = [re.sub(r'("[^"\n]*")|#[^\n]*', r"\1", raw.code).strip() for raw in raws]
+        named = [m.groups() if (m := _NAMED.match(code)) else ("", code) for code in codes]
+        expected = []
+        with suppress(StopIteration, TypeError):  # no style, a broken style
+            style = next(code for code in codes[:2] if registry.knows(name, code))
+            expected = signature.parameters(registry.find(name, style))
+        formula = any(p.kind.with_numbers for p in expected)
+        own = {word for word, _ in named if formula} - {p.name for p in expected}
+        for word, value in named:
+            words = set(re.findall(_WORD, value if formula else re.sub(r'"[^"\n]*"', " ", value)))
+            read |= words if word in own - {""} else words - own
+            hint = f"write {word} = {value} on a line of its own, and {word}={word} in {name}(...)"
+            hints[word] = hint
+    return read, assigned, hints
 
 
 class Presets(dict[str, str]):
@@ -124,17 +126,10 @@ class Presets(dict[str, str]):
         scripts = list(self._scripts(statements, self._script.folder)) if self else [None]
         if None in scripts:
             return
-        words = set(re.findall(_WORD, " ".join(self.values())))
-        assigned: dict[str, None] = {}
-        hints: dict[str, str] = {}
-        for statement in chain(*filter(None, scripts)):
-            read, named = names_in(statement)
-            words |= read
-            hints |= named
-            if isinstance(statement, Assignment):
-                assigned[statement.name] = None
+        read, assigned, hints = names_in(chain(*filter(None, scripts)))
+        read.update(assigned, re.findall(_WORD, " ".join(self.values())))
         for name in self:
-            if name not in words and name not in assigned:
+            if name not in read:
                 error = unknown(f"-var {name}: the script has no variable '{name}'", name, assigned)
                 error.hint = hints.get(name, error.hint)
                 raise error

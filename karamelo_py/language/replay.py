@@ -59,12 +59,9 @@ class Replay:
 
     def _was_over(self, run: str, mark: Mark | None) -> ScriptError:
         behind = "" if self.within else f", another run command after {self.record.statements[-1]}"
-        return ScriptError(
-            f"{self.file} was written after this run, by {run}",
-            mark=mark,
-            expected=f"{run} as it was{behind}",
-            hint=self._state_alone(),
-        )
+        message, expected = f"{self.file} was written after this run, by {run}", f"{run} as it was"
+        hint = self._state_alone()
+        return ScriptError(message, mark=mark, expected=f"{expected}{behind}", hint=hint)
 
     def _longer_by(self, before: str, text: str) -> str | None:
         run = self.record.statements[-1]
@@ -72,23 +69,17 @@ class Replay:
         if not (assigns and name.isidentifier() and before.startswith(f"{name}=") and self.within):
             return None
         longer = re.sub(rf"\b{name}\b", lambda _: value, run)
-        return (
-            None
-            if longer == run
-            else f"leave {before} as it was here, and write {longer} instead of {run}"
-        )
+        hint = f"leave {before} as it was here, and write {longer} instead of {run}"
+        return None if longer == run else hint
 
     def value(self) -> float:
         return self._values.pop(0) if self._values else nan
 
     def other_script(self, message: str, mark: Mark | None = None) -> ScriptError:
-        return ScriptError(
-            f"{self.file} was written by another script: {message}",
-            mark=mark,
-            expected="the script that wrote it; settings of steps and output, and the length of "
-            "the last run, may change",
-            hint=self._state_alone(),
-        )
+        message = f"{self.file} was written by another script: {message}"
+        expected = "the script that wrote it; settings of steps and output, and the length of "
+        expected += "the last run, may change"
+        return ScriptError(message, mark=mark, expected=expected, hint=self._state_alone())
 
     def _state_alone(self) -> str:
         return f"read_restart({self.file}) in a separate script takes only the state"

@@ -76,11 +76,9 @@ class Restrictions(NamedTuple):
         return self.but.get(kind) or instead or feature.instead
 
     def error(self, subject: Feature, feature: Feature) -> ScriptError:
-        return ScriptError(
-            f"{subject.words} does not support {feature.words}",
-            mark=feature.mark or subject.mark,
-            expected=self.instead_of(feature),
-        )
+        message = f"{subject.words} does not support {feature.words}"
+        mark = feature.mark or subject.mark
+        return ScriptError(message, mark=mark, expected=self.instead_of(feature))
 
 
 def compare(declared: Mapping[Feature, Restrictions], features: Iterable[Feature]) -> None:

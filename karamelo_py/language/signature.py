@@ -152,7 +152,8 @@ def call(
                 wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"
             wrong.mark = wrong.mark or explain.guilty(wrong, arguments, bound)
             if wrong.code == "by-position" and not wrong.command:
-                wrong.message = explain.by_position(wrong.name, expected, name)
+                which = wrong.name if any(p.name == wrong.name for p in expected) else "arguments"
+                wrong.message = f"{which} of {name}: given by position, without a name"
                 wrong.expected, wrong.code = syntax(target, name), "arguments"
             wrong.command = wrong.command or name
         raise
@@ -182,12 +183,9 @@ def remade(
         for argument in arguments:
             word, value = argument.keyword() or ("", argument)
             if word not in expected:
-                raise ScriptError(
-                    f"{name} has no '{word}'" if word else f"'{argument.text}' has no name",
-                    mark=argument.mark,
-                    expected=", ".join(f"{n}=..." for n in expected),
-                    hint=meant(word, expected),
-                )
+                message = f"{name} has no '{word}'" if word else f"'{argument.text}' has no name"
+                choices, near = ", ".join(f"{n}=..." for n in expected), meant(word, expected)
+                raise ScriptError(message, mark=argument.mark, expected=choices, hint=near)
             bound[word] = [value]
             values = values | {word: convert(hub, expected[word], value)}
         several = next((p.name for p in expected.values() if p.variadic), None)
@@ -253,13 +251,15 @@ def _bind(
         word, value = argument.keyword() or ("", argument)
         if not word or (passed_on and word not in by_name):
             if before := next((p.name for p in slots if p.name in bound), None):
-                raise explain.after_named(argument, before, syntax(target, name))
+                message = f"{argument.text} has no name, and follows {before}=..."
+                hint = "arguments by position come first, then those by name"
+                raise ScriptError(message, mark=argument.mark, hint=hint, code="arguments")
             positional.append(argument)
         elif word in bound or word in numbers:
             raise ScriptError(f"{word} is given twice", mark=argument.mark)
         elif word in (p.name for p in slots[: len(positional)]):
             message = f"{word} is given twice: by position and as {word}="
-            raise ScriptError(message, mark=argument.mark, expected=syntax(target, name))
+            raise ScriptError(message, mark=argument.mark)
         elif word in by_name:
             bound[word] = [value]
         elif formula:

@@ -168,16 +168,13 @@ def run(options: Namespace) -> int:
             )
         terminal().print(table)
         if options.method == "sobol":
-            _doubt(rows, options.n)
+            widest = max(total.high - total.low for _, total in rows)
+            if widest > 0.2:
+                more = 2 * options.n
+                print(f"intervals are up to {widest:.2g} wide: -n {more} makes them narrower")
     for item, (name, wrong) in zip(items, fits, strict=False):
         print(f"{item.word}: {name} has a leave-one-out error of {wrong:.2g} standard deviations")
         if wrong > DOUBTED:
             print(f"too large for reliable indices: -n {2 * options.n}, or -method sobol")
     print(f"{plural(len(study.rows), 'run')}; the table is {out}")
     return 0
-
-
-def _doubt(rows: Sequence[tuple[Interval, Interval]], n: int) -> None:
-    widest = max(total.high - total.low for _, total in rows)
-    if widest > 0.2:
-        print(f"intervals are up to {widest:.2g} wide: -n {2 * n} makes them narrower")

@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,12 +92,9 @@ def check(condition: str, names: Sequence[str]) -> None:
 
 
 def _happens(condition: str, row: Row) -> bool:
-    cells = {n: shown_exactly(row[n]) for n in [*row] if row[n] is not None}
+    some = {n: cell for n, cell in row.items() if cell is not None}
+    cells = {n: f"{c:.17g}" if isinstance(c, float) else str(c) for n, c in some.items()}
     return variables.holds(condition, cells, option="-fails")
-
-
-def shown_exactly(cell: Any) -> str:
-    return f"{cell:.17g}" if isinstance(cell, float) else str(cell)
 
 
 def draw(options: Namespace, table: Table) -> int:

@@ -6,7 +6,7 @@ import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Container, Iterable, Mapping, Sequence
 from contextlib import suppress
-from itertools import product, takewhile
+from itertools import chain, product, takewhile
 from math import prod
 from pathlib import Path
 from textwrap import fill
@@ -23,7 +23,7 @@ from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.script.reading import read_script
-from karamelo_py.script.syntax import Assignment, CommandCall, FunctionCall, Node, Raw
+from karamelo_py.script.syntax import CommandCall, FunctionCall, Node, Raw
 from karamelo_py.script.terms import number_of
 
 VALUES = "NAME=value,value,... or NAME=first:last:count"
@@ -176,21 +176,13 @@ class ScriptFiles:
         return tuple(map(read_script, sorted(self.statements)))
 
     def check(self, names: Iterable[str]) -> None:
-        read: set[str] = set()
-        assigned: set[str] = set()
-        hints: dict[str, str] = {}
-        for statement in (each for statements in self.statements.values() for each in statements):
-            words, named = names_in(statement)
-            read |= words
-            hints |= named
-            if isinstance(statement, Assignment):
-                assigned.add(statement.name)
+        read, assigned, hints = names_in(chain(*self.statements.values()))
         for name in names:
             if name not in read and self.all_known:
                 fault = "sets it and never reads it" if name in assigned else "has no such variable"
-                message = f"-var {name}: {self.path} {fault}"
-                error = unknown(message, name, sorted(assigned & read))
-                error.hint = error.hint if name in assigned else hints.get(name, error.hint)
+                known = sorted(assigned.keys() & read)
+                error = unknown(f"-var {name}: {self.path} {fault}", name, known)
+                error.hint = hints.get(name, error.hint)
                 raise error
 
     def logged(self) -> list[str] | None:
@@ -216,20 +208,14 @@ class ScriptFiles:
         if reduction not in ("", "max", "min", "mean", "first", "last"):
             return ""
         parts = {
-            words[0]: style
+            words[0]: registry.find(family, words[1])
             for family in ("fix", "compute") for words in self.words(family)
-            if len(words) > 1 and (style := _style(family, words[1]))
+            if len(words) > 1 and registry.knows(family, words[1])
         }  # fmt: skip
         for words in self.words("units"):
             with suppress(TypeError, KeyError):
                 return Units(*words).of_value(column.lower() if column == "Time" else column, parts)
         return ""
-
-
-def _style(family: str, name: str) -> Any:
-    with suppress(ScriptError):
-        return registry.find(family, name)
-    return None
 
 
 def add_family(parser: ArgumentParser, values: str = VALUES) -> None:

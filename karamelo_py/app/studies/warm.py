@@ -196,7 +196,10 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
         traceback.print_exc()
         status = 1
     sys.stdout.flush()
-    if stays is not None and status == 0 and _is_clean():
+    from karamelo_py.language import registry
+
+    clean = NOT_OURS not in sys.modules and not registry.foreign()
+    if stays is not None and status == 0 and clean:
         os.environ[STUDY] = study
         with socket.socket(fileno=stays) as link:
             pid = os.fork()
@@ -204,9 +207,3 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
                 keep(link)
             link.send(str(pid).encode())
     os._exit(status)
-
-
-def _is_clean() -> bool:
-    from karamelo_py.language import registry
-
-    return NOT_OURS not in sys.modules and not registry.foreign()
