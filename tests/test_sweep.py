@@ -306,11 +306,11 @@ def test_names_of_arguments_are_no_variables(tmp_path, script, names, refused):
     for name in refused:
         with pytest.raises(ScriptError, match="has no such variable") as caught:
             variables.ScriptFiles(tmp_path / "in.a").check([name])
-        assert f"on a line of its own, and {name}={name} in material" in caught.value.hint
+        assert f"on a separate line, and {name}={name} in material" in caught.value.hint
         run = Interpreter(Hub(), {name: "1"}).run_text
         with pytest.raises(ScriptError, match="the script has no variable") as caught:
             run(script)
-        assert f"on a line of its own, and {name}={name} in material" in caught.value.hint
+        assert f"on a separate line, and {name}={name} in material" in caught.value.hint
 
 
 def test_the_time_that_remains_grows_as_the_runs_do():

@@ -44,7 +44,7 @@ def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None]
         for word, value in named:
             words = set(re.findall(_WORD, value if formula else re.sub(r'"[^"\n]*"', " ", value)))
             read |= words if word in own - {""} else words - own
-            hint = f"write {word} = {value} on a line of its own, and {word}={word} in {name}(...)"
+            hint = f"write {word} = {value} on a separate line, and {word}={word} in {name}(...)"
             hints[word] = hint
     return read, assigned, hints
 
