@@ -392,7 +392,10 @@ def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, an
     ],
 )
 def test_places_that_are_refused(folder, capsys, monkeypatch, where, says):
+    """Ctrl-C remains the program's: dask-jobqueue takes it over when it is imported."""
     monkeypatch.setattr(elsewhere, "PATIENCE", 1)
+    interrupt = signal.getsignal(signal.SIGINT)
     assert main(["sweep", "in.lin", *WORDS, "-on", where]) == 1
+    assert signal.getsignal(signal.SIGINT) is interrupt
     err = capsys.readouterr().err
     assert says in err and "Traceback" not in err

@@ -436,6 +436,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
         hint = "pip install '.[dask]' in the folder of karamelo-py"
         raise ScriptError(f"-on {options.on} needs {needed.replace('_', '-')}", hint=hint)
     from distributed import Client, LocalCluster
+    from distributed.comm.registry import get_backend
 
     try:
         if options.on == "local":
@@ -447,8 +448,11 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
             )
             _closed(ends, cluster.close, timeout=PATIENCE)
         elif options.on in QUEUES:
+            before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
             import dask_jobqueue
 
+            for one, handler in before.items():  # which the import has replaced
+                signal.signal(one, handler)
             kind = getattr(dask_jobqueue, QUEUES[options.on])
             command = kind.job_cls.submit_command.split()[0]
             if shutil.which(command) is None:
@@ -457,6 +461,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
             _closed(ends, cluster.close, timeout=PATIENCE)
             cluster.scale(jobs=jobs)
         else:
+            get_backend(options.on.partition("://")[0])
             cluster = options.on
         client = _in_time(lambda: Client(cluster, timeout=PATIENCE))
     except ValueError as error:
