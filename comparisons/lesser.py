@@ -38,6 +38,10 @@ cells in the reduced model with 16 in 3D, which is off by 8 %.
 `python -m comparisons.lesser` writes the table. For some scenes it changes variables of the
 script: the lesser model of `in.kirsch` has n=10 (3.017), its default of n=6 gives 2.995.
 
+A step in plane stress takes 1.55 times as long as in plane strain, with a neo-Hookean law and with
+plastic metal (the same script with `plane_stress(true)` and `plane_stress(false)`, 65 536 points on
+one core, medians of seven alternate runs).
+
 | scene | answer | reduced model | 3D | exact | cost of 3D |
 |---|---|---|---|---|---|
 """
