@@ -251,29 +251,6 @@ def _give(links, link, p, into, by_mass):
 
 
 @noinline
-def _solve_dense(J, m):
-    """Solve J (m, m + 1) by pivoted elimination; the solution replaces the last column."""
-    for k in range(m):
-        best = k
-        for a in range(k + 1, m):
-            if abs(J[a, k]) > abs(J[best, k]):
-                best = a
-        if best != k:
-            for b in range(k, m + 1):
-                J[k, b], J[best, b] = J[best, b], J[k, b]
-        for a in range(k + 1, m):
-            factor = J[a, k] / J[k, k]
-            if factor != 0:
-                for b in range(k, m + 1):
-                    J[a, b] -= factor * J[k, b]
-    for back in range(m):
-        k = m - 1 - back
-        for b in range(k + 1, m):
-            J[k, m] -= J[k, b] * J[b, m]
-        J[k, m] /= J[k, k]
-
-
-@noinline
 def _begin(links, body, k):
     state, work, inverse = body.state[0], body.solution, links.inverse[k]
     for a in range(3):
@@ -604,7 +581,7 @@ def _descend(links, bodies):
 @noinline
 def _iterate(links, bodies, bounded):
     """Take Newton steps, halved if needed; return whether they have converged."""
-    m, energy = links.slope.shape[0], 0.0
+    energy = 0.0
     size = _residual(links, bodies, links.u, links.rest, bounded)
     for body in bodies:
         for a in range(6):
@@ -617,7 +594,7 @@ def _iterate(links, bodies, bounded):
             _add_body(links, body, n, bounded)
         for i in range(links.count[0]):
             _add_slope(links, links.rows[i], bounded)
-        _solve_dense(links.slope, m)
+        motion.solve_system(links.slope)
         better, now = False, size
         if bounded:
             now = _descend(links, bodies)

@@ -328,19 +328,21 @@ def add_slope(body, i, bounded):
 
 @noinline
 def solve_system(J):
-    """Solve J (6, 7) by pivoted elimination; the solution replaces the last column."""
+    """Solve J (m, m + 1) by pivoted elimination; the solution replaces the last column."""
     size = J.shape[0]
     for k in range(size):
         best = k
         for a in range(k + 1, size):
             if abs(J[a, k]) > abs(J[best, k]):
                 best = a
-        for b in range(size + 1):
-            J[k, b], J[best, b] = J[best, b], J[k, b]
+        if best != k:
+            for b in range(k, size + 1):
+                J[k, b], J[best, b] = J[best, b], J[k, b]
         for a in range(k + 1, size):
             factor = J[a, k] / J[k, k]
-            for b in range(k, size + 1):
-                J[a, b] -= factor * J[k, b]
+            if factor != 0:
+                for b in range(k, size + 1):
+                    J[a, b] -= factor * J[k, b]
     for back in range(size):
         k = size - 1 - back
         for b in range(k + 1, size):
