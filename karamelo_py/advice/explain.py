@@ -241,13 +241,10 @@ def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
 
 def warn_of_stress_left(hub: Hub, simulation: Simulation) -> None:
     """Warn once of stress across that is no longer small, with solid, law, step and state."""
-    if "stress across" in hub.update.warned_of:
-        return
     left = hub.fields.particle("stress_left")
-    p = int(np.argmax(left)) if len(left) else 0
-    if not len(left) or left[p] <= LEFT:
+    if left.max(initial=0) <= LEFT or not hub.update.first_time("stress across"):
         return
-    hub.update.first_time("stress across")
+    p = int(np.argmax(left))
     solid = solid_with(hub, p)
     command = "plane_stress" if hub.domain.dimension == 2 else "uniaxial_stress"
     names = [name for name in ("thickness", "damage", "ep") if name in hub.fields.particle_names()]

@@ -17,6 +17,7 @@ from karamelo_py.advice.loads import (
     cells,
     cost,
     depends,
+    extent,
     given,
     rollers,
     to_change,
@@ -104,8 +105,8 @@ def _bar(hub: Hub, held: dict[int, Roller]) -> Words:
         return
     solids = [solid for solid in hub.solids.values() if solid.count]
     x0 = np.concatenate([solid.x0 for solid in solids])
-    lo, hi = (np.stack([getattr(s, end)[:3] for s in solids]) for end in ("lo", "hi"))
-    size = hi.max(axis=0) - lo.min(axis=0)
+    lo, hi = extent(solids)
+    size = hi - lo
     for k in range(3):
         rest = [axis for axis in range(3) if axis != k]
         # symmetry planes: the whole bar is twice as wide

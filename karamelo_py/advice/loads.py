@@ -1,6 +1,6 @@
 """Directions in which the loads of a scene act, and its symmetry planes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from karamelo_py.run.lower.build import features
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
+from karamelo_py.scene.solid import Solid
 
 Words = Iterator[tuple[str, str]]  # reason, what to write instead
 AXES = "xyz"
@@ -33,13 +34,18 @@ def positions(hub: Hub, nodes: np.ndarray) -> np.ndarray:
     return np.concatenate([lattice.positions(some) for lattice, some in parts])
 
 
+def extent(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest corner (3,) of all solids."""
+    return np.min([one.lo for one in solids], axis=0), np.max([one.hi for one in solids], axis=0)
+
+
 def rollers(hub: Hub) -> dict[int, Roller]:
     """Return the symmetry planes by direction; not planes at both ends."""
     found: dict[int, Roller] = {}
     solids = [solid for solid in hub.solids.values() if solid.count]
     if not solids:
         return found
-    lo, hi = np.min([s.lo for s in solids], axis=0), np.max([s.hi for s in solids], axis=0)
+    lo, hi = extent(solids)
     small, twice = hub.domain.tolerance, set()
     for fix in hub.fixes.values():
         directions = [k for k, formula in enumerate(fix.formulas) if formula is not None]
@@ -87,8 +93,7 @@ def alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
         groups = [(solid.first_id, solid.x0) for solid in hub.solids.values() if solid.count]
         members = group.members if within is None else within
     for first, x in groups:
-        keys = np.rint(key(x) * (1e6 / hub.domain.h)).astype(np.int64)
-        _, cell = np.unique(keys, axis=0, return_inverse=True)
+        _, cell = np.unique(cells(key(x), hub.domain.h), axis=0, return_inverse=True)
         selected = np.bincount(cell, np.isin(first + np.arange(len(x)), members))
         if ((selected > 0) & (selected < np.bincount(cell))).any():
             return False

@@ -14,6 +14,7 @@ from karamelo_py.advice.loads import (
     cells,
     cost,
     depends,
+    extent,
     given,
     positions,
     to_change,
@@ -46,6 +47,10 @@ class Middle(NamedTuple):
     def along(self) -> list[int]:
         return [axis for axis in range(3) if axis not in self.across]
 
+    def apart(self, solid: Solid) -> np.ndarray:
+        """Return the distances (2, k) of the ends of a solid from the centre, across the axis."""
+        return np.abs(np.stack([solid.lo, solid.hi]) - self.centre)[:, self.across]
+
     def radius(self, x: np.ndarray) -> np.ndarray:
         return np.linalg.norm((x - self.centre)[:, self.across], axis=1)
 
@@ -60,7 +65,7 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
         return
     if any(can(solid.material.whole, is_round) for solid in solids):
         return  # laws with directions
-    lo, hi = np.min([s.lo for s in solids], axis=0), np.max([s.hi for s in solids], axis=0)
+    lo, hi = extent(solids)
     centre, sides = (lo + hi) / 2, np.zeros(3)
     for k, roller in held.items():
         centre[k], sides[k] = roller.at, roller.side
@@ -84,7 +89,7 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
 
 def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] | None:
     """Return solids that are square plates under round bodies; None if others are not round."""
-    reach = [_reach(solid, middle) for solid in solids]
+    reach = [float(middle.apart(solid).max()) for solid in solids]
     round_ = [
         _is_round(solid.region, domain.contains, middle, far)
         for solid, far in zip(solids, reach, strict=True)
@@ -96,7 +101,7 @@ def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] |
     for solid, one in zip(solids, round_, strict=True):
         if one:
             continue
-        apart = np.abs(np.stack([solid.lo, solid.hi]) - middle.centre)[:, middle.across]
+        apart = middle.apart(solid)
         free = apart[:, middle.sides[middle.across] == 0]
         inner = min([*free.ravel(), *apart.max(axis=0)])
         whole = len(middle.across) == 2 and inner >= WIDE * most
@@ -104,11 +109,6 @@ def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] |
             return None
         squares.append(solid.id)
     return squares
-
-
-def _reach(solid: Solid, middle: Middle) -> float:
-    apart = np.abs(np.stack([solid.lo, solid.hi]) - middle.centre).max(axis=0)
-    return float(apart[middle.across].max())
 
 
 def _is_round(region: Region | None, here: Callable, middle: Middle, reach: float) -> bool:
@@ -159,10 +159,15 @@ def _radial(hub: Hub, fix: Fix, middle: Middle) -> bool:
     outwards = (arm * values).sum(axis=1) / size
     rest = values - arm * (outwards / size)[:, None]
     small = SAME * (np.abs(values).max(initial=0.0) or 1.0)
+    return bool((np.abs(rest) <= small).all()) and _is_even(hub, middle, x, outwards, small)
+
+
+def _is_even(hub: Hub, middle: Middle, x: np.ndarray, values: np.ndarray, small: float) -> bool:
+    """Return True if `values` (n,) are equal at all positions of the same radius and height."""
     _, same = np.unique(cells(middle.key(x), hub.domain.h), axis=0, return_inverse=True)
     most = np.full(same.max(initial=-1) + 1, -np.inf)
-    np.maximum.at(most, same, outwards)
-    return bool((np.abs(rest) <= small).all() and (outwards >= most[same] - small).all())
+    np.maximum.at(most, same, values)
+    return bool((values >= most[same] - small).all())
 
 
 def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
@@ -262,12 +267,9 @@ def _angular_velocity(hub: Hub, fix: Fix, middle: Middle) -> str | None:
     square = np.maximum((r * r).sum(axis=1), 1e-18 * hub.domain.h**2)
     omega = (r[:, 0] * second - r[:, 1] * first) / square
     apart = np.hypot(first + omega * r[:, 1], second - omega * r[:, 0])
-    _, same = np.unique(cells(middle.key(x), hub.domain.h), axis=0, return_inverse=True)
-    most = np.full(same.max(initial=-1) + 1, -np.inf)
-    np.maximum.at(most, same, omega)
     scale = 1e-9 * np.abs(omega).max(initial=0.0)
-    rotates = (apart <= scale * np.sqrt(square)).all() and (omega >= most[same] - scale).all()
-    if not rotates:
+    rotates = (apart <= scale * np.sqrt(square)).all()
+    if not rotates or not _is_even(hub, middle, x, omega, scale):
         return None
     off = omega[square > 1e-12 * hub.domain.h**2]
     constant = not any("time" in one.names for one in formulas) and np.ptp(off) <= 2 * scale

@@ -139,7 +139,7 @@ def _name_of(law: object) -> str:
     """Return the family and style of a law or its part, such as 'eos ideal-gas'."""
     kind, families = type(law), ("eos", "strength", "material")
     named = ((family, registry.name_of(family, kind)) for family in families)
-    return next((f"{a} {name}" for a, name in named if name != kind.__name__), kind.__name__)
+    return next((f"{a} {name}" for a, name in named if registry.knows(a, name)), kind.__name__)
 
 
 def fit_to_domain(hub: Hub, material: Material) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, Setup
-from karamelo_py.kernels.equations.periodic import EVERY, GHOSTS, Axis, InUse, Seam
+from karamelo_py.kernels.equations.periodic import EVERY, GHOSTS, Axis, InUse, Seam, position_on
 from karamelo_py.kernels.equations.sheared import Shear
 from karamelo_py.run.boxes import numbers
 from karamelo_py.scene.domain import Domain
@@ -53,7 +53,7 @@ def mark_nodes(s: Setup, domain: Domain) -> None:
         return
     n, home = np.arange(len(used)), np.ones(len(used), bool)
     for axis in s.control.ranks.axes:
-        node = (n - axis.first) // axis.stride % axis.count - GHOSTS
+        node = position_on(axis, n) - GHOSTS
         home &= (node >= 0) & (node < axis.period)
     if not used[home, 0].all():
         raise ScriptError(

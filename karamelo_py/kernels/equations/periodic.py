@@ -37,7 +37,7 @@ class Seam(NamedTuple):
 
 def position_on(axis, n):
     """Return a node's index along an axis, with ghosts."""
-    return (int(n) - axis.first) // axis.stride % axis.count
+    return (n - axis.first) // axis.stride % axis.count
 
 
 @counts.on(Seam)
@@ -45,7 +45,7 @@ def _counts_seam(ranks, n):
     """Return True for one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
-        position = position_on(axis, n) - GHOSTS
+        position = position_on(axis, int(n)) - GHOSTS
         counted = counted & (position >= 0) & (position < axis.period)
     return counted
 
@@ -83,7 +83,7 @@ def _is_lowest(axis, nodes, n):
     """Return True for the first node in use among its images."""
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    position = position_on(axis, n)
+    position = position_on(axis, int(n))
     lowest = position >= 0
     for k in range(1, int(position // axis.period) + 1):
         if used[index(int(n - k * step)), 0] > 0:
@@ -94,7 +94,7 @@ def _is_lowest(axis, nodes, n):
 def _join(axis, nodes, array, n):
     used = field(nodes.fields, InUse)
     step = axis.period * axis.stride
-    position = position_on(axis, n)
+    position = position_on(axis, int(n))
     more = int((axis.count - 1 - position) // axis.period)
     for c in range(int(array.shape[1])):
         total = array[n, c]

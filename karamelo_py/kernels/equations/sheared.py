@@ -39,7 +39,7 @@ def images_of(s):
 
 
 def _place(axis, n):
-    return int(position_on(axis, n)) - GHOSTS
+    return int(position_on(axis, int(n))) - GHOSTS
 
 
 def _is_home(images, n):

@@ -21,6 +21,7 @@ from karamelo_py.points.laws.placed import (
     formulas_of_place,
     refuse_absent,
     some_places,
+    words_of,
 )
 from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import Mark, ScriptError
@@ -86,9 +87,8 @@ class Axes:
         return np.stack([R[:, i, j] for i, j in F.places], axis=1)
 
     def fault(self, what: str, x0: np.ndarray) -> ScriptError:
-        place = ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0, strict=False))
         return ScriptError(
-            f"axes: {what}, at the point {place}",
+            f"axes: {what}, at the point {words_of(x0)}",
             mark=self.mark,
             expected=f"{self.script_kind}; in 2D without z",
         )

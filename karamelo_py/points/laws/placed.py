@@ -58,12 +58,16 @@ class Direction:
         if not (wrong := ~(np.isfinite(size) & (size > 0))).any():
             return np.stack(a, axis=1) / size[:, None]
         k = int(np.flatnonzero(wrong)[0])
-        place = ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0[k], strict=False))
+        direction = ", ".join(f"{one[k]:g}" for one in a)
         raise ScriptError(
-            f"the direction is ({', '.join(f'{one[k]:g}' for one in a)}) at the point {place}",
+            f"the direction is ({direction}) at the point {words_of(x0[k])}",
             mark=self.mark,
             expected="three numbers at every point, not all 0",
         )
+
+
+def words_of(x0: np.ndarray) -> str:
+    return ", ".join(f"{axis}0 = {x:.6g}" for axis, x in zip("xyz", x0, strict=False))
 
 
 def refuse_absent(formulas: Sequence[Expression], d: int, mark: Mark | None) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.compiler import round_off, where
 from karamelo_py.compiler.powers import exponential
+from karamelo_py.language import registry
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.scene import Scene
@@ -25,7 +26,6 @@ from karamelo_py.points.kinematics import (
     tr,
 )  # fmt: skip
 from karamelo_py.points.laws import Absent, LawTraits, law_parts, law_traits
-from karamelo_py.points.laws.newtonian import Newtonian
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError
 
@@ -42,8 +42,9 @@ class ElasticMaterial:
     @classmethod
     def from_script(cls, hub: Scene, argument: Argument) -> Any:
         material = look_up(hub.materials, argument)
-        if viscous := [type(one) for one in law_parts(material.whole) if type(one) in VISCOUS]:
-            message = f"material '{material.id}' has viscosity {VISCOUS[viscous[0]]} already"
+        named = [registry.name_of("viscosity", type(one)) for one in law_parts(material.whole)]
+        if viscous := [name for name in named if registry.knows("viscosity", name)]:
+            message = f"material '{material.id}' has viscosity {viscous[0]} already"
             raise ScriptError(message, mark=argument.mark, expected=cls.order)
         if not law_traits(material.whole).rebounds or not is_isotropic(material.whole):
             raise ScriptError(
@@ -221,9 +222,6 @@ known_failure(
     "{dt:.4g}: that part of the stress never acts",
     cure="leave the term out, with a softer elastic law",
 )
-
-
-VISCOUS = {Viscoelastic: "prony", Newtonian: "newtonian"}
 
 
 class State(NamedTuple):
