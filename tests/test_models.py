@@ -43,8 +43,8 @@ def test_a_shell_by_three_models(run_script):
 def test_symmetry_costs_nothing(run_script):
     """A quarter of the ring has the error of the whole.
 
-    Not to all digits with FLIP 0.99: rollers also change the velocities that points have beyond the
-    nodes' (`test_walls.py`), which a symmetry plane inside the body does not.
+    The last digits differ with FLIP 0.99: rollers damp the noise in the velocities of points next
+    to them (`test_walls.py`), and a symmetry plane inside the body does not.
     """
     quarter, full = (last(run_script, "lame", "err", model) for model in ("quarter", "full"))
     assert quarter == pytest.approx(full, rel=2e-3)

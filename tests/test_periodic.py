@@ -207,7 +207,7 @@ LAYER = """
 def test_grains_down_a_plane(run_script, N, T, within):
     """mu(I) has Bagnold's profile (GDR MiDi 2004; Jop, Forterre & Pouliquen 2006).
 
-    It takes 1.2 s to adapt; the rest is the error of the steady flow: order 1.9, root mean square.
+    The flow becomes steady after 1.2 s. Its root mean square error is then of order 1.9.
     """
     points = columns(final(run_script(LAYER.format(N=N, T=T))))
     angle, H, d = np.radians(24), 0.02, 0.5e-3

@@ -98,7 +98,7 @@ def test_fibres_carry_when_the_matrix_is_broken(run_interpreted):
 
 
 def test_a_broken_ply_has_no_stress_across(run_interpreted):
-    """A slope of the stress across of 6e-5 of the modulus; the same element in 3D."""
+    """The stiffness across is 6e-5 of the largest modulus; the reference is the element in 3D."""
     loads = """
         load_path(cube, 40, exx=0.02, syy=0, szz=0)
         load_path(plate, 40, exx=0.02, syy=0)
