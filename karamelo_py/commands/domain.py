@@ -34,8 +34,8 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
     """Set the number of dimensions, the domain and the cell size of its grid.
 
     A point that leaves the domain ends the run (see boundary). Strain is uniaxial in 1D and plane
-    (unit thickness) in 2D. The grid starts at the lower corner; no node lies at an upper end that
-    is no multiple of the cell size from it, so a wall there is too far out.
+    (unit thickness) in 2D. The grid starts at the lower corner. If a side is not a multiple of the
+    cell size, the last nodes, and a wall at them, lie outside the domain.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
 
     Notes
     -----
-    Once only, before regions and solids.
+    Use this command once, before regions and solids.
 
     See Also
     --------
@@ -80,7 +80,7 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
     ----------
     bounds
         ``xmin, xmax``, then ``ymin, ymax`` and ``zmin, zmax`` in 2D and 3D; optionally the cell
-        size h. Without h the first solid sets it.
+        size h. Without h, the cell size of the first solid is used.
 
     Example
     -------
@@ -89,7 +89,7 @@ def create_domain(hub: Hub, *bounds: Argument) -> None:
 
     Notes
     -----
-    Without ``dimension(1|2|3)`` before it, the number of arguments sets the dimension.
+    Without an earlier ``dimension(1|2|3)``, the number of arguments sets the number of dimensions.
 
     See Also
     --------
@@ -119,9 +119,9 @@ def boundary(
         with its mass and momentum. ``reflect``: it is mirrored back inside, and its normal velocity
         reversed. ``periodic``: it returns at the other end.
     directions
-        With ``periodic`` alone.
+        The periodic directions (``periodic`` only).
     shear
-        Velocity gradient dvx/dy of a cell that is periodic in x and y (Lees & Edwards 1972).
+        Prescribed velocity gradient dvx/dy, if x and y are periodic (Lees & Edwards 1972).
 
     Example
     -------
@@ -132,25 +132,26 @@ def boundary(
     Notes
     -----
     ``delete`` and ``reflect`` are for splashes; for a body against a wall use fix velocity_nodes. A
-    warning names the first point; the end of a run reports their number.
+    warning names the first such point; the end of the run reports how many there were.
 
-    A point is deleted before the step in which it would leave. The run repeats the steps since its
-    last stored state, at most a hundred, with their Python hooks (about six times as long if points
-    leave in every step).
+    A point is deleted before the step in which it would leave: the run returns to its last stored
+    state, at most a hundred steps earlier, and repeats these steps, with their Python hooks. If
+    points leave in every step, the run takes about six times as long.
 
-    A reflected point retains its stress and tangential velocity. A body that hits the edge as a
-    whole loses most of its normal velocity.
+    A reflected point retains its stress and tangential velocity. If a whole body hits the edge, it
+    loses most of its normal velocity.
 
-    In a periodic direction, bodies at both ends touch. Its length is a multiple of the cell size,
-    and formulas of nodes should be periodic. Points return to the domain every 10 steps; until
-    then, dumps may show them outside. It needs method ulmpm with a linear basis or splines, scheme
-    musl, any transfer except XPIC, and one process without a GPU. Refused are other styles of
-    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies, and pore_water.
+    In a periodic direction, bodies at opposite ends of the domain are in contact. The length of the
+    domain must be a multiple of the cell size, and formulas that fixes evaluate at nodes should be
+    periodic. Points return to the domain every 10 steps; until then, dumps may show them outside.
+    Periodic directions need method ulmpm with a linear basis or splines, scheme musl, any transfer
+    except XPIC, and one process without a GPU. They cannot be combined with other styles of
+    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies or pore_water.
 
-    In a sheared cell, which bodies fill, start with fix initial_velocity_particles of the mean
-    velocity `shear` y. Momentum is conserved to round-off; the energy balance is not monitored.
+    With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
+    initial_velocity_particles). Momentum is conserved to round-off; energy is not monitored.
 
-    Separate grids of solids (tlmpm, tlcpdi) have no edge.
+    In tlmpm and tlcpdi, the command has no effect: the separate grids of solids have no edge.
 
     See Also
     --------
@@ -199,7 +200,7 @@ def set_periodic(hub: Hub, directions: list[int], shear: float) -> None:
     domain.periodic, domain.node_fields = tuple(sorted(set(directions))), (InUse,)
 
 
-registry.may_differ(boundary)  # a run that points leave can resume with boundary(delete)
+registry.may_differ(boundary)  # a run that points have left can be resumed with boundary(delete)
 
 
 def region(
@@ -218,7 +219,8 @@ def region(
 
     Notes
     -----
-    A region includes its surface. A last word ``exterior`` inverts block, cylinder and sphere.
+    A region includes its surface. With ``exterior`` as last argument, block, cylinder and sphere
+    include everything outside the shape.
 
     See Also
     --------
@@ -262,7 +264,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         raise
     domain.mark = hub.mark
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
-    # A domain of one cell is an element that deforms.
+    # A domain of a single cell is intended: an element test.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
@@ -291,7 +293,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
 
     Notes
     -----
-    After the method, domain, region and material.
+    The method, domain, region and material must be defined before the solid.
 
     See Also
     --------
@@ -360,14 +362,14 @@ def group(
 ) -> None:
     """Name a set of points or of nodes.
 
-    Points are selected by their reference positions. A group of nodes also gets nodes of the
-    separate grids of later solids, unless `solids` are named. The group ``all`` always exists. A
-    set of faces, edges or nodes of a mesh selects members within half a cell.
+    Points are selected by their reference positions. Unless `solids` are named, a group of nodes
+    also includes nodes of the separate grids of solids defined later. A set of faces, edges or
+    nodes of a mesh selects points or nodes within half a cell. The group ``all`` always exists.
 
     Parameters
     ----------
     ID
-        Name of the group; an existing group gets further members.
+        Name of the group; if it exists, members are added to it.
     kind
         ``particles`` or ``nodes``.
     by
@@ -423,7 +425,7 @@ def group(
     if count or region.unknown:
         return
     if kind == "nodes" and not solids and own_grids(hub):
-        members.awaits_solids = True  # the run warns if none came
+        members.awaits_solids = True  # the run warns if it is still empty
     else:
         none_yet = "no solid is made yet: groups of particles come after the solids"
         hub.warn(

@@ -23,9 +23,9 @@ def fix(hub: Hub, ID: str, style: Annotated[str, StyleOf("fix")], *arguments: Ar
     ID
         Name of the fix; a fix with the same name is replaced.
     style
-        What it does.
+        The kind of support, load or initial state.
     arguments
-        The group it acts on, then arguments of the style; see its page.
+        The group on which the fix acts, then the arguments of the style (see its page).
 
     Example
     -------
@@ -64,9 +64,9 @@ def compute(
     Parameters
     ----------
     style
-        What it measures.
+        The quantity to measure.
     arguments
-        The group it measures, then arguments of the style; see its page.
+        The group that is measured, then the arguments of the style (see its page).
 
     Example
     -------
@@ -180,7 +180,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
     Notes
     -----
-    Measured when the log is written or a condition reads it.
+    The value is updated when the log is written or a condition uses it.
 
     See Also
     --------
@@ -209,10 +209,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes it is the sum of the forces from the points, by stress and by fixes on points
-    (contact, tools, tractions). At held nodes with little acceleration it is minus the reaction.
-    For points it is the rate of change of their momentum in the last step, sum m a. It is 0 before
-    the first step.
+    For nodes it is the sum of the forces due to the stress of points and to fixes on points
+    (contact, tools, tractions). At held nodes it is the negative reaction, if accelerations are
+    small. For points it is the rate of change of their momentum in the last step, sum m a. It is 0
+    before the first step.
 
     See Also
     --------
@@ -243,9 +243,10 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes these are fixes on nodes, such as body_force and force_nodes; for points, fixes on
-    points (contact, tools, tractions). Prescribed velocities are omitted; their fixes publish
-    reactions. It is 0 before the first step. Karamelo returns the internal force instead.
+    For nodes it is the force of fixes on nodes, such as body_force and force_nodes; for points, of
+    fixes on points (contact, tools, tractions). Reactions of prescribed velocities are not
+    included; their fixes publish them. It is 0 before the first step. (Karamelo returns internal
+    forces.)
 
     See Also
     --------

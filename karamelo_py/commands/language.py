@@ -70,7 +70,7 @@ def value(hub: Hub, expression: Expression) -> float:
         return expression.constant
     if not expression.names.intersection(POINT_SEEDS):
         if hub.rehearsing:
-            return math.nan  # known only after earlier runs
+            return math.nan  # earlier runs determine the value
         if hub.interpreter.replay is not None:
             number = hub.interpreter.replay.value()
         else:

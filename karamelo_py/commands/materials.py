@@ -32,7 +32,7 @@ def material(
     Parameters
     ----------
     style
-        The law.
+        The constitutive law.
 
     Example
     -------
@@ -153,13 +153,14 @@ def load_path(
         Angle of simple shear, twice the tensor strain: gxy, a displacement in x that grows with y,
         rotates the point by gxy/2; exy does not.
     sxx, syy, szz, sxy, sxz, syz
-        Cauchy stress, tension positive, for which the strain is found.
+        Prescribed Cauchy stress, tension positive; the strain is found by iteration.
     volumetric
-        exx + eyy + ezz; the remainder is split among the unspecified normal strains.
+        Volumetric strain exx + eyy + ezz. Normal strains that are not specified get equal parts of
+        what the specified ones leave.
     turn
         Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        For rate-dependent laws; default 1. Given alone, it holds the strain.
+        Duration, for rate-dependent laws; default 1. Without strains or stresses: a hold time.
 
     Example
     -------
@@ -227,7 +228,7 @@ def element(
     Parameters
     ----------
     ID
-        Used in file names.
+        Name of the test, used in file names.
     material
         ID of a material.
     first, more
@@ -257,11 +258,11 @@ def element(
     reference volume; columns of the law, such as the equivalent plastic strain ep. The last row is
     published as ID_exx, ID_sxx and so on.
 
-    The law gets dt grad v as in a run, so det F after n increments e is (1 + e)^n. For a rotation,
-    dt grad v is skew to first order; of possible second-order parts it is the one that stores the
-    least energy. Prescribed stresses are found by Newton's method with the exact tangent. An
-    increment that does not converge is halved, up to eight times; if that fails, the files show the
-    increments before it.
+    As in a run, each increment passes dt grad v to the law, so n uniaxial increments e give det F =
+    (1 + e)^n. For a rotation, dt grad v is skew to first order, and its second-order part is chosen
+    such that the least energy is stored. Strains for prescribed stresses are found by Newton's
+    method with the exact tangent. An increment that does not converge is halved, up to eight times;
+    if that fails, the files show the increments before it.
 
     See Also
     --------

@@ -61,12 +61,13 @@ def method(
     ``method(auto)``, without further arguments, reads the script up to its first run and chooses
     method, transfer, basis, scheme, mass and F-bar for the scene (docs/choose.md).
 
-    ``thermo-mechanical``: before each momentum update, heat flows between materials with a
-    temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa, ``eos-strength`` with
-    a temperature), also between bodies with common nodes. Other heat comes only from fixes. Points
-    take temperature increments (as in FLIP, for any velocity transfer), so only conduction smooths
-    temperatures. `dt` also respects the stable step of conduction, h^2/(4 d) rho cp/kappa in d
-    dimensions. With ``mechanical``, points are heated only by their own plastic and viscous work.
+    ``thermo-mechanical``: before each momentum update, heat is conducted between points of
+    materials with a temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa,
+    ``eos-strength`` with a temperature), also between bodies with common nodes. Fixes can add heat.
+    Temperature increments are mapped to the points (as in FLIP, for any velocity transfer), so the
+    mapping itself does not smooth temperatures. `dt` is also limited by the stable step of
+    conduction, h^2/(4 d) rho cp/kappa in d dimensions. With ``mechanical``, points are heated only
+    by their own plastic and viscous work.
 
     See Also
     --------
@@ -109,9 +110,9 @@ def auto(hub: Hub, kind: Literal["auto"]) -> None:
     """Choose the method for the scene that the rest of the script describes.
 
     The script is read up to its first run; materials, bodies, speeds, contact and duration select a
-    row of the table in docs/choose.md. Banner and ``check`` show the chosen lines, such as
-    ``method(...)``. ``scheme``, ``anti_volumetric_locking`` and ``dt_factor`` of the script take
-    precedence.
+    row of the table in docs/choose.md. The banner and ``check`` show the chosen lines, such as
+    ``method(...)``. Commands ``scheme``, ``anti_volumetric_locking`` and ``dt_factor`` in the
+    script take precedence.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
@@ -134,12 +135,12 @@ def scheme(
     *arguments: Argument,
     start: Literal["full", "half"] = "full",
 ) -> None:
-    """Choose when the stress is updated in a step, or an implicit scheme.
+    """Choose when the stress is updated in an explicit step, or choose an implicit scheme.
 
     Parameters
     ----------
     style
-        Default ``musl``.
+        The time integration; default ``musl``.
     arguments
         Arguments of the style; explicit schemes have none.
     start
@@ -214,12 +215,12 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
-    """Average volume changes over neighbouring points (F-bar).
+    """Average volume changes over neighbouring points (F-bar), against volumetric locking.
 
-    Low-order basis functions constrain the volume of each point, so that nearly incompressible and
-    plastic bodies are too stiff. Averaging the volume increment with the basis weights removes the
-    excess constraints (Coombs et al. 2018). The mean stress is averaged with the same weights, so
-    that nodal forces are work-conjugate to the averaged strain.
+    With low-order basis functions, constant volume at each point is a constraint too many, so
+    nearly incompressible and plastic bodies are too stiff. Averaging the volume increment with the
+    basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is averaged
+    with the same weights, so that nodal forces are work-conjugate to the averaged strain.
 
     Example
     -------
@@ -227,7 +228,7 @@ def anti_volumetric_locking(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    It costs one more pass over the points per stress update and one per force evaluation.
+    F-bar costs one more pass over the points per stress update and one per force evaluation.
 
     Yield surfaces of mohr-coulomb, drucker-prager and mu-i use the pressure p + c (p_mean - p),
     where p is the pressure of the point, p_mean the averaged pressure, and c = (sin(phi) -
@@ -271,7 +272,7 @@ class _Call:
         errors: list[ScriptError] = []
         for family, name in self.names.items():
             if family == "basis" and not errors:
-                break  # it may be the shape of domains
+                break  # the word may be a shape of domains
             try:
                 styles[family] = registry.find(family, name)
             except ScriptError as error:
@@ -365,7 +366,7 @@ class _Call:
         basis: str | None = None,
         by_name: bool = False,
     ) -> str:
-        """The command with another kind or basis, and `option` at the end."""
+        """Return the command with another kind or basis, and `option` at the end."""
         styles = [self.styles[family] for family in FAMILIES if family in self.styles]
         asked = [p for s in styles for p in signature.parameters(s) if not p.kind.words]
         typed = [argument.text for argument in self.options if self._is_number(argument)]
@@ -423,7 +424,7 @@ class _Call:
 
 
 def _word(argument: Argument, words: Container[str]) -> str | None:
-    """The option, if it is one of `words`; a variable of that name is ignored."""
+    """Return the option if it is one of `words`; a variable of that name is ignored."""
     word = argument.text if argument.text in words else argument.word()
     return word if word in words else None
 

@@ -21,7 +21,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     kind
         ``material``, ``viscosity``, ``eos``, ``strength``, ``damage`` or ``temperature``.
     ID
-        Name of the part; of the material, also for its viscosity.
+        Name of the material or part. A viscosity has the name of its material.
     numbers
         ``name=value`` for each changed constant, named as on the page of the style.
 
@@ -34,10 +34,10 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
 
     Notes
     -----
-    The next run uses them, without compilation. A stress outside the new yield surface returns to
-    it in the first step. If an elastic modulus changes, an incremental law retains its stress; with
-    a law of the total deformation it changes at once. The density (points have masses) and
-    constants of the initial state, such as pc of cam-clay, cannot be changed.
+    The next run uses the new constants, without compilation. A stress outside the new yield surface
+    is returned to it in the first step. If an elastic modulus changes, incremental laws retain
+    their stress; with laws of the total deformation, the stress changes at once. The density
+    (points have masses) and constants of the initial state, such as pc of cam-clay, are fixed.
 
     ``material`` also changes constants of the parts of eos-strength, if only one part has that
     name.
@@ -61,7 +61,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     changed = {entry: _changed(hub, entry, entry.arguments, numbers)}
     for material in hub.materials.values():
         _now(hub, material, changed)
-    # Not materials without their later viscosity, which have its name.
+    # Skip materials before a viscosity was added: they have the same name.
     changed = {old: new for old, new in changed.items() if _catalogue(hub, old)[old.id] is old}
     for before, after in changed.items():
         if isinstance(after, Material):

@@ -33,14 +33,13 @@ def dump(
     style
         The content and format of the files.
     arguments
-        The interval, the file name, then arguments of the style; see its page. The interval is a
-        number of steps, or ``time(T)``: the first step at or after each multiple of the time T.
+        The interval, the file name, then the arguments of the style (see its page). The interval is
+        a number of steps, or ``time(T)``: the first step at or after each multiple of the time T.
 
     Notes
     -----
     File names are relative to the folder where the program was started; ``~`` is the home folder.
-    Folders must exist; files are overwritten. Snapshots of a longer, earlier run remain, and a
-    viewer shows them after the new ones.
+    Folders must exist. Files are overwritten; later snapshots of an earlier, longer run remain.
 
     Example
     -------
@@ -103,8 +102,8 @@ def set_output(
 ) -> None:
     """Set how often a line is logged, and in which format.
 
-    The first and last state of each run are always logged, at once to the terminal and to log.mpm
-    in the current folder; by default every step is.
+    Lines appear on the terminal and in log.mpm in the current folder. By default every step is
+    logged; the first and last state of each run always are.
 
     Parameters
     ----------
@@ -112,7 +111,7 @@ def set_output(
         Steps between two lines, counted over all runs, or ``time(T)``: the first step at or after
         each multiple of the time T.
     form
-        ``csv``: the file is log.csv, with commas between the columns.
+        ``csv``: write log.csv, with commas between the columns, instead of log.mpm.
 
     Example
     -------
@@ -135,7 +134,7 @@ def set_output(
 def log(hub: Hub, every: Every) -> None:
     """Set how often a line is logged (older form; see set_output).
 
-    In an expression log(x) is the natural logarithm.
+    In an expression, log(x) is the natural logarithm instead.
 
     Parameters
     ----------
@@ -165,8 +164,8 @@ def log_modify(hub: Hub, style: Literal["default", "custom"], *keys: Logged) -> 
 
     Notes
     -----
-    Between two runs it changes the columns of the following rows; a line ``#`` of log.mpm names
-    them.
+    Between two runs, the command changes the columns of the following rows. In log.mpm, a line
+    beginning with ``#`` then lists the new columns.
 
     Example
     -------
@@ -197,7 +196,7 @@ def plot(
     scale: Literal["linear", "log"] = "linear",
     label: str | None = None,
 ) -> None:
-    """Plot one quantity against another, in the picture of save_plot.
+    """Plot one quantity against another; save_plot draws the curves to a file.
 
     Curves with the same x are drawn in one diagram, with a legend of their IDs.
 
@@ -210,9 +209,9 @@ def plot(
     x, y
         ``step``, ``dt``, ``time``, a variable, a value of a fix or compute, or a formula of these.
     axis
-        Side of the y axis: ``right`` for a second axis with separate limits.
+        ``right``: use a second y axis, on the right, with separate limits.
     scale
-        ``log`` for a logarithmic y axis, which omits numbers that are not positive.
+        ``log``: use a logarithmic y axis, which omits numbers that are not positive.
     label
         Label of the y axis, such as "energy (J)". Default: the name of y with its unit.
 
@@ -240,9 +239,9 @@ def plot(
 
 
 def save_plot(hub: Hub, file: Annotated[Path, OutputFile]) -> None:
-    """Draw the curves of all plot commands to a file at the end of each run, also if it fails.
+    """Draw the curves of all plot commands to a file at the end of each run, also of a failed one.
 
-    After a run, the command draws at once.
+    After a run, the command draws the file at once.
 
     Parameters
     ----------

@@ -60,10 +60,11 @@ def plane_strain(hub: Hub, *, ezz: Expression) -> None:
 
     Notes
     -----
-    Before the first material, explicit and in load steps. The column ``thickness`` is F_zz, and s33
-    the stress across. Masses, forces and energies refer to the initial thickness, 1. The energy
-    balance includes the work done across. Rigid solids do not stretch. Refused are GPUs,
-    pore_water, and points that enter after a run (solid, activate, fix inflow).
+    Use this command before the first material, with explicit schemes or load steps. The column
+    ``thickness`` is F_zz, and s33 is the stress across the plane. Masses, forces and energies refer
+    to the initial thickness, 1. The energy balance includes the work of this stress. Rigid solids
+    do not stretch. GPUs, pore_water, and points that enter after a run (solid, activate, fix
+    inflow) are not supported.
 
     See Also
     --------

@@ -34,7 +34,7 @@ class Solids(tuple):
 def delete_particles(
     hub: Hub, solids: Solids, by: Literal["region", "where"], chosen: Argument
 ) -> None:
-    """Delete points of a solid, for holes and notches or between runs.
+    """Delete points of a solid: holes and notches, or parts removed between runs.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ def delete_particles(
     by
         The word ``region`` or ``where``.
     chosen
-        After ``region``: its ID; reference positions decide. After ``where``: a formula of columns
-        of dump particle, not 0 for deleted points.
+        After ``region``: the ID of a region, whose points are selected by reference position. After
+        ``where``: a formula of columns of dump particle; points for which it is not 0 are deleted.
 
     Example
     -------
@@ -53,9 +53,9 @@ def delete_particles(
 
     Notes
     -----
-    Use ``where`` between runs: the mass and energy of the deleted points are printed, and ids do
-    not change. Before the first run, the other points are renumbered, so the command must precede
-    particle groups and contact fixes of these solids, and a solid cannot lose all its points.
+    Between runs, the mass and energy of the deleted points are printed, and ids do not change.
+    Before the first run, the remaining points are renumbered, so the command must precede particle
+    groups and contact fixes of these solids; a solid must retain a point.
 
     See Also
     --------
@@ -133,8 +133,8 @@ def translate_particles(
 
     Notes
     -----
-    The reference positions move. Volumes do not change, except with the radius in axisymmetry. A
-    separate grid of a solid covers the new positions. Points stay in their groups.
+    The reference positions change, too. Volumes do not change, except in proportion to the radius
+    in axisymmetry. A solid's separate grid is adapted. Groups retain their points.
 
     See Also
     --------
@@ -188,9 +188,9 @@ def populate_cylindrical_coordinates(
     Parameters
     ----------
     solid
-        Its material and cell size do not change.
+        The solid; its material and cell size do not change.
     region
-        Points outside it are dropped.
+        Points outside this region are omitted.
     lattice
         In 2D ``c1, c2, R, Ndr, Ndtheta, T0``: centre, outer radius, number of rings, points per
         ring, initial temperature. In 3D ``axis, c1, c2, R, lo, hi, Ndx, Ndr, Ndtheta, T0``: the
@@ -208,7 +208,8 @@ def populate_cylindrical_coordinates(
     ``dx = (hi - lo) / Ndx``. Every point has the volume of its polar cell, ``r dr dtheta dx``.
     Karamelo's rings lie at ``j dr``, with a point in the centre, and its slices at ``lo + i dx``.
 
-    Before the first run, and before groups of these points. T0 replaces the solid's.
+    Use this command before the first run and before groups of these points. T0 replaces the initial
+    temperature of the solid.
 
     See Also
     --------
@@ -238,7 +239,7 @@ populate_cylindrical_coordinates.syntax = (
 
 
 def _polar(values: dict, places: dict) -> Placement:
-    """Place slices outermost, then rings, then angles."""
+    """Order points by slice, then ring, then angle."""
     check_radius(values["R"], mark=places["R"])
     counts = [
         _count(values[name], name, places[name]) if name in values else 1
@@ -279,7 +280,7 @@ def _polar(values: dict, places: dict) -> Placement:
 
 def _count(value: float, name: str, mark) -> int:
     if math.isnan(value):
-        return 1  # a rehearsal lacks the result
+        return 1  # unknown in a rehearsal
     if value < 1 or value != math.floor(value):
         raise ScriptError(f"{name} must be a whole number of at least 1, not {value:g}", mark=mark)
     return int(value)

@@ -10,7 +10,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9
-HEAVIEST = 3.2  # density of grains over the density of water: 2.6 to 2.8 in soils, 3.5 if saturated
+HEAVIEST = 3.2  # relative density of grains; in soils it is 2.6 to 2.8
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -31,13 +31,13 @@ def pore_water(
     Parameters
     ----------
     material
-        The skeleton: any law of a solid, with the dry density, (1 - n) times the density of grains.
-        Its stress is the effective stress.
+        The soil skeleton: any solid material. Its density is the dry density, (1 - n) times the
+        density of the grains; its stress is the effective stress.
     n
         Porosity before deformation, from 0.01 to 0.9.
     permeability
-        Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water is k
-        times the gradient of the head.
+        Hydraulic conductivity k in m/s (Darcy): the porosity times the relative velocity of the
+        water is k times the hydraulic gradient.
     intrinsic
         Permeability in m^2, instead of the conductivity.
     viscosity
@@ -47,12 +47,12 @@ def pore_water(
     rho
         Density of the water.
     gravity
-        In the definition of the conductivity; it is no load (see fix body_force).
+        Gravity in the definition of the conductivity. It is not a load (see fix body_force).
     kozeny
         true: the permeability follows n^3/(1 - n)^2 (Kozeny & Carman).
     suction
-        Pores empty above the water table (load steps): at a pressure p < 0, saturation and relative
-        permeability are exp(p/suction) (Gardner 1958).
+        Let soil above the water table be unsaturated (load steps only): at a pore pressure p < 0,
+        saturation and relative permeability are exp(p/suction) (Gardner 1958).
 
     Example
     -------
@@ -62,11 +62,11 @@ def pore_water(
 
     Notes
     -----
-    Points carry the water in their pores; nodes have velocities of soil and water (Jassim, Stolle &
-    Vermeer 2013; Bandara & Soga 2015). Columns: ``pore_pressure``, ``saturation``, ``porosity``,
-    ``water_content`` (mass of the water per volume before deformation), and ``wx``, ``wy``, ``wz``,
-    its velocity relative to the soil (times the porosity, Darcy's). ``s11`` ... is the effective
-    stress, ``t11`` ... the total one.
+    Points contain soil and pore water; nodes have separate velocities of soil and water (Jassim,
+    Stolle & Vermeer 2013; Bandara & Soga 2015). Columns: ``pore_pressure``, ``saturation``,
+    ``porosity``, ``water_content`` (mass of the water per volume before deformation), and ``wx``,
+    ``wy``, ``wz``, the Darcy velocity (porosity times the velocity of the water relative to the
+    soil). ``s11`` ... is the effective stress, ``t11`` ... the total stress.
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force
@@ -74,14 +74,15 @@ def pore_water(
     the soil alone; the stored energy includes the compressed water. The energy balance includes the
     water, its drag, inflow and outflow.
 
-    The step follows the fast wave, about 1850 m/s in soil with stiff water, but not the drag. With
-    N cells over a drainage path of length L, consolidation to Tv = 1 takes about 2 N L c/c_v steps,
-    too many at 1e-9 m/s. Then use scheme(quasi-static), or multiply the densities by a factor, as
-    in inputs/in.terzaghi.
+    The stable step is set by the fast compression wave (about 1850 m/s in water-saturated soil),
+    not by the drag. With N cells along a drainage path of length L, consolidation to Tv = 1 takes
+    about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation. If
+    these are too many, as at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a
+    factor, as in inputs/in.terzaghi.
 
-    Use it before the solid of the material. It needs method ulmpm or tlmpm with FLIP or PIC and
-    linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a scene in 1D, plane
-    strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
+    Use this command before the first solid of the material. It needs method ulmpm or tlmpm with
+    FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a
+    scene in 1D, plane strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
 
     See Also
     --------

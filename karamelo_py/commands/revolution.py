@@ -15,8 +15,8 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
     active
         ``true``, or ``false`` for plane strain (the default).
     twist
-        Bodies also rotate around the axis, by an angle per point: torsion, spinning bodies,
-        swirling fluids.
+        Also allow rotation around the axis, by a different angle at each point: torsion, spinning
+        bodies, swirling fluids.
 
     Example
     -------
@@ -26,21 +26,21 @@ def axisymmetric(hub: Hub, active: bool, *, twist: bool = False) -> None:
 
     Notes
     -----
-    Before the first solid, in a 2D domain with x >= 0. Points carry the volume and mass of one
-    radian: multiply forces and energies by 2 pi for the whole body.
+    Use this command before the first solid, in a 2D domain with x >= 0. Points carry the volume and
+    mass of one radian: multiply forces and energies by 2 pi for the whole body.
 
-    With twist, z is the direction around the axis: components 13 and 23 are the shears r-theta and
-    z-theta. The third component of fix initial_velocity_particles is the velocity around the axis,
-    and fix angular_velocity_nodes holds and rotates nodes. The third component of force_nodes,
-    force_particles, body_force and edge_traction acts around the axis; they publish its torque per
-    radian as ID_z. Columns of points: ``vtheta``, this velocity, and ``twist``, the angle of
-    rotation in radians. compute angular_momentum publishes the angular momentum about the axis as
-    ID_y, conserved to round-off.
+    With twist, z is the circumferential direction: components 13 and 23 are the shears r-theta and
+    z-theta of cylindrical coordinates. The third component of fix initial_velocity_particles is the
+    velocity around the axis, and fix angular_velocity_nodes holds and rotates nodes. The third
+    component of force_nodes, force_particles, body_force and edge_traction acts around the axis;
+    its torque per radian is published as ID_z. Points have the columns ``vtheta``, the velocity
+    around the axis, and ``twist``, the angle of rotation in radians. compute angular_momentum
+    publishes the angular momentum about the axis as ID_y, conserved to round-off.
 
-    Load steps (scheme quasi-static) find the angles of the nodes, too. In ulmpm/contacts, fix
-    contact/friction also rubs around the axis: ContactTorque_ID_y is the torque about it. Refused:
-    scheme newmark, contact in load steps, contact between points or with surfaces, tools, walls
-    with bounds or friction, rigid solids, periodic directions, ulcpdi and tlcpdi.
+    Load steps (scheme quasi-static) also solve for the rotation of the nodes. In ulmpm/contacts,
+    fix contact/friction also acts around the axis: ContactTorque_ID_y is the torque about it. Twist
+    cannot be combined with scheme newmark, contact in load steps, contact between points or with
+    surfaces, tools, walls with bounds or friction, rigid solids, periodic directions or CPDI.
 
     See Also
     --------
@@ -62,10 +62,10 @@ def cylindrical(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Before the first solid, in a 1D domain with x >= 0. The hoop strain is the radial displacement
-    over r (component 22); there is no strain along the axis (33). Points carry the volume and mass
-    of one radian and of unit length, r dr: multiply by 2 pi for the whole ring. A node at x = 0
-    does not move.
+    Use this command before the first solid, in a 1D domain with x >= 0. The hoop strain is the
+    radial displacement over r (component 22); there is no strain along the axis (33). Points carry
+    the volume and mass of one radian and of unit length, r dr: multiply by 2 pi for the whole ring.
+    A node at x = 0 does not move.
 
     See Also
     --------
@@ -84,11 +84,11 @@ def spherical(hub: Hub, active: bool) -> None:
 
     Notes
     -----
-    Before the first solid, in a 1D domain with x >= 0. The hoop strains, components 22 and 33, are
-    the radial displacement over r. Points carry the volume and mass of one steradian, r^2 dr:
-    multiply by 4 pi for the whole sphere. A node at x = 0 does not move. The material must be the
-    same in y and z. With a Poisson's ratio near 0.5, or metals that flow, linear cells lock: use
-    anti_volumetric_locking(true).
+    Use this command before the first solid, in a 1D domain with x >= 0. The hoop strains,
+    components 22 and 33, are the radial displacement over r. Points carry the volume and mass of
+    one steradian, r^2 dr: multiply by 4 pi for the whole sphere. A node at x = 0 does not move.
+    Materials must behave alike in y and z. At a Poisson's ratio near 0.5, and in plastic flow of
+    metals, a linear basis locks: use anti_volumetric_locking(true).
 
     See Also
     --------

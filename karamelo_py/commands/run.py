@@ -28,10 +28,10 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 
 
 def carry_out(hub: Hub, **length: Any) -> None:
-    """Run for `length` (see `RunLoop`), or do what replaces the run.
+    """Run for `length` (see `RunLoop`), unless the script is only read or resumed.
 
-    A rehearsal records the run, a `Pause` stops before it, and ``check`` reports instead. A resumed
-    script skips complete runs.
+    A rehearsal records the run, `Pause` stops before it, and ``check`` prints its report instead. A
+    resumed script skips runs that were complete.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
@@ -74,8 +74,8 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     dt
-        A run warns above the stable limit: cell size over wave speed plus velocity, less with
-        scheme usl. Above four times the limit of conduction it refuses to start.
+        The time step. A run warns above the stable step, the cell size over wave speed plus
+        velocity (less with usl), and stops at once above four times the limit of heat conduction.
 
     Example
     -------
@@ -97,10 +97,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        By default 0.9; 0.4 (0.2 with one point per cell) where a drifting body would gain energy:
-        linear basis in ulmpm, FLIP coefficient above 0.99, and musl or usf. Until a point has moved
-        a quarter of a cell, it is 0.9, and more with splines. A given factor always refers to the
-        stable step of moving bodies; a run warns of unstable factors.
+        The fraction. The default is 0.9, or 0.4 (0.2 with one point per cell) where a drifting body
+        would otherwise gain energy: with a linear basis in ulmpm, a FLIP coefficient above 0.99,
+        and scheme musl or usf. Until a point has moved a quarter of a cell, the default is 0.9, and
+        more with splines. A factor set here always refers to the stable step of moving bodies; a
+        run warns if it is unstable.
 
     Example
     -------
@@ -129,10 +130,10 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     steps
         Exact number of steps.
     on_trouble
-        ``stop``, or ``halve``: when a point fails, energy appears that no load supplied (otherwise
-        a warning), or the step becomes unstable, the run returns to its last good state and halves
-        the step, at most five times. Log, dumps, curves and computes return, too. Points that leave
-        the domain without an energy gain stop the run (see `boundary`).
+        ``stop`` (default), or ``halve``: if a point fails, the step becomes unstable, or energy
+        appears that no load supplied (only a warning with ``stop``), the run returns to its last
+        good state and halves the step, at most five times. Log, dumps, curves and computes also
+        return to this state. Points that leave the domain without an energy gain stop the run.
 
     Example
     -------
@@ -143,7 +144,7 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     -----
     The log shows positions and stresses at the end of a step, and velocities half a step earlier:
     after n steps of free fall, the kinetic energy is too low by the fraction 1/(n + 1). With
-    ``scheme(musl, start=half)`` both belong to the logged time.
+    ``scheme(musl, start=half)`` all belong to the logged time.
 
     See Also
     --------
@@ -170,7 +171,7 @@ def run_time(
 
     Notes
     -----
-    Kinetic energies in the log belong to half a step earlier: see `run`.
+    Kinetic energies in the log belong to a time half a step earlier (see `run`).
 
     See Also
     --------
@@ -262,23 +263,24 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     Notes
     -----
     ``karamelo-py SCRIPT -restart FILE`` resumes after the step of the file, bit-identically to an
-    uninterrupted run with any number of threads. Log and dumps continue; later lines are cut off.
+    uninterrupted run with any number of threads. Log and dumps continue; lines written after that
+    step are removed.
 
     The script must be unchanged up to this run, except for set_dt, dt_factor, set_output, dump,
     plot, an added ``boundary(delete)``, and the length of the last run, as a number in its line.
-    Variables set with ``-var`` come from the file. A longer ``run(n)`` is bit-identical to a run of
-    this length; so is a longer ``run_time(T)`` from a file before the last two steps of the shorter
-    run.
+    Variables set with ``-var`` come from the file. If the last run is lengthened, results are
+    bit-identical to one run of the new length; for ``run_time(T)`` only from a file written before
+    the last two steps of the shorter run, which end exactly at T.
 
     A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
-    plots, and values that the script has read. A run killed while writing leaves the previous file.
-    The last state of each run is written too. A failed run writes last_good.<step>.h5 instead: if
-    its energy has grown, the last state before the growth, accurate to ten steps; if its step was
-    above the stable limit from the start, the initial state. There is none with boundary(delete),
-    or if the run was resumed from a file at that step.
+    plots, and values that the script has read. If a run is killed while writing, the previous file
+    remains. The last state of each run is always written. A failed run writes last_good.<step>.h5
+    instead: the initial state if its time step was above the stable limit from the start, or, if
+    its energy has grown, a state at most ten steps before the growth. This file is not written with
+    boundary(delete), or if the run was resumed from a file at that step.
 
-    Dumps include the state of an interruption or failure; a resumed run removes it from files with
-    several snapshots.
+    Dumps include the state at an interruption or failure. A resumed run removes this snapshot from
+    files with several snapshots.
 
     Example
     -------
@@ -309,8 +311,8 @@ def write_restart(hub: Hub, file: OutputFile) -> None:
 
     Notes
     -----
-    ``karamelo-py SCRIPT -restart FILE`` resumes after this line, where a run may be added. The
-    length of the runs before it must not change.
+    ``karamelo-py SCRIPT -restart FILE`` resumes after this line; runs may be added there. Earlier
+    runs must have the same length.
 
     Example
     -------
@@ -341,14 +343,14 @@ def read_restart(hub: Hub, file: str) -> None:
     Parameters
     ----------
     file
-        Name of a file of restart or write_restart, in the current folder or next to the script. A
-        ``*`` selects the largest number.
+        A file written by restart or write_restart, in the current folder or next to the script.
+        With a ``*``, the file with the largest number is read.
 
     Notes
     -----
-    First repeat the domain, method and solids of the writing script, and the fixes and computes to
-    continue: with the same ID and style they retain their values. Initial velocities are not
-    applied again. Anything else may differ. Time and step continue.
+    Before this line, repeat the domain, method and solids of the script that wrote the file, and
+    the fixes and computes to continue: with the same ID and style they retain their values.
+    Everything else may differ. Time and step continue; initial velocities are not applied again.
 
     The run starts new output files. A picture or movie with the same ID, style and field retains
     the earlier colour scale.

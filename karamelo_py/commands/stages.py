@@ -12,7 +12,7 @@ from karamelo_py.script.errors import ScriptError, plural, render_message
 
 
 def deactivate(hub: Hub, group: ParticleGroup) -> None:
-    """Remove points from a scene: an excavation, or fill that is placed later.
+    """Remove points from a scene, for an excavation or for fill that is placed later.
 
     Parameters
     ----------
@@ -26,9 +26,9 @@ def deactivate(hub: Hub, group: ParticleGroup) -> None:
 
     Notes
     -----
-    Before the first run or between runs. Output, groups and fixes then omit the points; ids do not
-    change. Between runs, their mass and energy are printed, and the energy balance counts the
-    energy as work.
+    Use this command before the first run or between runs. Output, groups and fixes then omit the
+    points; ids do not change. Between runs, the mass and energy of the points are printed, and the
+    energy balance counts their energy as work.
 
     See Also
     --------
@@ -114,7 +114,7 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """True in a rehearsal or replay, whose state differs."""
+    """Return whether to do nothing: in a rehearsal or replay, the state of points differs."""
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

@@ -14,7 +14,7 @@ from karamelo_py.script.errors import ScriptError, plural
 
 
 def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive] = 1.0) -> None:
-    """Make a 2D scene a thin plate, without stress across it.
+    """Treat a 2D scene as a thin plate without stress through its thickness.
 
     Parameters
     ----------
@@ -30,13 +30,15 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
 
     Notes
     -----
-    Before the first material. Each law finds the strain across the plate for which szz vanishes.
-    The column ``thickness`` is the present thickness over the initial one, ``stress_left`` the
-    largest szz that a step has left, over the largest stress: above 2 % a warning names solid and
-    state. Masses, forces and energies refer to the whole thickness. Refused are liquids, gases and
-    loose grains, which have no strength unless confined, and anti_volumetric_locking, which plane
-    stress does not need; with a thickness other than 1 also fixes that use sizes of points (contact
-    between points and with surfaces, fluxes through faces of points).
+    Use this command before the first material. Each law finds the strain across the plate for which
+    szz vanishes. The column ``thickness`` is the present thickness over the initial one;
+    ``stress_left`` is the largest remaining szz of any step over the largest stress, and above 2 %
+    a run warns. Masses, forces and energies refer to the whole thickness.
+
+    Liquids, gases and loose grains are refused, since they have no strength unless confined, and
+    anti_volumetric_locking, since plane stress does not lock. With a thickness other than 1, fixes
+    that use sizes of points (contact between points and with surfaces, fluxes through faces of
+    points) are refused, too.
 
     See Also
     --------
@@ -46,7 +48,7 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
 
 
 def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] = 1.0) -> None:
-    """Make a 1D scene a bar, without stress across it.
+    """Treat a 1D scene as a bar without lateral stress.
 
     Parameters
     ----------
@@ -62,10 +64,10 @@ def uniaxial_stress(hub: Hub, active: bool, *, area: Annotated[float, Positive] 
 
     Notes
     -----
-    Before the first material. Each law finds the strain across the bar, equal in y and z, for which
-    the stress across vanishes. The column ``thickness`` is this stretch. Masses, forces and
-    energies refer to the whole cross-section. Refused are the materials and fixes that plane_stress
-    refuses, and orthotropic materials that differ in y and z.
+    Use this command before the first material. Each law finds the lateral strain, equal in y and z,
+    for which the lateral stress vanishes. The column ``thickness`` is the lateral stretch. Masses,
+    forces and energies refer to the whole cross-section. Materials and fixes that plane_stress
+    refuses, and orthotropic materials that differ in y and z, are refused.
 
     See Also
     --------

@@ -18,7 +18,7 @@ def viscosity(hub: Hub, style: Annotated[str, StyleOf("viscosity")], *arguments:
     Parameters
     ----------
     style
-        ``prony``: relaxation; ``newtonian``: a stress proportional to the strain rate.
+        ``prony``: stress relaxation; ``newtonian``: a stress proportional to the strain rate.
 
     Example
     -------
@@ -27,8 +27,8 @@ def viscosity(hub: Hub, style: Annotated[str, StyleOf("viscosity")], *arguments:
 
     Notes
     -----
-    The material retains its ID; ``modify(viscosity, rubber, tau=(0.02, 1))`` changes it.
-    Both styles may be used for one material, prony first.
+    The material retains its ID. A material may have both styles, prony first. Constants can be
+    changed between runs: ``modify(viscosity, rubber, tau=(0.02, 1))``.
 
     See Also
     --------

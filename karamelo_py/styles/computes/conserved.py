@@ -88,7 +88,7 @@ class FixStrainEnergy(StrainEnergy, Fix):
 class DissipatedEnergy(Energy):
     """Measure the energy that a group of points has dissipated; published as ID.
 
-    Plastic and viscous work, and energy released by damage; 0 without dissipation.
+    It consists of plastic and viscous work and the energy released by damage.
 
     Example
     -------
@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
 
 
 class Drift:
-    """Change of a value since the first, relative to the largest scale so far."""
+    """Change since the first value, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -114,7 +114,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """`scale` > 0 is an upper bound of the value's magnitude."""
+        """Return the change up to `value`; `scale` > 0 is an upper bound of its magnitude."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value
@@ -129,7 +129,7 @@ class EnergyBalance(Compute):
     Parameters
     ----------
     work
-        Work of known loads on the group since the start, as a function of time and published
+        Work that loads have done on the group since the start, a function of time and published
         values.
 
     Example
@@ -140,11 +140,11 @@ class EnergyBalance(Compute):
 
     Notes
     -----
-    Publishes ID, the sum; ID_total, without the work; and ID_drift, the change of ID since the
-    first output over the largest kinetic, stored or dissipated energy or work so far. Velocities
-    lag positions by half a step, so the drift is of the order of dt (33 % in a body of a few
-    cells); the energy line at the end of a run compares equal times. Energy stored within points by
-    affine transfers is not included.
+    Publishes ID, kinetic + stored + dissipated energy - work; ID_total, the same without the work;
+    and ID_drift, the change of ID since the first output over the largest of these energies and the
+    work so far. Velocities lag positions by half a step, so ID_drift has an error of order dt (up
+    to 33 % in a body of a few cells). The energy line at the end of a run has no such error. Energy
+    stored within points by affine transfers is not included.
 
     See Also
     --------
@@ -169,7 +169,7 @@ class EnergyBalance(Compute):
 
 
 class Momentum(Compute):
-    """Base of momenta; `terms` are components and magnitude."""
+    """Base of momenta; `terms` returns components and magnitudes."""
 
     published = ("x", "y", "z", "drift")
     remembers = ("_drift",)
@@ -247,11 +247,11 @@ class AngularMomentum(Momentum):
         if twists:
             v[:, 2] = points.particle("vtheta")
         angular = np.cross(arm, v)
-        if twists:  # the rest has no sum over a revolution
+        if twists:  # other components sum to zero over a revolution
             angular *= (0, 1, 0)
         moment = points.velocity_moment
         if moment is not None and d > 1 and not twists:
-            # B_ij = sum N v_i (X - x)_j: angular momentum within a point's surroundings.
+            # B_ij = sum N v_i (X - x)_j has the angular momentum of a point about its position.
             b = np.zeros((points.count, 3, 3))
             b[:, :d, :d] = moment.reshape(-1, d, d)
             angular += np.stack(

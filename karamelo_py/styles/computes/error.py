@@ -50,8 +50,8 @@ class PointField:
 class Norm:
     """Norm L1, L2 or max, absolute or relative to the norm of the exact values.
 
-    Histories weight differences by the time since the last output, so the number of outputs has no
-    effect.
+    In histories, differences are weighted by the time since the previous output, so the frequency
+    of outputs has no effect.
     """
 
     remembers = ("_sums", "_duration", "_time", "history", "largest", "_exact")
@@ -85,10 +85,7 @@ class Norm:
         return mean if self.kind == "L1" else np.sqrt(mean)
 
     def follow(self, time: float, moment: np.ndarray) -> float:
-        """Return the present norm as `scaled`.
-
-        If the output is new, also update `history` and `largest`.
-        """
+        """Return the present norm (see `scaled`); at a new output, update history and maximum."""
         difference, exact = moment
         self._exact = max(self._exact, exact)
         now = self.scaled(difference, exact if exact > VANISHED * self._exact else self._exact)
@@ -117,7 +114,7 @@ class Compared:
     """Mix-in for computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
-        """Norms (2,) of the differences and of the exact values, and the other sums of `sizes`."""
+        """Return norms (2,) of differences and exact values, and the other sums of `sizes`."""
         sums = self.hub.fields.added_up(self)
         largest = self.hub.fields.each(self, "largest") if self.norm.kind == "max" else []
         return self.norm.moment(sums, largest), sums[3:]
@@ -148,9 +145,9 @@ class Error(Compared, Compute):
         ``displacement``, ``velocity``, ``stress``, ``strain``.
     expression
         The exact value, a function of x, y, z (present position), x0, y0, z0 (initial position),
-        time, and published values. For a whole field: one per component, in the order x, y, z or
-        11, 22, 33, 12, 13, 23; NULL omits one. Then, in any order, the norm ``L1``, ``L2``
-        (default) or ``max``, and ``absolute`` (default) or ``relative``.
+        time, and published values. For a whole field, one function per component, in the order x,
+        y, z or 11, 22, 33, 12, 13, 23; NULL omits a component. After these, in any order, the norm
+        (``L1``, ``L2`` (default) or ``max``), and ``absolute`` (default) or ``relative``.
 
     Example
     -------
@@ -160,15 +157,15 @@ class Error(Compared, Compute):
 
     Notes
     -----
-    With the magnitude e of the difference at a point (of a tensor: sqrt(e_ij e_ij)) and its initial
-    volume V0: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max e. ``relative``
-    divides by the same norm of the exact values. While they vanish it divides by the largest norm
-    so far, and gives inf if there is none.
+    Let e be the magnitude of the difference at a point (for a tensor sqrt(e_ij e_ij)) and V0 the
+    initial volume of the point: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max
+    e. ``relative`` divides by the same norm of the exact values; while all exact values are 0, by
+    the largest norm so far, or the result is inf if they were always 0.
 
-    Publishes ID, the present error; ID_max, the largest so far; and ID_history, the norm over
-    points and outputs so far, weighted by the time since the previous one. With ``relative``, the
-    numerator and the denominator of ID_history are both taken over the whole history, so that exact
-    values may vanish at times.
+    Publishes ID, the present error; ID_max, the largest error so far; and ID_history, the norm over
+    all points and outputs so far, with each output weighted by the time since the previous output.
+    With ``relative``, ID_history is the norm of all differences over the norm of all exact values,
+    so exact values may be 0 at times.
 
     See Also
     --------
@@ -234,8 +231,8 @@ class Reference(Compared, Compute):
         over a coordinate.
     file
         Columns separated by commas, semicolons or blanks, with names in the first row (else 1, 2,
-        ...); # begins a comment line. The first column is the time. For points it is named after a
-        column of points, such as x, y0 or T, over which the curve is given.
+        ...); # begins a comment line. The first column is the time for a value. For points its name
+        must be a column of points, such as x, y0 or T: the abscissa of the curve.
     column
         The column of the file to compare with. For points, the name must also be a column of
         points, such as s11 or vx.
@@ -254,10 +251,10 @@ class Reference(Compared, Compute):
     -----
     The curve is linear between its rows. Values beyond its ends are not compared.
 
-    For a value, ID is the norm of the difference over the outputs so far, weighted by the time
-    since the previous one, ID_now the present difference, ID_curve the present value of the curve.
-    For points, ID and ID_now are the present norm, weighted by initial volumes, ID_curve the mean
-    of the curve at the points.
+    For a value, ID is the norm of the difference over all outputs so far, each weighted by the time
+    since the previous output; ID_now is the present difference and ID_curve the present value of
+    the curve. For points, ID and ID_now are the present norm, weighted by initial volumes, and
+    ID_curve is the mean of the curve at the points.
 
     See Also
     --------
@@ -317,7 +314,7 @@ class Reference(Compared, Compute):
         self.publish_all(norm, now, curve)
 
     def sizes(self, points: PointTable) -> tuple[np.ndarray, ...]:
-        """Return magnitudes (2, n) of differences and curve; weights, the curve, and ones (n,)."""
+        """Return magnitudes (2, n) of differences and curve; weights, curve, and ones (n,)."""
         within, exact = self._exact(column(points, self.along))
         difference = column(points, self.column)[within] - exact
         sizes = np.abs([difference, exact])

@@ -58,8 +58,9 @@ class ForceOn(Compute):
     Parameters
     ----------
     part, more
-        A solid: the contact force on it by other solids, rigid bodies, tools and surfaces. A fix:
-        its force on the points or nodes of its group. Several: their sum.
+        IDs of solids or fixes; the forces of several are added. For a solid: the contact force that
+        other solids, rigid bodies, tools and surfaces exert on it. For a fix: its force on the
+        points or nodes of its group.
     x, y, z
         Position about which the torque is taken.
 
@@ -73,24 +74,23 @@ class ForceOn(Compute):
     Notes
     -----
     Publishes the force ID_x, ID_y, ID_z, the torque ID_tx, ID_ty, ID_tz, and the point of action
-    ID_px, ID_py, ID_pz: in 2D ID_tz and ID_px, ID_py. A wall, tool or surface takes the opposite
-    force.
+    ID_px, ID_py, ID_pz; in 2D only ID_x, ID_y, ID_tz, ID_px and ID_py. The force on a wall, tool or
+    surface is the opposite of the force of its fix.
 
-    The point of action is the point of the line of action closest to (x, y, z). In 3D the line is
-    the central axis; a torque about it may remain. With the torque about the origin, the line
-    meets y = 0 at x = ID_tz/ID_y.
+    The point of action is the point of the line of action closest to (x, y, z). In 3D the line of
+    action is the central axis, about which a torque may remain. If (x, y, z) is the origin, the
+    line meets y = 0 at x = ID_tz/ID_y.
 
-    Walls (fix velocity_nodes), loads and weight count only if their fixes are named. Lever arms use
-    positions at the beginning of the step: of points their present ones, of nodes their positions
-    in the grid (in tlmpm the initial ones). In load steps torques err by the displacement in a
-    step.
+    Walls (fix velocity_nodes), loads and weight are included only if their fixes are named. Lever
+    arms are taken at the beginning of the step, from the present positions of points and the grid
+    positions of nodes (initial positions in tlmpm). In load steps, torques have errors of the order
+    of the displacement in a step.
 
-    Fixes: velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
+    The fixes may be velocity_nodes, velocity_particles, body_force, force_nodes, force_particles,
     edge_traction, edge_pressure, neumann_bc_mech, absorbing, local_damping, contact/..., indent and
-    other tools. They must precede this compute. Friction of contact/minimize_penetration acts
+    other tools. Define them before this compute. Friction of contact/minimize_penetration acts
     between the centres of points, so the torques on the two solids are not quite opposite. The
-    torque of velocity_particles lacks the angular momentum that affine transfers store within
-    points.
+    torque of velocity_particles omits the angular momentum that affine transfers store in points.
 
     See Also
     --------

@@ -52,8 +52,8 @@ class AverageStress(Mean):
 
     Notes
     -----
-    Over the present volume: sum V sigma / sum V; 0 without points. For a body at rest it depends
-    only on the forces on its surface.
+    The mean is over the present volume, sum V sigma / sum V, or 0 without points. For a body at
+    rest it depends only on the forces on its surface.
 
     See Also
     --------
@@ -70,7 +70,8 @@ class AverageStress(Mean):
 class AverageTemperature(Mean):
     """Measure the mean temperature of a group of points; published as ID.
 
-    Weighted by mass; points without a temperature count as 0. Refused if no material has one.
+    The mean is weighted by mass; points without a temperature count as 0. At least one material
+    must have a temperature.
 
     Example
     -------
@@ -230,7 +231,7 @@ class PositionQuantile(Compute):
 
     def refresh(self) -> None:
         d = self.hub.domain.dimension
-        # Radix selection: eight bits of the coordinates at a time, from the highest.
+        # Radix selection by eight bits of the coordinates at a time, from the highest.
         first, below = [0] * d, np.zeros(d)
         for shift in range(64 - BITS, -1, -BITS):
             mass = self.hub.fields.added_up(self, "masses", shift, first).reshape(d, -1)
@@ -238,7 +239,7 @@ class PositionQuantile(Compute):
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:
-                # Round-off must not shift a fraction such as 0.1 of ten equal points.
+                # Against round-off: 0.1 of ten equal points is one point.
                 wanted = self.fraction * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
@@ -261,8 +262,8 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Integers in the order of floating-point numbers."""
-    bits = (numbers + 0.0).view(np.uint64)  # makes -0 a 0
+    """Return integers that have the order of the floating-point numbers."""
+    bits = (numbers + 0.0).view(np.uint64)  # converts -0 to 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
 
@@ -271,7 +272,7 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
 
 
 class Probe(Mean):
-    """Measure a column of the points, such as a stress: the mean, or the value at a place.
+    """Measure a column of the points, such as a stress: its mean, or its value at one point.
 
     Published as ID, or for several columns as ID_column. NaN for an empty group, and for a point
     that no longer exists.
@@ -279,11 +280,11 @@ class Probe(Mean):
     Parameters
     ----------
     column, columns
-        Columns of dump particle. Their mean over the group is weighted by volume.
+        Columns of dump particle. By default their volume-weighted mean over the group is measured.
     point
-        The id of a point, as in dumps: its values instead of the mean.
+        The id of a point, as in dumps, whose values are measured instead of the mean.
     x, y, z
-        A position: the values of the point of the group that is nearest to it at that time.
+        A position: at each output, values of the point of the group that is nearest are measured.
 
     Example
     -------
@@ -331,7 +332,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Distance, id and columns of the given or nearest point."""
+        """Return distance, id and columns of the given or nearest point."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

@@ -64,7 +64,7 @@ class Dump(Rhythmic):
 
 
 POSITIONS = ("x", "y", "z")
-# Written with every row anyway; Karamelo calls the id `tag`, too.
+# These are in every row anyway; `tag` is another name of the id in Karamelo.
 LEADING = ("id", "type", "tag")
 
 
@@ -77,21 +77,21 @@ class TableRows(NamedTuple):
 class TableDump(Dump):
     """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
 
-    `OfPoints` or `OfNodes`, an earlier base, defines the `names` of columns, the `absent` ones
-    (always 0), the `extent` (number of rows, largest id), and `tables` of rows by id that fit into
-    memory.
+    `OfPoints` or `OfNodes`, which must come first among the bases, defines the `names` of columns,
+    the `absent` ones (always 0), the `extent` (number of rows, largest id), and `tables`, pieces of
+    rows sorted by id that fit into memory.
 
     Attributes
     ----------
     to_first
-        Whether only rank 0 gets the tables, which all ranks iterate over once.
+        Whether only rank 0 gets the tables. All ranks must iterate over them once.
     counts_rows
         Whether `write` reads the extent first.
     """
 
     to_first = False
     counts_rows = True
-    copies: int | None = None  # around an axis
+    copies: int | None = None  # `revolve`
 
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         columns_available = [*LEADING, *self.names(hub)]
@@ -102,7 +102,7 @@ class TableDump(Dump):
             raise ScriptError(message, argument="file", expected=expected, hint=hint)
         check_columns(columns, columns_available, first=2)
         wanted = [name for name in dict.fromkeys(columns) if name not in LEADING]
-        # A viewer needs all three positions.
+        # Viewers need all three coordinates.
         if not set(POSITIONS) <= set(wanted):
             wanted = [*POSITIONS, *(name for name in wanted if name not in POSITIONS)]
         super().__init__(hub, every, file, *wanted)
@@ -133,8 +133,8 @@ class OfPoints:
         (velocity), s11 s22 s33 s12 s13 s23 (Cauchy stress), e11 ... e23 (strain), seq (von Mises
         stress), p (pressure), rho (density), volume, mass and so on.
     revolve
-        Number of copies of each point around the axis, in 3D, for axisymmetric scenes. Positions,
-        velocities, stress and strain rotate, also by the angle of twist.
+        For axisymmetric scenes: write a 3D body, with this number of copies of each point around
+        the axis. Positions, velocities, stress and strain are rotated, also by twist.
     """
 
     rows_are = "points"
@@ -188,7 +188,7 @@ class OfNodes:
         Columns for each node: x y z (position, the default), vx vy vz (velocity), vx_update ...
         (velocity after the momentum update), fx fy fz (total force), mass, T if heat flows.
     occupied
-        true: omit nodes without mass, for small files from a sparsely filled domain.
+        true: omit nodes without mass, which makes files of sparsely filled domains small.
     """
 
     rows_are = "nodes"

@@ -15,7 +15,7 @@ from karamelo_py.output.vtkhdf import VERSION, describe
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump, TableRows
 
-# With shuffled bytes, higher levels take twice as long and save a few per cent.
+# Higher levels than 1 take twice as long and save only a few per cent.
 STORED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 CHUNK = 1 << 16
 OF_A_COLUMN = 1 << 14  # bytes that HDF5 may need to find the chunks of a column
@@ -51,7 +51,7 @@ class Hdf5Dump(TableDump):
         import h5py
 
         if k == 0 or self.one_file_per_step:
-            # In memory first: HDF5 cannot close a file on a full disk.
+            # Made in memory first, since HDF5 cannot close a file on a full disk.
             with h5py.File("new", "w", driver="core", backing_store=False, libver=VERSION) as root:
                 self._prepare(root, snapshot.last)
                 root.flush()
@@ -76,16 +76,13 @@ class Hdf5Dump(TableDump):
         except (
             OSError,
             RuntimeError,
-        ) as error:  # h5py raises both kinds, with the text of the system
+        ) as error:  # h5py raises both, with the message of the operating system
             reason = re.search("error message = '([^']*)'", str(error))
             message = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {message}") from error
 
     def _reserve(self, path: Path, last: int) -> None:
-        """Refuse a disk without space for a snapshot.
-
-        HDF5 neither reports nor survives a failure to write.
-        """
+        """Raise an error if the disk lacks space for a snapshot, which HDF5 would not report."""
         if not hasattr(os, "posix_fallocate"):
             return
         rows = max(last, 1)
@@ -100,9 +97,9 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Continue a file, rewritten for equal bytes.
+        """Continue the file of an earlier run in a copy, with the bytes of one long run.
 
-        A file that a killed program was writing can only be read.
+        HDF5 allows no writing to a file that was open when a program was killed.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -178,13 +175,13 @@ class Hdf5Dump(TableDump):
         for name, number in (("time", snapshot.time), ("step", snapshot.step)):
             root[name].resize((k + 1,))
             root[name][k] = number
-        # An array without a reference flushes its chunks when deleted, and hides errors.
+        # Hold references: a garbage-collected array flushes its chunks, and hides errors.
         arrays = {name: root[name] for name in ("id", "type", *self.columns)}
         for name in self.columns:
             arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
-            # Blocks of a fixed size give equal bytes however the rows arrive.
+            # Blocks of fixed size make the bytes of the file independent of the tables.
             for begin in range(0, count, PIECE):
                 block, here = (
                     slice(begin, min(begin + PIECE, count)),
@@ -209,8 +206,8 @@ class Hdf5Dump(TableDump):
 def _opened_to_append(path: Path) -> Any:
     """Open a file that stays readable if the program dies.
 
-    h5py's swmr=True also opens a file left by a killed program if it was opened that way from the
-    start (`h5py.File.swmr_mode` is too late).
+    A file left by a killed program can be opened with swmr=True if it was written in this mode from
+    the start. Setting `h5py.File.swmr_mode` later has no such effect.
     """
     import h5py
 
@@ -226,9 +223,9 @@ def _opened_to_append(path: Path) -> Any:
 class Hdf5(OfPoints, Hdf5Dump):
     """Write the material points to one compressed binary file, which h5py and xarray read.
 
-    Each column is an array over time and id; deleted points are NaN. The file is complete after
-    every snapshot. ParaView opens the small file of the same name with the ending ``.vtkhdf``,
-    which has all snapshots.
+    Each column is an array (snapshot, id), with NaN for deleted points. The file is readable after
+    every snapshot. In ParaView, open the file of the same name with the ending ``.vtkhdf``, which
+    refers to all snapshots.
 
     Notes
     -----
@@ -238,8 +235,8 @@ class Hdf5(OfPoints, Hdf5Dump):
         points.seq.sel(time=0.5, method="nearest").max()
         h5py.File("points.h5")["seq"][-1]
 
-    If the program was killed while writing, open the file with ``h5py.File(name, swmr=True)``.
-    After a full disk, the file has the complete snapshots.
+    If the program was killed while writing, open the file with ``h5py.File(name, swmr=True)``. If
+    the disk was full, the file contains the snapshots that were complete.
 
     Example
     -------

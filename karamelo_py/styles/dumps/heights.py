@@ -19,12 +19,13 @@ class HeightsDump(Dump):
     Parameters
     ----------
     file
-        File name with a ``*``, which becomes the step number: a raster has one snapshot.
+        File name with a ``*``, which becomes the step number: each snapshot is a file.
     cell
-        Side of a cell: at least twice the point spacing, or cells inside the deposit remain empty.
+        Cell size of the raster: at least twice the point spacing, otherwise cells inside the
+        deposit are empty.
     of
-        ``depth``: volume of the points in a cell over its area. ``top``: height of the highest
-        upper face of these points, -9999 (NODATA) in empty cells.
+        ``depth``: volume of the points in a cell over the area of the cell. ``top``: height of the
+        upper face of the highest point in a cell; -9999 (NODATA) in empty cells.
 
     Example
     -------
@@ -33,8 +34,8 @@ class HeightsDump(Dump):
 
     Notes
     -----
-    The raster covers the domain, in 2D with one row. The depths add up to the volume of the points.
-    QGIS, ArcGIS, GDAL and region heights read the files.
+    The raster covers the domain; in 2D it has one row. The sum of depth times cell area is the
+    volume of the points. QGIS, ArcGIS, GDAL and region heights read the files.
 
     See Also
     --------

@@ -17,7 +17,7 @@ from karamelo_py.output.text import rows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 
-# 33 % of the time of level 6, for 4 % more bytes.
+# It takes 33 % of the time of level 6 (zlib's default) and gives 4 % more bytes.
 COMPRESSION = 4
 PIECE = 1 << 20
 # For the binary format (LAMMPS manual, dump, second revision).
@@ -42,13 +42,13 @@ class Plain:
 
 
 class LammpsDump(TableDump):
-    # For one file with all snapshots: position of the next one, and length of the text so far.
+    # For one file with all snapshots: where the next one begins, and the length of all text.
     remembers = ("_end", "_length")
     to_first = True
     _end = 0
     _length = 0
     _encoder: Any = None
-    named = False  # with ELEMENT
+    named = False  # the format with ELEMENT
     encoder: Any = Plain
     opened: Any = staticmethod(partial(open, mode="rb"))
 
@@ -60,7 +60,7 @@ class LammpsDump(TableDump):
                     file.write(encoder.compress(text))
                 file.write(encoder.flush())
             return
-        # The next snapshot overwrites the last bytes of the file, which is complete after each.
+        # The last bytes close the file, so that it is complete; the next snapshot overwrites them.
         # (OVITO reads only the first of separately compressed snapshots.)
         start, before = self._end, self._encoder or self.encoder()
         encoder = before.copy()
@@ -82,7 +82,7 @@ class LammpsDump(TableDump):
             self.warn_of_absence()
             self._end = self._length = 0
             return
-        # Pending bytes of an encoder are not in the file; the text restores them.
+        # The state of the encoder is not in the file; encoding the text again restores it.
         self._encoder = self.encoder()
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
@@ -98,7 +98,7 @@ class LammpsDump(TableDump):
         ends = ["pp" if k in self.hub.domain.periodic else "sm" for k in range(3)]
         lines = [
             *(["ITEM: UNITS", str(units)] if units else []),
-            "ITEM: TIME",  # read_dump of LAMMPS expects it first
+            "ITEM: TIME",  # read_dump of LAMMPS expects the time first
             f"{update.time:.16g}",
             "ITEM: TIMESTEP",
             str(update.step),
@@ -121,10 +121,7 @@ class LammpsDump(TableDump):
 
 
 def box(hub: Hub) -> list[tuple[float, float]]:
-    """Ends of the domain along the three axes.
-
-    OVITO treats a box of zero thickness as degenerate.
-    """
+    """Return the bounds of the domain along three axes; OVITO refuses a box of zero thickness."""
     domain = hub.domain
     used = slice(domain.dimension)
     thin = [(-0.5 * domain.h, 0.5 * domain.h)] * (3 - domain.dimension)
@@ -137,11 +134,11 @@ class Gzipped:
     Parameters
     ----------
     file
-        File name, best with the ending ``.gz``; ``*`` as in dump particle.
+        File name, preferably with the ending ``.gz``; a ``*`` as in dump particle.
     """
 
     def encoder(self) -> Any:
-        """Omit name and date, for reproducible bytes."""
+        """Return a gzip encoder without name and date, for reproducible bytes."""
         return zlib.compressobj(COMPRESSION, zlib.DEFLATED, 16 + zlib.MAX_WBITS)
 
     opened = staticmethod(gzip.open)
@@ -153,7 +150,7 @@ class BinaryRows:
     Parameters
     ----------
     file
-        File name, best with the ending ``.bin``; ``*`` as in dump particle.
+        File name, preferably with the ending ``.bin``; a ``*`` as in dump particle.
     """
 
     def _snapshot(self) -> Iterator[bytes]:
@@ -175,7 +172,7 @@ class Particle(OfPoints, LammpsDump):
 
     Each row begins with the point's number (``id``, constant during the run) and the number of its
     solid (``type``, from 1). Positions are always written. The header has the step and, as ``ITEM:
-    TIME``, the time. The column ``element`` has the names of solids, OVITO's particle types.
+    TIME``, the time. The column ``element`` is the name of the solid, OVITO's particle type.
 
     Example
     -------
@@ -206,9 +203,9 @@ class GridDump(OfNodes, LammpsDump):
     Each row begins with the node's number (``id``, from 0, z fastest, then y, then x) and the
     number of its grid (``type``, from 1). Positions are always written.
 
-    Grids have consecutive ids: one in ulmpm and ulcpdi; in tlmpm and tlcpdi one for each solid,
-    over its reference shape; in ulmpm/contacts one for each velocity field, so several rows have
-    the same position.
+    Methods ulmpm and ulcpdi have one grid; tlmpm and tlcpdi have one for each solid, over its
+    reference shape; ulmpm/contacts has one for each velocity field, so several rows have the same
+    position. Nodes are numbered consecutively over all grids.
 
     Example
     -------
@@ -219,7 +216,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    Less than half the size; otherwise like dump particle.
+    Files have less than half the size; otherwise the same as dump particle.
 
     Example
     -------
@@ -234,7 +231,7 @@ class ParticleGz(Gzipped, Particle):
 class GridGz(Gzipped, GridDump):
     """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
-    Otherwise like dump grid.
+    Otherwise the same as dump grid.
 
     Example
     -------
@@ -249,7 +246,7 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    All digits, written faster than text; otherwise like dump particle.
+    Full precision, and faster to write than text; otherwise the same as dump particle.
 
     Example
     -------
@@ -266,7 +263,7 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    All digits, written faster than text; otherwise like dump grid.
+    Full precision, and faster to write than text; otherwise the same as dump grid.
 
     Example
     -------

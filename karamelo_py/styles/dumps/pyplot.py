@@ -23,61 +23,63 @@ from karamelo_py.script.errors import ScriptError, meant
 from karamelo_py.styles.dumps.base import Dump
 
 DPI = 100
-# Larger widths and heights are in pixels.
+# Larger widths and heights are taken as pixels.
 MOST_INCHES = 50
 LEAST_PIXELS, MOST_PIXELS = 20, 20000
 PNG_COMPRESSION = 1
-# Components of either sign have a diverging colour map, grey at 0.
+# Signed components have a diverging colour map that is grey at 0.
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # points for the typical size
+SAMPLE = 1 << 16  # points that are sampled for the typical size
 
 
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 1D the field is drawn over x. By default the colour limits grow with the values.
+    In 1D the field is drawn as a curve over x.
 
     Parameters
     ----------
     every
         Steps between two pictures, or ``time(T)``. The first and the last state of a run are drawn.
     file
-        Ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without ``*`` each
-        picture replaces the previous one.
+        File name ending in .png, .pdf or .svg. The first ``*`` becomes the step number; without
+        ``*`` each picture replaces the previous one.
     width, height
-        Up to 50 in inches (of 100 pixels), above in pixels; from 20 to 20000 pixels.
+        Size of the picture: up to 50 in inches (of 100 pixels), above 50 in pixels, at most 20000.
     field
-        Column of dump particle that sets the colour, or a formula of columns, groups and solids (1
-        for their points, else 0), time and published values. Default: the solid (in 1D: vx).
+        Column of dump particle that is shown by colour, or a formula of columns, groups and solids
+        (1 for their points, else 0), time and published values. Default: the solid (in 1D: vx).
     vmin, vmax
-        Limits of the colours; the colour bar ends in an arrow if values exceed them.
+        Limits of the colours. By default they widen from picture to picture to include all values
+        so far. If values exceed the limits, the colour bar ends in an arrow.
     cmap
         A Matplotlib colour map; default viridis, or coolwarm for components with either sign.
     azimuth, elevation
-        Viewing direction in 3D, in degrees: around z from x, and above the horizon.
+        Viewing direction in 3D, in degrees: the angles around z from x, and above the horizon.
     axes
         false: without axes and numbers.
     title
-        Text above, before step and time. A name or formula in braces becomes a number, as in "force
-        {press_y} N"; two braces make one. Mathematics is in dollars, as in "$v_{max}$".
+        Text above the picture, before step and time. A name or formula in braces is replaced by its
+        value, as in "force {press_y} N"; write a literal brace twice. Text between dollar signs is
+        set as mathematics, as in "$v_{max}$".
     label
         Label of the colour bar, such as "stress (MPa)"; default: the column.
     only
-        Condition on columns, as in `field`, for the drawn points: ``not tool && y > 0``.
+        Draw only points that meet this condition on columns, groups, solids: ``not tool && y > 0``.
     xmin, xmax, ymin, ymax, zmin, zmax
         Limits of the view; default: the domain.
     scale
-        log: colours follow the logarithm of the column.
+        log: colours show the logarithm of the field.
     quantile
-        Fraction of the values beyond either colour limit, such as 0.01.
+        Choose colour limits so that this fraction of the values, such as 0.01, is beyond each.
     dpi
-        Pixels per inch, by default 100: with 300, a picture of 600 pixels has 1800.
+        Pixels per inch, by default 100. With 300, a width of 600 gives 1800 pixels.
     fontsize
         Font size in points.
     pointsize
-        Size of the drawn points over the material points; 1.4 fills all gaps.
+        Size of the drawn points relative to the material points; 1.4 fills all gaps.
     mirror
         true: in an axisymmetric scene, draw the points on both sides of the axis.
     outlines
@@ -160,7 +162,7 @@ class PyPlot(Dump):
     @seen.setter
     def seen(self, seen: tuple[Any, ...] | None) -> None:
         limits, *of = seen or (None,)
-        if of == [self._label(), *self._marks()]:  # a resumed script may show another field
+        if of == [self._label(), *self._marks()]:  # a resumed script may choose another field
             self._limits = limits
             if self._picture is not None:
                 self._picture.begin_with(limits)
@@ -238,7 +240,7 @@ class PyPlot(Dump):
         volume = columns["volume"]
         if hoops := domain.kin.hoops:
             x = columns["x"]
-            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0)) ** hoops  # of a ring
+            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0)) ** hoops  # of a ring to area
         some = volume[columns["id"] % -(-self.hub.fields.count // SAMPLE) == 0]
         return float(np.median(some)) ** (1 / domain.dimension) if len(some) else 0.0
 
@@ -280,7 +282,7 @@ def look_of(
     outlines: bool,
     **look: Any,
 ) -> dict[str, Any]:
-    """Check keywords, and return the settings of a picture."""
+    """Check the keywords and return the settings of a picture."""
     ranges = ((vmin, vmax), "vmin", "vmax"), *zip(window, *EDGES, strict=True)
     for (first, last), low, high in ranges:
         if first is not None and last is not None and first >= last:
@@ -329,9 +331,9 @@ FRAMES_PER_SECOND = 25
 
 
 class Movie(PyPlot):
-    """Draw a movie of the points, with pictures like dump pyplot: 25 frames per second.
+    """Draw a movie of the points with 25 pictures per second, as dump pyplot draws them.
 
-    Written at the end of each run, also of a failed or interrupted one.
+    The file is written at the end of each run, even if the run failed or was interrupted.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ KINDS = "vertex", "line", "triangle"
 
 
 class SurfaceVtk(VtkDump):
-    """Write the surfaces of rigid bodies and tools as a series of VTU files: triangles in 3D.
+    """Write the triangulated surfaces of rigid bodies and tools as a series of VTU files, in 3D.
 
     In ParaView open the file of the same name with the ending ``.pvd``. `type` numbers the surfaces
     in the order of their fixes.
@@ -28,8 +28,8 @@ class SurfaceVtk(VtkDump):
 
     Notes
     -----
-    The surfaces come from files: bodies of fix rigid_body that fill a region stl or mesh, or have
-    one in contact/rigid_body(region=...), and regions of fix contact/surface.
+    Only surfaces from files are written: regions stl or mesh that are filled by a body of fix
+    rigid_body, or given in contact/rigid_body(region=...) or fix contact/surface.
 
     See Also
     --------

@@ -16,7 +16,7 @@ from karamelo_py.styles.dumps.base import POSITIONS, OfNodes, OfPoints, TableDum
 
 
 class VtkDump(TableDump):
-    """A series of VTU files, and a PVD file with the time of each.
+    """A dump as a series of VTU files, and a PVD file with the time of each.
 
     Parameters
     ----------
@@ -74,18 +74,18 @@ class VtkDump(TableDump):
             file.write((head + "".join(rows) + "</Collection>\n</VTKFile>\n").encode())
 
     def connect(self, vtu: Vtu, ids: np.ndarray, kept: list[np.ndarray]) -> None:
-        """Add the cells of the last points, or their data to `kept`."""
+        """Add the cells of the latest points to `vtu`, or append data for `complete` to `kept`."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
-        """Add the cells between all points."""
+        """Add cells that need all points."""
 
 
 class Vtk(OfPoints, VtkDump):
     """Write the material points as a series of VTU files, which ParaView opens.
 
-    Open the file of the same name with the ending ``.pvd``, which lists all snapshots. All
-    components of velocity, force, stress or strain are also one array, for ParaView's filters
-    Glyph, Warp By Vector and Tensor Glyph.
+    Open the file of the same name with the ending ``.pvd``, which lists all snapshots. Velocity,
+    force, stress and strain are also written as one array each if all components are requested, for
+    ParaView's filters Glyph, Warp By Vector and Tensor Glyph.
 
     Example
     -------

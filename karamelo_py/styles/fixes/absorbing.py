@@ -30,7 +30,7 @@ class Support(Field):
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """Dashpots rho c A; only the component `axis` of `normal` (rho A) counts."""
+    """Apply dashpots rho c A; only the component of `normal` (rho A) along the axis is used."""
     axis, along, across = values
     chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
     weight = chosen[0] if len(chosen) == 1 else total(chosen)
@@ -44,7 +44,7 @@ def absorb(mass, v, force, normal, support, values, dt):
 
 
 def dashpot(rate, mass, v, force, dt):
-    """Force -rate m (v + v')/2, with the velocity v' after this force and `force`."""
+    """Return -rate m (v + v')/2, where v' is the velocity due to this force and `force`."""
     half = 0.5 * dt * rate
     return (-1 / (1 + half)) * (rate * mass * v + half * force)
 
@@ -55,7 +55,7 @@ class Absorbing(Fix):
     Parameters
     ----------
     material
-        Its wave speeds set the dashpots.
+        The material at the edge; its wave speeds determine the dashpots.
     side
         Outward direction of the edge.
 
@@ -65,16 +65,18 @@ class Absorbing(Fix):
 
     Notes
     -----
-    The traction is -rho c v, with the P wave speed for the normal velocity and the S wave speed
-    along the surface. A pulse 20 cells long at normal incidence reflects 0.2 % of its energy. Plane
-    waves at up to 45 degrees reflect up to 1.4 % (P) and 4.7 % (S, at 30 degrees), 0.2 % with a
-    layer of fix mass_damping. In saturated ground, soil and water move as one at the edge.
+    The traction is -rho c v, where c is the P wave speed for the normal velocity and the S wave
+    speed for the tangential velocity. Of the energy of a pulse 20 cells long at normal incidence,
+    0.2 % is reflected. Of plane waves at up to 45 degrees, up to 1.4 % (P) and 4.7 % (S, at 30
+    degrees) is reflected, or 0.2 % with a layer of fix mass_damping. In saturated ground, soil and
+    water move together at the edge.
 
-    The fix balances the force on each node in its first step: ground with an initial stress (fix
-    initial_stress) stays at rest. A later load, such as weight, slowly pushes the edge outwards.
+    A constant force balances the force on each node in the first step, so that ground with an
+    initial stress (fix initial_stress) stays at rest. Loads applied later, such as weight, slowly
+    push the edge outwards.
 
-    Publishes the force of the edge as ID_x, ID_y, ID_z. Best in tlmpm, and in ulmpm while points
-    move less than half a cell.
+    Publishes the force of the edge as ID_x, ID_y, ID_z. The fix is accurate in tlmpm, and in ulmpm
+    while points move less than half a cell.
 
     See Also
     --------
@@ -132,7 +134,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """P and S wave speeds; in saturated soil, rho c over its density."""
+    """Return P and S wave speeds; in saturated soil, rho c over the dry density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

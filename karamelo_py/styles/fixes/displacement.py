@@ -21,7 +21,7 @@ class EarlierDisplacement(Field):
 
 
 class Displacement(Fix):
-    """Measure displacements from the positions at the next step: 0 after gravity has acted.
+    """Measure displacements from the positions at the next step, such as the state under gravity.
 
     Example
     -------
@@ -29,9 +29,9 @@ class Displacement(Fix):
 
     Notes
     -----
-    Points then have the columns ux, uy, uz. To measure from a later stage, use delete_fix and
-    define the fix again. Displacements of other points, and of points that enter later, are
-    measured from the initial position.
+    The columns ux, uy, uz of these points then have the new reference. To measure from a later
+    stage, delete the fix (delete_fix) and define it again. Displacements of other points, and of
+    points that enter later, are measured from the initial position.
 
     See Also
     --------

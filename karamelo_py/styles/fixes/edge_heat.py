@@ -23,12 +23,12 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Faces on the surface; None for meshes, with boxes of points."""
+        """Return faces on the surface; for meshes None: faces of the points' boxes are used."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Heat per time (n,) into the points from `values` at the faces (m,)."""
+        """Return the heat per time (n,) into the points for `values` at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -61,9 +61,10 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat through the adjacent surface of the region, by the initial area of the
-    smooth surface (for a mesh, of its points' faces). To load part of an edge, restrict the group,
-    or set q to 0 elsewhere. Beyond the domain or a symmetry plane, a region has no surface.
+    Each point gets the heat that flows through the adjacent surface of the region. Areas are those
+    of the smooth surface at the start (for a mesh, of the faces of points). To load part of an
+    edge, restrict the group, or set q to 0 elsewhere. Planes at the edge of the domain and symmetry
+    planes are not loaded.
 
     Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in axisymmetry
     per radian).
@@ -97,9 +98,9 @@ class EdgeConvection(EdgeHeat):
 
     Notes
     -----
-    Areas are as in edge_heat_flux. T is the temperature at the surface after the step, so even a
-    large h cools no point below the fluid temperature. Publishes the heat per time into all points
-    as ID_s, and the area as ID_area.
+    Areas are as in edge_heat_flux. T is the temperature at the surface at the end of the step, so
+    that points are not cooled below the temperature of the fluid, however large h is. Publishes the
+    heat per time into all points as ID_s, and the area as ID_area.
 
     See Also
     --------

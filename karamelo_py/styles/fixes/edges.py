@@ -20,8 +20,8 @@ from karamelo_py.styles.fixes.forces import PointForces
 from karamelo_py.styles.fixes.formulas import vector
 
 SIDES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
-AT_ONCE = 4_000_000  # distances of faces and points
-PARTS = 4  # per direction of a box, to measure the surface
+AT_ONCE = 4_000_000  # distances between faces and points that are computed at a time
+PARTS = 4  # sub-boxes per direction of a box, to measure the surface
 
 
 class Faces(NamedTuple):
@@ -36,10 +36,10 @@ class Faces(NamedTuple):
 
 
 def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
-    """Outer faces of the points `ids` inside a region.
+    """Return the outer faces of the points `ids` inside a region.
 
-    Points are boxes; outside an outer face, the centre of the next box is outside. `faces_cut` does
-    the same for boxes cut by a region.
+    Points are boxes. A face is an outer one if the centre of the next box is outside the region.
+    For boxes cut by a region see `faces_cut`.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -64,7 +64,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
 class EdgePieces(NamedTuple):
     point: np.ndarray  # (m,)
     area: np.ndarray  # (m, d) times the outward normal
-    length: np.ndarray  # (m,) area of a piece, with both sides of an edge
+    length: np.ndarray  # (m,) area of a piece, counting both sides of an edge
     middle: np.ndarray
 
 
@@ -76,9 +76,9 @@ def joined(tables: Sequence[Columns]) -> Columns:
 
 
 def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
-    """The surface at the points `ids` of a solid that fills `region`.
+    """Return the surface at the points `ids` of a solid that fills `region`.
 
-    In a sub-box, it belongs to the nearest point in this box or an adjacent one.
+    The surface in a sub-box is assigned to the nearest point in this box or an adjacent one.
     """
     size, boxes, d = solid.h / solid.ppc, solid.places, solid.domain.dimension
     x0 = solid.x0_of(ids - solid.first_id)
@@ -88,7 +88,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
     pieces = [EdgePieces(np.empty(0, np.int64), none, np.empty(0), none)]
     if not len(ids):
         return pieces[0]
-    corner = x0.min(axis=0) - 2.5 * size  # aligns points of whole boxes with the box centres
+    corner = x0.min(axis=0) - 2.5 * size  # such that points of whole boxes are at box centres
     shape = tuple(((x0.max(axis=0) - corner) / size + 5).astype(np.int64))
     cells = np.ravel_multi_index(tuple(((x0 - corner) / size).astype(np.int64).T), shape)
     order = np.argsort(cells, kind="stable")
@@ -104,7 +104,7 @@ def surface_at(solid: Solid, region: Region, ids: np.ndarray) -> EdgePieces:
         nearest, taker = np.full(len(at), np.inf), np.full(len(at), -1)
         for step in itertools.product((-1, 0, 1), repeat=d):
             number = np.ravel_multi_index(tuple((at + step).T), shape, mode="clip")
-            for k in (0, 1):  # two points may be in one box: one has absorbed a small neighbour
+            for k in (0, 1):  # a box may have two points, if one has absorbed a small neighbour
                 row = np.minimum(np.searchsorted(cells, number) + k, len(cells) - 1)
                 apart = np.linalg.norm(x0[order[row]] - middle, axis=1)
                 nearer = (cells[row] == number) & (apart < nearest * (1 - 1e-9))
@@ -137,9 +137,9 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Faces of cut boxes: projections of the surface across the axes.
+    """Return faces of cut boxes: the surface projected along each axis.
 
-    At an edge within a sub-box, only the difference of opposite projections remains.
+    Opposite projections within a sub-box cancel, except for their difference.
     """
     d, least = solid.domain.dimension, 1e-9 * (solid.h / solid.ppc) ** (solid.domain.dimension - 1)
     pieces = surface_at(solid, region, ids)
@@ -162,7 +162,7 @@ def whole_faces(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
 
 
 def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Faces:
-    """Pieces of simplices (m, d, d), with the nearest points."""
+    """Return pieces of the simplices (m, d, d), each with the nearest point."""
     none = np.zeros(0, np.int64)
     if not len(ids) or not len(sheet):
         return Faces(ids[:0], none, none, np.empty(0), np.empty((0, d)))
@@ -186,7 +186,7 @@ def faces_of_sheet(hub: Hub, sheet: np.ndarray, ids: np.ndarray, d: int) -> Face
 
 
 def _parts_of_simplex(d: int, count: int) -> np.ndarray:
-    """Centres (n, d - 1) of `count`^(d - 1) equal pieces, in fractions of the edges."""
+    """Return centres (n, d - 1) of `count`^(d - 1) equal pieces, as fractions of the edges."""
     if d < 3:
         return ((np.arange(count) + 0.5) / count)[:, None] if d == 2 else np.zeros((1, 0))
     i, j = np.divmod(np.arange(count * count), count)
@@ -206,7 +206,7 @@ class OnEdge(Fix):
 
     group: ParticleGroup
     region: Region
-    side: int | None = None  # of `SIDES`; None: all
+    side: int | None = None  # index in `SIDES`; None: all sides
     _seen: tuple[np.ndarray, Faces] | None = None
 
     def defined(self) -> None:
@@ -225,7 +225,7 @@ class OnEdge(Fix):
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Fixes the order of sums over the faces of a point.
+            # Sort, so that sums over the faces of a point have a fixed order.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -233,7 +233,7 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Faces on the surface; None to find them from boxes."""
+        """Return faces on the surface; None: find them from boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
@@ -260,7 +260,7 @@ class OnEdge(Fix):
             tables.append(faces.some(np.isin(faces.point, ids)))
         tables.append(faces_on(self.hub, self.region, ids[whole]))
         faces = joined(tables)
-        loaded = faces.area > 0  # not the axis
+        loaded = faces.area > 0  # not on the axis
         if self.side is not None:
             loaded &= 2 * faces.axis + (faces.sign > 0) == self.side
         return faces.some(loaded)
@@ -295,7 +295,7 @@ class EdgeTraction(EdgeFix):
     Parameters
     ----------
     side
-        The loaded side, by its outward direction; or ``all`` faces of a set in a mesh file.
+        The loaded side, named by its outward direction; or ``all`` faces of a set in a mesh file.
     traction
         tx, ty, tz, one per dimension: functions of x, y, z (initial position of the edge), time and
         published values. NULL leaves a component unchanged. With axisymmetric(true, twist=true), tz
@@ -309,14 +309,14 @@ class EdgeTraction(EdgeFix):
     -----
     Publishes the sum as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
 
-    Points are boxes that fill the region; those with an outer face in the direction of `side` take
-    the traction on its initial area. It is a dead load (constant magnitude and direction), acts
-    half a box inside the edge, and sums exactly to traction times area on a plane side. Faces of a
-    hole are loaded too: for a plate with a hole, use the region without it. In axisymmetry, area
-    and force are per radian.
+    Points are boxes that fill the region. Each point with an outer face in the direction of `side`
+    gets the traction times the initial area of this face, as a dead load (magnitude and direction
+    do not follow the deformation). It acts at the point, half a box inside the edge; on a plane
+    side, the total is exactly traction times area. Faces of a hole are loaded too: for a plate with
+    a hole, use the region without the hole. In axisymmetry, area and force are per radian.
 
-    Faces of a set in a mesh load the nearest points of the group: ``region(top, mesh, deck.inp,
-    TOP)`` and ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
+    A set of faces in a mesh file loads the nearest points of the group: ``region(top, mesh,
+    deck.inp, TOP)`` and ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
 
     See Also
     --------
@@ -351,7 +351,7 @@ class EdgeTraction(EdgeFix):
     def forces(self, points: PointsView) -> np.ndarray:
         force = super().forces(points)
         if force.shape[1] > points.position.shape[1]:
-            # The torque is the one at the faces, half a box outside of the points.
+            # The tractions act at the faces, half a box outside the points.
             faces = self.faces_at(points.ids - 1)
             torque = np.zeros(len(force))
             np.add.at(torque, faces.point, faces.middle[:, 0] * self.loads(faces)[:, 2])
@@ -365,7 +365,7 @@ class EdgePressure(EdgeFix):
     Parameters
     ----------
     p
-        As a function of x, y, z (initial position of the edge), time and published values.
+        Pressure, a function of x, y, z (initial position of the edge), time and published values.
 
     Example
     -------
@@ -376,12 +376,12 @@ class EdgePressure(EdgeFix):
     Publishes the sum as ID_x, ID_y, ID_z.
 
     The pressure acts inwards on the initial area of each outer face of the points' boxes, with
-    constant magnitude and direction. A curved edge is stair-stepped, but the force along each axis
-    (pressure times projected area) is correct; with points=cut, forces are those on the smooth
-    edge. In axisymmetry, forces are per radian.
+    constant magnitude and direction. Points approximate a curved edge by steps, but the force along
+    each axis (pressure times projected area) is correct. With points=cut, each point gets the force
+    on the smooth edge. In axisymmetry, forces are per radian.
 
-    To load part of an edge, define a separate region; the group may have to exclude other sides of
-    a region such as ``region(top, block, 0, 1, 0.9, 1)``.
+    To load part of an edge, define a separate region, such as ``region(top, block, 0, 1, 0.9, 1)``,
+    and a group without points at its other sides.
 
     See Also
     --------

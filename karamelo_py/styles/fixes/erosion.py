@@ -20,9 +20,10 @@ class Erosion(Fix):
     ----------
     condition
         A formula of columns of dump particle (damage, volume, x, ep, T, ...), groups, solids, time
-        and published values: 0 for points that remain. Columns hide variables.
+        and published values; points for which it is not 0 are deleted. Names of columns take
+        precedence over variables.
     every
-        Checks follow steps whose number is a multiple of this.
+        Number of steps between checks.
 
     Example
     -------
@@ -32,8 +33,8 @@ class Erosion(Fix):
     Notes
     -----
     Publishes sums since the start: ID_points, ID_mass, and ID_energy (kinetic, stored and
-    dissipated), which the energy balance counts as work of the fix. Log and dumps at this step omit
-    the points.
+    dissipated), which the energy balance counts as work of the fix. Log and dumps of the same step
+    already omit the deleted points.
 
     See Also
     --------

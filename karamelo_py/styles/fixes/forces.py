@@ -47,7 +47,7 @@ def share_out_whole(force, sums, load, values, dt):
 
 
 def pushed(force, sums, load, push):
-    """Add a force in the plane of radius and axis, and a torque; return what a hook returns."""
+    """Add a force in the plane of radius and axis, and a torque; return the result of the hook."""
     inertia, momentum, torque = sums
     force = force._make([old + new for old, new in zip(force, push[:2], strict=True)])
     return force, (inertia, momentum, torque + push[2]), load + push[2], push
@@ -194,7 +194,7 @@ class PointForces(Fix):
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = exerts = True
-    conserves = True  # except the work of the forces, which is summed
+    conserves = True  # apart from the work of the forces, which is summed
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -210,7 +210,7 @@ class PointForces(Fix):
     def publish_load(self, points: PointsView, force: np.ndarray) -> None:
         """Publish the sum of forces (n, d), and their torque if requested.
 
-        With twist, forces (n, 3) have the torque about the axis as their third sum.
+        With twist, forces are (n, 3), and the third sum is the torque about the axis.
         """
         x, torque = points.position, self.hub.values.torque_of(self.id)
         d = x.shape[1]
@@ -240,9 +240,10 @@ class ForceParticles(PointForces):
 
     Notes
     -----
-    A point of mass m gets m/M of the force at its position, M the mass of the group. Unlike with
-    force_nodes, the load moves with the points. In axisymmetry, forces are per radian. Publishes
-    the sum as ID_x, ID_y, ID_z; with twist, fz acts around the axis, and ID_z is its torque.
+    A point of mass m gets the fraction m/M of the force at its position, where M is the mass of the
+    group. Unlike force_nodes, the load moves with the points. In axisymmetry, forces are per
+    radian. Publishes the total force as ID_x, ID_y, ID_z; with twist, fz acts around the axis, and
+    ID_z is its torque.
 
     See Also
     --------
@@ -267,9 +268,9 @@ class ForceParticles(PointForces):
 
 
 def brake(node):
-    """Reduce the change of v* by forces by a fraction; the total is the force.
+    """Reduce the velocity change due to forces by a fraction, and return the damping force.
 
-    No effect if the motion is reversed, or a wall has stopped it.
+    There is no damping where the velocity changes sign, or a wall has stopped the node.
     """
     against = 0.0
     if node.v * node.v_star > 0:
@@ -295,12 +296,12 @@ class LocalDamping(Fix):
 
     Notes
     -----
-    The force f of a node becomes f - alpha |f| sign(v), by component (Cundall 1987). Neither a
-    state of rest nor steady motion is damped. With 0.8 a scene comes to rest within about ten
-    periods of its slowest vibration.
+    Each component f of the force on a node becomes f - alpha |f| sign(v) (Cundall 1987). Bodies at
+    rest or in steady motion are not damped. With 0.8 a scene comes to rest within about ten periods
+    of its slowest vibration.
 
-    The damping acts on the net force after all other fixes, in ulmpm/contacts after contact, so
-    touching bodies come to rest with correct contact forces. Nodes that are held or move at a
+    The damping uses the net force after all other fixes (in ulmpm/contacts also after contact), so
+    that touching bodies come to rest with correct contact forces. Nodes that are held or move at a
     prescribed constant velocity are not damped, so their reactions are correct. Publishes the sum
     of the damping forces as ID_x, ID_y, ID_z.
 
@@ -339,8 +340,8 @@ class InitialStress(Fix):
     Notes
     -----
     The stress of a hyperelastic material (neo-hookean, orthotropic) follows from its deformation
-    and cannot be set. A warning names tension that a material cannot sustain, such as soil without
-    cohesion.
+    and cannot be set. A warning is given for tension that a material cannot sustain, such as soil
+    without cohesion.
     """
 
     published = ()
@@ -391,7 +392,7 @@ class Detonation(Fix):
 
     Notes
     -----
-    Other materials are unaffected.
+    Points of other materials are unaffected.
 
     See Also
     --------
@@ -425,7 +426,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Bodies with a tension that 10 % of their points cannot sustain."""
+    """Return bodies of which at least 10 % of the points cannot sustain their tension."""
     cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

@@ -17,7 +17,7 @@ from karamelo_py.styles.fixes.forces import refuse_following
 
 
 class GeostaticStress(Fix):
-    """Set the stress of ground under its weight once, before the next step, below any surface.
+    """Set the stress due to weight once, before the next step, in ground with any surface.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class GeostaticStress(Fix):
         Horizontal over vertical effective stress, as a function of x, y, z, x0, y0, z0, such as
         if(y0 < 5, 1.2, 0.5) for two layers.
     gravity
-        Acceleration against the last direction of the scene: y in 2D, z in 3D.
+        Gravitational acceleration, positive, against the last direction (y in 2D, z in 3D).
 
     Example
     -------
@@ -33,11 +33,12 @@ class GeostaticStress(Fix):
 
     Notes
     -----
-    The vertical stress of a point is the weight of the group's points above it, in columns as wide
-    as the largest point; layers may differ in material and in points per cell. A material with
-    pore_water is saturated up to its highest point in the column, with hydrostatic pressure, and
-    the stress is the effective stress. With fix body_force, ground with a level surface is at rest,
-    and a slope is close to it. The material must accept a stress: see initial_stress.
+    The vertical stress at a point is the weight per area of the points of the group above it,
+    summed in columns as wide as the largest point. Layers may differ in material and in points per
+    cell. A material with pore_water is saturated up to its highest point in the column, with
+    hydrostatic pressure, and the stress is the effective stress. Under fix body_force, ground with
+    a level surface is then in equilibrium, and a slope nearly so. The material must accept a
+    stress: see initial_stress.
 
     See Also
     --------
@@ -82,9 +83,9 @@ class GeostaticStress(Fix):
 
 
 def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Steps (n, d) from points of a solid to the centres of their boxes.
+    """Return vectors (n, d) from points of a solid to the centres of their boxes.
 
-    Gauss points (and Karamelo's three per cell) are not at these centres.
+    Gauss points (and Karamelo's three per cell) are not at the centres.
     """
     step = np.zeros_like(x)
     for along, length, out in zip(x.T, size.T, step.T, strict=True):
@@ -93,7 +94,7 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
         begins = np.diff(at, prepend=-np.inf) > 1e-6 * long
         line, at, long = np.cumsum(begins) - 1, at[begins], long[begins]
         middle = np.cumsum(long) - long / 2
-        # A gap divides the solid.
+        # Points on both sides of a gap belong to different pieces.
         piece = np.cumsum(np.diff(at - 1.5 * middle, prepend=np.inf) > 0)
         off = np.bincount(piece, at - middle) / np.bincount(piece)
         to = middle + off[piece] - at
@@ -103,11 +104,11 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weight per area (n, k) above the centres of points that are boxes.
+    """Return the weight per area (n, k) above the centres of points, taken as boxes.
 
     `x`, `size` (n, d): centres and sizes; the last direction is up. `weights` (n, k) are per
-    volume. A box loads the columns that it overlaps, at least as wide as the widest box, and takes
-    the mean of their loads.
+    volume. Columns are at least as wide as the widest box. The weight of a box is added to all
+    columns that it overlaps, and its load is their mean.
     """
     flat, half = x[:, :-1], size[:, :-1] / 2
     begin = (flat - half).min(axis=0)
@@ -121,7 +122,7 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     boxes = np.tile(np.arange(len(x)), len(corners))
     fraction = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
     columns = np.concatenate([np.minimum(first + c, count - 1) for c in corners])
-    inner = fraction > 1e-9  # no second column for round-off
+    inner = fraction > 1e-9  # round-off adds no second column
     boxes, fraction, columns = boxes[inner], fraction[inner], columns[inner]
     column = np.tile(columns @ np.cumprod([1, *count])[:-1], 3)
     # The load in a column is linear between the tops and bottoms of boxes.

@@ -20,7 +20,7 @@ class GripOfTool(Grip):
 
 
 def memory_for(hub: Hub, kind: type) -> type:
-    """A class of `kind` that no other fix uses."""
+    """Return a subclass of `kind` that no other fix uses."""
     taken = {kind for fix in hub.fixes.values() for kind in fix.point_fields}
     k = 1
     while globals().get(f"{kind.__name__}{k}") in taken:
@@ -31,7 +31,7 @@ def memory_for(hub: Hub, kind: type) -> type:
 
 class Gripping(Fix):
     remembers = ("has_touched",)
-    has_touched = False  # until then, grips in a restart file belong to an earlier fix
+    has_touched = False  # until then, grips in a restart file are from an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
     memories: tuple[type, ...] = ()  # fields of this fix alone

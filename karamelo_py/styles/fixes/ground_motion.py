@@ -34,7 +34,7 @@ def push_z(normal, force, values, dt):
 
 
 def pushed(axis, normal, force, values):
-    """Add forces (rho A) c v across `axis`; `values` are c v."""
+    """Add the forces (rho A) c v on an edge normal to `axis`; `values` are c v."""
     added = type(force)(*[abs(normal[axis]) * values[k] for k in range(len(force))])
     return force + added, added
 
@@ -68,10 +68,13 @@ class BaseAcceleration:
         return BaseAcceleration(hub, formula)
 
     def take(self, axis: str) -> None:
-        """Choose the column of a direction."""
+        """Choose the column for a direction."""
 
     def motion(self, time: float, step: float, before: tuple[float, float]) -> tuple:
-        """Velocity, acceleration, and its rate in `step`; `before`: a time, its velocity."""
+        """Return velocity, acceleration, and its rate in `step`;
+
+        `before`: an earlier time and its velocity.
+        """
         since, speed = before
         at = np.array([since, (since + time) / 2, time, time + step])
         a = self.formula.evaluate_columns(self.hub.values, {"time": at})
@@ -80,7 +83,7 @@ class BaseAcceleration:
 
 
 class RecordedAcceleration(BaseAcceleration):
-    """A record in a file, linear between its times."""
+    """A record in a file, interpolated linearly in time."""
 
     is_constant, constant = False, nan
 
@@ -115,16 +118,16 @@ class RecordedAcceleration(BaseAcceleration):
 
 
 class GroundMotion(VelocityNodes):
-    """Shake the base of the ground by a record of acceleration.
+    """Shake the base of the ground by a record of acceleration, as in an earthquake.
 
     Parameters
     ----------
     acceleration
         ax, ay, az, one per dimension: a formula of time, or a file with the columns time and
-        acceleration (of several, those named ax, ay, az). NULL: none.
+        acceleration (if it has several, the columns named ax, ay, az). NULL: no acceleration.
     through
-        A fix absorbing of the same nodes, for a compliant base. By default the base is rigid and
-        its nodes have the velocity of the record.
+        ID of a fix absorbing of the same nodes, for a compliant base. By default the base is rigid
+        and its nodes have the velocity of the record.
 
     Example
     -------
@@ -132,13 +135,13 @@ class GroundMotion(VelocityNodes):
 
     Notes
     -----
-    Accelerations are linear between the times of a file, 0 after the last one, and integrated from
-    rest; if the velocity does not return to 0, the base stays in motion. A rigid base reflects all
-    waves that return to it; NULL directions are free.
+    Accelerations from a file are interpolated linearly in time and 0 after the last row. They are
+    integrated from rest; if the final velocity of the record is not 0, the base remains in motion.
+    A rigid base reflects all waves that reach it; directions with NULL are free.
 
-    With `through`, waves enter and leave through the edge. The record is the outcrop motion of
-    rock, twice the incoming wave (Joyner & Chen 1975): its velocity v gives the traction rho c v of
-    the material of that fix, exact at normal incidence.
+    With `through`, waves enter and leave through the edge. The record is then the outcrop motion of
+    rock, twice the incoming wave (Joyner & Chen 1975): its velocity v is applied as the traction
+    rho c v, with the material of fix absorbing, which is exact at normal incidence.
 
     Publishes the force on the nodes as ID_x, ID_y, ID_z, and velocity and acceleration of the
     record as ID_vx, ID_ax and so on.
@@ -163,7 +166,7 @@ class GroundMotion(VelocityNodes):
         through: str | None = None,
     ):
         self.records = per_direction(hub, "a", acceleration)
-        # Formulas are made once the fix has its ID.
+        # `defined` makes the formulas, when the fix has its ID.
         unknown = [record and Velocity(Expression.seed("time")) for record in self.records]
         if through is None:
             super().__init__(hub, group, *unknown)
@@ -202,7 +205,7 @@ class GroundMotion(VelocityNodes):
         self.between_steps()
 
     def _velocity(self, axis: str) -> Expression:
-        """Velocity v + s (a + s j/2), s = time - since."""
+        """Return the velocity v + s (a + s j/2) with s = time - since."""
         v, a, j, since = (Expression.seed(f"{self.id}_{x}") for x in
                           (f"v{axis}", f"a{axis}", f"j{axis}", "since"))  # fmt: skip
         gone = Expression.seed("time").minus(since)

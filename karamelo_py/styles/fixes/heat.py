@@ -55,11 +55,11 @@ def check_coefficient(h: Expression) -> None:
         raise ScriptError(message, argument="h", expected=expected)
 
 
-MANY = 1_000_000  # points of a solid; larger ones skip the check
+MANY = 1_000_000  # points of a solid above which the check is skipped
 
 
 def hold_node(node):
-    """Set T to the value; the total is the heat per time needed."""
+    """Set T to the value; the published sum is the heat per time that this needs."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
@@ -79,15 +79,15 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the heat per time needed as ID_s. Of several such fixes on a node, the last decides
-    and gets its heat.
+    Publishes the required heat per time as ID_s. If several such fixes include a node, the last one
+    applies and publishes the heat.
 
     See Also
     --------
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    # The temperature gradient for the heat flow uses the value.
+    # The temperature gradient for the heat flow must contain the prescribed value.
     post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(hold_node, holds=True)
 
@@ -105,7 +105,7 @@ def hold_point(pt):
 
 
 class TemperatureParticles(HeatFix):
-    """Prescribe the temperature of points, which heat their surroundings.
+    """Prescribe the temperature of points, which then heat or cool the points around them.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class TemperatureParticles(HeatFix):
 
     Notes
     -----
-    Publishes nothing.
+    The fix publishes nothing.
 
     See Also
     --------
@@ -165,7 +165,7 @@ class HeatFluxParticles(FacesOfPoints):
     Parameters
     ----------
     group
-        A single layer along the surface.
+        A single layer of points along the surface.
     q
         Heat per area and time, negative if it leaves the body, a function of x, y, z, x0, y0, z0,
         time and published values.
@@ -176,11 +176,12 @@ class HeatFluxParticles(FacesOfPoints):
 
     Notes
     -----
-    A point has one outer face, the side of a cube of its volume; in 1D, the whole section. A point
-    at an edge of the body needs two fixes. In axisymmetry the face is at the radius of the point,
-    slightly inside the surface. On curved surfaces the printed area depends on the layer of points
-    (0.66 to 1.44 of the surface); edge_heat_flux uses the exact area. Publishes the heat per time
-    (in 2D per thickness, in axisymmetry per radian) as ID_s.
+    Each point has one outer face, with the area of a side of a cube of its volume (in 1D the whole
+    section). A point at a corner of the body, with two outer faces, needs two fixes. In axisymmetry
+    the face is at the radius of the point, slightly inside the surface. On curved surfaces the
+    total area, which is printed, is 0.66 to 1.44 of the true area, depending on the layer of
+    points; edge_heat_flux uses the exact area. Publishes the heat per time (in 2D per thickness, in
+    axisymmetry per radian) as ID_s.
 
     See Also
     --------
@@ -195,9 +196,9 @@ class HeatFluxParticles(FacesOfPoints):
 
 
 def exchange(pt):
-    """Newton's law of cooling, at the point's temperature after the step.
+    """Apply Newton's law of cooling, with the temperature of the point after the step.
 
-    Otherwise a large coefficient would cool the point below the fluid.
+    With the temperature before the step, a large coefficient would cool the point below the fluid.
     """
     if not pt.capacity > 0:
         return 1.0, pt.supply, pt.T
@@ -211,7 +212,7 @@ class ConvectionParticles(FacesOfPoints):
     Parameters
     ----------
     group
-        A single layer along the surface.
+        A single layer of points along the surface.
     h
         Heat transfer coefficient, heat per area, time and kelvin, a function of x, y, z, x0, y0,
         z0, time and published values.
@@ -232,7 +233,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    order = LAST  # the temperature monitor bounds the heat of other fixes
+    order = LAST  # limits the heat that other fixes have added
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

@@ -19,7 +19,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.erosion import Erosion
 from karamelo_py.styles.fixes.velocity_nodes import Velocity, VelocityNodes
 
-MOST = 20_000_000  # points that wait to enter
+MOST = 20_000_000  # points that have not entered yet
 ALIKE = 1e-6  # round-off of positions, in cells
 
 
@@ -36,16 +36,16 @@ class Inlet(Region):
 
 
 class Inflow(VelocityNodes):
-    """Feed material at a velocity through the region that a solid fills at the start.
+    """Feed material into the scene, at a prescribed velocity, through an inlet that a solid fills.
 
     Parameters
     ----------
     solid
-        It fills the inlet, at least one cell long: its points enter first, layer by layer.
+        The solid that fills the inlet, at least one cell long. Its layers of points enter first.
     velocity
-        vx, vy, vz, one per dimension, of which one is not 0.
+        vx, vy, vz, one per dimension; exactly one of them is not 0.
     until
-        Time of the last layer.
+        Time at which the last layer enters.
 
     Example
     -------
@@ -53,10 +53,11 @@ class Inflow(VelocityNodes):
 
     Notes
     -----
-    Nodes of the inlet have the velocity. A layer of points enters at its upstream end whenever the
-    previous layer has moved by the spacing of the layers, so that the mass is exact. The layers
-    repeat the solid, and ids follow the order of entry. All points up to the time `until` are
-    created before the first run. The energy balance counts the energy of entering points as work.
+    Nodes of the inlet have this velocity. A layer of points enters at the upstream end of the inlet
+    whenever the previous layer has moved by the layer spacing, so that the inflow of mass is exact.
+    The layers of the solid are repeated in order, and ids follow the order of entry. All points up
+    to the time `until` are created before the first run. The energy balance counts the energy of
+    entering points as work.
 
     Publishes the force on the nodes of the inlet as ID_x, ID_y, ID_z, and the number and mass of
     the points that have entered as ID_points and ID_mass.
@@ -103,10 +104,10 @@ class Inflow(VelocityNodes):
         self.entered = 0
         self._fill(hub, until)
         super().__init__(hub, group, *v)
-        self.held_directions = ()  # no wall: splines reach past it
+        self.held_directions = ()  # it is no wall: splines are not modified there
 
     def _inlet(self, hub: Hub) -> Inlet:
-        """Cells of the solid, and upstream cells whose nodes its points reach."""
+        """Return the cells of the solid, and upstream cells that its points reach."""
         solid, lattice = self.solid, hub.lattices[0]
         d, h, far = hub.domain.dimension, lattice.h, hub.update.method.basis.traits.cells // 2
         corner = lattice.lo[:d]
@@ -180,7 +181,7 @@ class Inflow(VelocityNodes):
         before = self.entered
         if not self.looked:
             self.looked = True
-            self._refuse_others()  # later solids
+            self._refuse_others()  # solids may have been added
         while self.entered < self.layers:
             gone = self.hub.update.time - (self.entered + 1) * self.distance / self.speed
             if gone < 0:
@@ -213,9 +214,9 @@ class Outflow(Erosion):
     Parameters
     ----------
     region
-        Where points leave.
+        ID of the region in which points are removed.
     every
-        Checks follow steps whose number is a multiple of this.
+        Number of steps between checks.
 
     Example
     -------

@@ -16,12 +16,12 @@ def damp(node):
 
 
 class MassDamping(Fix):
-    """Damp the velocity v of nodes by forces -rate m v: a layer that absorbs waves.
+    """Damp the velocity v of nodes by forces -rate m v, as in a layer that absorbs waves.
 
     Parameters
     ----------
     rate
-        In 1/time, a function of x0, y0, z0 and time. A wave decays by exp(-rate t/2).
+        Damping rate in 1/time, a function of x0, y0, z0 and time. A wave decays by exp(-rate t/2).
 
     Example
     -------
@@ -30,10 +30,10 @@ class MassDamping(Fix):
     Notes
     -----
     For waves, put a layer before fix absorbing with a thickness L of one wavelength, and a rate
-    that grows with the square of the depth to 6 c/L at the edge (c: P wave speed). It reflects
-    below 0.2 % of the energy of P and S waves at up to 45 degrees. Rigid motion is damped, too
-    (mass-proportional Rayleigh damping). In saturated ground it acts on the soil, which drags the
-    water.
+    that grows with the square of the depth to 6 c/L at the edge (c: P wave speed). Less than 0.2 %
+    of the energy of P and S waves at up to 45 degrees is then reflected. The damping is
+    mass-proportional Rayleigh damping, so rigid motion is damped, too. In saturated ground it acts
+    on the soil; the water is damped by drag.
 
     Publishes the sum of the damping forces as ID_x, ID_y, ID_z.
 

@@ -17,7 +17,7 @@ def momentum_rate(pt):
     return pt.v, pt.x, pt.mass * pt.v / pt.kick
 
 
-# Quantities at nodes or points, and when they are measured in a step.
+# For each quantity: when it is measured in a step, and how, at nodes or points.
 HOOKS = {
     "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
     "force": ("post_update_grid_state", node_hook(force_of_nodes)),
@@ -63,9 +63,9 @@ class CheckSolution(Fix):
 
     Notes
     -----
-    Publishes ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), the present error; over the outputs so
-    far ID_x = sum dt sum V0 |u - u_exact|^2, ID_y = sum dt sum V0 |u_exact|^2, and the relative
-    error ID_z = sqrt(ID_x / ID_y).
+    Publishes the present error ID_s = sqrt(sum V0 |u - u_exact|^2 / sum V0), and, summed over the
+    outputs so far, ID_x = sum dt sum V0 |u - u_exact|^2, ID_y = sum dt sum V0 |u_exact|^2, and the
+    relative error ID_z = sqrt(ID_x / ID_y). V0 is the initial volume of a point, dt the time step.
     """
 
     syntax = "group, ux[, uy[, uz]]"

@@ -24,7 +24,7 @@ from karamelo_py.styles.fixes.forces import torques
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.grip import Gripping
 
-SENT = 350  # bytes per point, to the process that searches for pairs
+SENT = 350  # bytes per point sent to the process that searches for pairs
 
 
 def check_pair(solid1: Solid, solid2: Solid) -> None:
@@ -41,7 +41,7 @@ class PairContact(Gripping):
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = exerts = True
-    conserves = True  # except the work of the forces, which is summed
+    conserves = True  # apart from the work of the forces, which is summed
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))
@@ -63,9 +63,9 @@ class PairContact(Gripping):
         self._reach = max(solid.h for solid in self.solids)
 
     def law(self) -> NamedTuple:
-        """Tag of :mod:`karamelo_py.points.bodies` for the force between two points.
+        """Return the tag of the force law between two points (:mod:`karamelo_py.points.bodies`).
 
-        Read in each step, as constants may change between runs.
+        It is called in each step, since constants may change between runs.
         """
         raise NotImplementedError
 
@@ -96,11 +96,11 @@ class PairContact(Gripping):
         torque[:] = turning[: len(torque)]
 
     def sent(self, simulation: Any) -> int:
-        """Number of points that may touch."""
+        """Return the number of points that may touch."""
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Rows of points in the overlap of the solids' extended boxes, or None."""
+        """Return rows of points in the overlap of the solids' extended boxes, or None."""
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
@@ -129,7 +129,7 @@ class PairContact(Gripping):
     def _push(
         self, kin: Any, times: tuple[float, float, float], tables: list[np.ndarray]
     ) -> list[tuple]:
-        """Forces and grips of the points of each process, their sum, and torques."""
+        """Return forces and grips of the points of each process, the total force, and torques."""
         of_all, d = np.concatenate(tables), kin.dimension
         begin, end = self._ranges[:2]
         second = (of_all[:, 0] < begin) | (of_all[:, 0] >= end)
@@ -160,7 +160,7 @@ gain(
 
 
 class ContactMinimizePenetration(PairContact):
-    """Point-to-point contact of two solids, as stiff as the step allows, with friction.
+    """Apply point-to-point contact of two solids, as stiff as the step allows, with friction.
 
     Parameters
     ----------
@@ -183,16 +183,16 @@ class ContactMinimizePenetration(PairContact):
     times this force, stops and reverses the slip (de Vaucorbeil & Nguyen 2021, "Modelling contacts
     with a total Lagrangian material point method"): a point at rest is displaced by at most mu p.
 
-    dt is the step of the scene, not one shortened to end a run on time. If steps drop suddenly, it
-    decreases by 1 % of the elapsed time.
+    In this formula, dt is the regular step, not one shortened to end a run on time. If the step
+    drops suddenly, dt follows gradually, by 1 % of the elapsed time per step.
 
-    A surface of spheres is rough. The force on a block (two points per cell and direction) is 0.19,
-    0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces inclined to the grid lock:
-    on a slope of 20 degrees with mu = 0 a block sticks, and with points=cut it accelerates by 2.8
-    instead of 3.4. For correct friction use method ulmpm/contacts.
+    Surfaces made of spheres are rough: the force to push a block (two points per cell and
+    direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces
+    inclined to the grid interlock: on a slope of 20 degrees with mu = 0, a block sticks, or with
+    points=cut accelerates at 2.8 instead of 3.4 m/s^2. Friction is correct in ulmpm/contacts.
 
-    The cost is proportional to the number of points that may touch; the first of several processes
-    searches among them.
+    The cost is proportional to the number of points that may touch. With several processes, the
+    first one searches for all contacts.
 
     See Also
     --------
@@ -236,12 +236,12 @@ def plane_modulus(solid: Solid, argument: str) -> float:
 
 
 class ContactHertz(PairContact):
-    """Point-to-point contact of two solids with Hertz forces, without friction.
+    """Apply point-to-point contact of two solids with Hertz forces, without friction.
 
     Parameters
     ----------
     solid1, solid2
-        Their materials have a Young's modulus and a Poisson's ratio.
+        IDs of the two solids, whose materials must have a Young's modulus and a Poisson's ratio.
 
     Example
     -------
@@ -251,18 +251,18 @@ class ContactHertz(PairContact):
     -----
     Points are spheres as in contact/minimize_penetration. Two points that overlap by p repel each
     other with 4/3 E* sqrt(R p^3) in 3D and pi/4 E* sqrt(R p^3) otherwise, where R = R1 R2 / (R1 +
-    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. It is meant for single points: bodies overlap
-    noticeably before the force is large, and a fast body may pass through.
+    R2) and 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. The law is meant for bodies of a single point
+    each: larger ones overlap noticeably before the force is large, and may pass through each other.
 
-    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. The
-    first of several processes searches for pairs.
+    Publishes the force on solid1 as ID_x, ID_y, ID_z; the force on solid2 is the opposite. With
+    several processes, the first one searches for pairs.
 
     See Also
     --------
     contact/minimize_penetration, method tlmpm
     """
 
-    # Points around an axis or centre are rings, not balls.
+    # Points of axisymmetric, cylindrical or spherical scenes are rings or shells, not balls.
     restrictions = Restrictions("hertz", "minimize_penetration", only={"kinematics": FLAT})
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
@@ -280,7 +280,7 @@ class ContactFriction(Fix):
     Parameters
     ----------
     solid1, solid2
-        One fix per pair; other pairs are frictionless.
+        IDs of the two solids. Each pair needs a fix; contact of other pairs is frictionless.
     mu
         Coefficient of friction (Coulomb); or ``no-slip``: the solids stick while pressed together.
 
@@ -292,11 +292,11 @@ class ContactFriction(Fix):
     -----
     Publishes the contact force of solid2 on solid1 as ID_x, ID_y, ID_z.
 
-    A liquid or gas rubs at nodes within half a cell of a rigid solid.
+    Friction acts on a liquid or gas at nodes within half a cell of the surface of a rigid solid.
 
-    Frictional work heats solids with a temperature: half each, or all of it if only one has a
-    temperature; with ``thermo-mechanical`` by the effusivities sqrt(kappa rho cp), as between
-    half-spaces.
+    Frictional work heats solids with a temperature: half of it each, or all of it one if the other
+    has no temperature. With ``thermo-mechanical``, it is divided in proportion to the effusivities
+    sqrt(kappa rho cp), as between half-spaces.
 
     See Also
     --------

@@ -15,7 +15,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Return the pressure; publish the mass of water per time that left."""
+    """Return the pressure; publish the mass of water per time that has left."""
     return (values[0], 0 * values[0]), flux[-3]
 
 
@@ -24,7 +24,7 @@ def give_one_way(flux, values, dt):
 
 
 def supply(given, values, dt):
-    """Return the flux; publish minus the mass per time that entered."""
+    """Return the flux; publish the negative mass per time that has entered."""
     q, way, rho = values
     ways = range(len(given))
     gave = total([where(way == k, given[k], 0) for k in ways])
@@ -37,7 +37,7 @@ FROM_FLUX: dict[str, Any] = {
 
 
 class PorePressure(Fix):
-    """Open nodes to water at a given pressure: drains, free surfaces, reservoirs.
+    """Prescribe the pore pressure at nodes, where water can enter and leave: drains, reservoirs.
 
     Parameters
     ----------
@@ -51,10 +51,10 @@ class PorePressure(Fix):
 
     Notes
     -----
-    Other surfaces are impermeable. The group contains the nodes at the surface, or on both sides of
-    a surface that settles within a cell (ulmpm). The pressure does not load the soil: add the
-    weight of a lake on its bed by fix edge_traction. Publishes ID_s, the mass of water per time
-    that left in the previous step.
+    Surfaces without this fix are impermeable. The group should contain the nodes at the surface,
+    or, in ulmpm, on both sides of a surface that moves within a cell. The pressure does not load
+    the soil: add the weight of a lake on its bed by fix edge_traction. Publishes ID_s, the mass of
+    water per time that left in the previous step.
 
     See Also
     --------
@@ -78,12 +78,12 @@ class PorePressure(Fix):
 
 
 class SeepageFace(PorePressure):
-    """Let water seep out of nodes at a surface, but not in: a slope, a well, a dam's toe.
+    """Let water seep out of the soil at nodes, but not in: a slope, a well, a dam's toe.
 
     Parameters
     ----------
     p
-        Pressure where water leaves, usually 0.
+        Pressure at which water leaves, usually 0.
 
     Example
     -------
@@ -91,8 +91,8 @@ class SeepageFace(PorePressure):
 
     Notes
     -----
-    A node is open, at the pressure p, while the pressure in the soil is above p; otherwise it is
-    impermeable. Publishes ID_s, as fix pore_pressure does.
+    While the pressure in the soil is above p, a node is open and has the pressure p; otherwise it
+    is impermeable. Publishes ID_s, as fix pore_pressure does.
 
     See Also
     --------
@@ -103,7 +103,7 @@ class SeepageFace(PorePressure):
 
 
 class WaterFlux(Fix):
-    """Give water to nodes at a rate: rain, wells, injection.
+    """Prescribe the inflow of water at nodes: rain, wells, injection.
 
     Parameters
     ----------
@@ -111,8 +111,8 @@ class WaterFlux(Fix):
         Volume of water that enters per time and area of the surface (negative: leaves), a function
         of x0, y0, z0, time and published values.
     through
-        Faces that it enters through, by their outward direction, or any ``surface``. ``volume``: q
-        is per volume of the body.
+        Faces through which the water enters, named by their outward direction, or any ``surface``.
+        ``volume``: q is per volume of the body instead.
 
     Example
     -------
@@ -121,8 +121,8 @@ class WaterFlux(Fix):
 
     Notes
     -----
-    Nodes that are open at the same time (fix pore_pressure, or a fix seepage_face under water) let
-    the flux out at once: rain runs off. Publishes ID_s, the mass of water per time that left in the
+    At nodes that are also open (fix pore_pressure, or an active fix seepage_face), the inflow
+    leaves at once: rain runs off. Publishes ID_s, the mass of water per time that left in the
     previous step: negative if it entered.
 
     See Also
@@ -164,12 +164,12 @@ class WaterFlux(Fix):
 
 
 class InitialPorePressure(Fix):
-    """Set the pressure of the water of points once, before the next step.
+    """Set the pore pressure of points once, before the next step.
 
     Parameters
     ----------
     p
-        Pressure, a function of x, y, z, x0, y0, z0.
+        Pore pressure, a function of x, y, z, x0, y0, z0.
 
     Example
     -------
@@ -177,7 +177,7 @@ class InitialPorePressure(Fix):
 
     Notes
     -----
-    Dry points are unaffected. The soil is not loaded: see fix initial_stress.
+    Dry points are unaffected. The stress of the soil does not change: see fix initial_stress.
 
     See Also
     --------

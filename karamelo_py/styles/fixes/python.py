@@ -35,7 +35,7 @@ class PythonFunction:
 
     @classmethod
     def from_script(cls, hub: Hub, argument: Argument) -> Callable:
-        """Import the function; modules next to the script come first."""
+        """Import the function; modules next to the script take precedence."""
         name = argument.words()
         if name in hub.functions:
             return hub.functions[name]
@@ -75,7 +75,7 @@ class Python(Fix):
     group
         Group of points or of nodes, or ``all``.
     function
-        ``module.function``, of a module next to the script or installed.
+        ``module.function``, from a module next to the script or an installed one.
     moment
         When it is called in a step. Default for points: ``initial_integrate``, where
         ``points.force`` accepts forces; for nodes: ``post_update_grid_state``, where
@@ -84,20 +84,21 @@ class Python(Fix):
     Notes
     -----
     The function gets a view of the group: dt, time, and arrays with a row per member (position,
-    velocity, mass, force ...; see the page on plug-ins). Changes to them take effect. The return
-    value is published: a number as ID, up to three as ID_x, ID_y, ID_z. A call costs some ten
-    microseconds.
+    velocity, mass, force ...; see the page on plug-ins). The function may change these arrays. Its
+    return value is published: a number as ID, up to three numbers as ID_x, ID_y, ID_z. A call costs
+    about ten microseconds.
 
-    With several processes all points are gathered in each step. Set ``pull.point_by_point = True``
-    for a function ``pull`` that treats each point or node separately and moves no points: each
-    process then calls it for its points, in any order. ``points.total(terms)`` sums terms (n,) or
-    (n, k) over all points.
+    With several processes, all points are gathered in each step, which is slow. If a function
+    ``pull`` treats each point or node separately and moves no points, set ``pull.point_by_point =
+    True``: each process then calls it for its own points, in any order. ``points.total(terms)``
+    sums terms (n,) or (n, k) over all points.
 
-    Restart files contain values that the function stores between steps if its module, or the class
-    of a callable object, names them: ``remembers = ("taken", "left")``. They are numbers, texts,
-    arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. The first file warns
-    of other such data that has changed, except in defaults of arguments, other objects and modules,
-    and ``np.random``.
+    Restart files contain the values that the function stores between steps if its module, or the
+    class of a callable object, names them: ``remembers = ("taken", "left")``. Such values are
+    numbers, texts, arrays, NumPy generators, or lists, tuples, sets and dictionaries of these. When
+    the first file is written, a warning names other values of the module or object that have
+    changed; changes in defaults of arguments, in other objects and modules, and in ``np.random``
+    are not detected.
 
     Example
     -------
@@ -154,7 +155,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of values that restart files lack."""
+        """Warn once of values that are missing in restart files."""
         keeper = self.keeper
         forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
@@ -206,7 +207,7 @@ class Python(Fix):
 
 
 class Keeper:
-    """Object or module of a function, and its stored values.
+    """Object or module of a function, with the values it stores.
 
     `names` are the names in ``remembers``; `title` names the object.
     """
@@ -236,7 +237,7 @@ class Keeper:
         data = dict(self.data)
         if inspect.isfunction(self.function):
             seen = inspect.getclosurevars(self.function)
-            # A notebook defines many unrelated names.
+            # The module of a notebook has many unrelated names.
             module = sys.modules.get(self.function.__module__)
             notebook = self.function.__module__ == "__main__" or module is None
             data = (dict(seen.globals) if notebook else data) | dict(seen.nonlocals)
