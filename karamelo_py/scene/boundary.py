@@ -30,9 +30,10 @@ RESTRICTIONS = {
 
 
 def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
-    """Delete points that left the domain in a failed step, whose start `repeat` restores.
+    """Undo a step in which points left the domain, and delete them; return whether there are any.
 
-    The result depends on the state only, not on threads or on how a run is divided.
+    `repeat` restores the state before the step. The result is independent of the number of threads
+    and of how a run is divided.
     """
     if hub.update.boundary != "delete":
         return False
@@ -58,10 +59,7 @@ def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> b
 
 
 def take_away(hub: Scene, ids: np.ndarray, mark: Mark | None) -> tuple[float, float]:
-    """Delete points (ids, ascending); return their mass and energy.
-
-    The energy balance counts the energy as negative work.
-    """
+    """Delete points with ascending `ids`; return their mass and energy (negative work)."""
     simulation = hub.simulation
     for body, fix in moved(hub).items():
         if np.any((ids >= body.first_id) & (ids < body.first_id + body.count)):

@@ -1,7 +1,7 @@
 """Volumes and centroids of point boxes clipped at the edge of a region.
 
-The surface in a box is a plane, fitted to `Region.depth` at the corners and the centre. Boxes where
-a plane does not fit are halved, up to `HALVED` times.
+The surface in a box is approximated by a plane, fitted to `Region.depth` at the corners and the
+centre. A box in which this is not accurate is halved, up to `HALVED` times.
 """
 
 import itertools
@@ -12,38 +12,37 @@ import numpy as np
 
 from karamelo_py.scene.region import Region
 
-HALVED = 5  # per direction
-PLANE = 0.01  # distance from a plane over box size
-EDGE = 0.05  # for a sub-box, whose edge would otherwise be sharp
-SHEET = 0.01  # for a surface that may belong to a thin sheet
+HALVED = 5  # times, in each direction
+PLANE = 0.01  # tolerated distance of the surface from a plane, over box size
+EDGE = 0.05  # the same for the smallest sub-boxes
+SHEET = 0.01  # the same for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off over box size
-# Fraction of a box in the smallest sub-boxes that are not plane: 1/3 of it at a corner in 2D or an
-# edge in 3D. Thinner sheets have more, or are mostly such sub-boxes.
+# Fraction of a box that consists of smallest sub-boxes with a surface that is not plane: 1/3 of
+# ROUGH at a corner in 2D or an edge in 3D, more in thin sheets.
 ROUGH = 0.025
 MOSTLY = 0.1
-FACE = 2  # pieces of a face per direction
-SLOPE = 1e-3  # relative to the largest; smaller slopes are zero, as sums would lose their digits
+FACE = 2  # pieces of a box face per direction
+SLOPE = 1e-3  # smaller slopes, relative to the largest, count as 0: sums would lose their digits
 
 
 class Pieces(NamedTuple):
-    number: np.ndarray  # (n,) of the box, ascending
+    number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) of the box volume
-    # (m,) fraction of each box in the smallest sub-boxes that are not plane
+    # (m,) fraction of each box in smallest sub-boxes with a surface that is not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
-        """Smallest thickness that is resolved; 0: all."""
+        """Return the smallest thickness that is resolved; 0: any thickness."""
         mostly = self.rough.sum() > MOSTLY * self.fraction.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Clip boxes of edge `size` around `x` (n, d): mask, and pieces at the region's edge.
+    """Clip boxes of edge `size` around `x` (n, d); return a mask, and pieces of cut boxes.
 
-    Boxes end at the domain and at the region's bounding box, so that faces along the axes are
-    exact.
+    Boxes are first cut at the domain and the region's bounding box: faces along axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -70,10 +69,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger one in an adjacent box.
-
-    Their fraction becomes 0.
-    """
+    """Merge small pieces into the nearest larger ones in adjacent boxes, with 0 as fraction."""
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -114,12 +110,12 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Volume fraction (n,), moment (n, d) and `Pieces.rough` of clipped boxes."""
+    """Return volume fraction (n,), first moment (n, d) and `Pieces.rough` of clipped boxes."""
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
     box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
-    # Regions read one direction after another: contiguous rows.
+    # Rows of one direction are contiguous, as regions use one direction after another.
     lo, edges = lo[box].T, edges[box].T
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=d)))
     places = np.concatenate([corners, np.full((1, d), 0.5)])
@@ -138,7 +134,7 @@ def _measure(
         whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
         passed = (np.abs(inmost) < reach) & ~whole
         slopes[:, ~passed] = 0
-        # A surface that neither corners nor centre reveal may be a sheet.
+        # If corners and centre are on the same side, the surface may belong to a sheet.
         unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
         edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
         bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))
@@ -160,9 +156,9 @@ def _measure(
 
 
 def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.ndarray]:
-    """Area times outward normal (n, d), and a position on the surface (n, d), in each box.
+    """Return area times outward normal (n, d), and a surface position (n, d), in each box.
 
-    They follow from the covered areas of opposite faces, so that the sum over boxes is exact.
+    The area follows from the covered areas of opposite faces, so that the sum over boxes is exact.
     """
     n, d = x.shape
     ends = np.array(list(itertools.product((0.0, 1.0), repeat=d - 1)))
@@ -173,7 +169,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
         covered = []
         for side in (-0.5, 0.5):
             at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
-            # A face along the surface is covered for neither of its boxes.
+            # A box face that lies in the surface is covered for neither of its boxes.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
@@ -185,10 +181,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Fraction (n,) and centroid (d, n) of the part of a unit cube above a plane.
-
-    The part is where mean + slopes (x - 1/2) > 0.
-    """
+    """Return fraction (n,) and centroid (d, n) of a unit cube where mean + slopes (x - 1/2) > 0."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)
@@ -202,7 +195,7 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve `_plane` for slopes -`m` < 0 (d, n).
+    """Return the results of `_plane` for slopes -`m` < 0 (d, n).
 
     The part is a simplex at the lowest corner, minus (plus, minus ...) the simplices at the other
     corners, which lie outside the cube.

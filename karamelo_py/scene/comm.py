@@ -1,4 +1,4 @@
-"""Signals, and communication of one process (several: :mod:`karamelo_py.run.mpi.comm`)."""
+"""Signals, and the communicator of a single process (see also :mod:`karamelo_py.run.mpi.comm`)."""
 
 import signal
 import threading
@@ -12,7 +12,7 @@ import numpy as np
 from karamelo_py.script.errors import ScriptError
 
 T = TypeVar("T")
-# Ctrl-C; batch systems and kill; a closed terminal (not reported on Windows).
+# Sent by Ctrl-C; by batch systems and kill; and when a terminal closes (not on Windows).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 
@@ -25,7 +25,7 @@ def handled_signals(
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    # Ignored signals let the program outlive the terminal (nohup).
+    # Signals that are ignored stay ignored, as for nohup.
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:
         signal.signal(number, handler)
@@ -40,11 +40,11 @@ class SerialComm:
     """Communicator of one process; methods are collective."""
 
     rank, size = 0, 1
-    beside = 1  # processes on this one's cores, including it
+    beside = 1  # number of processes that use the cores of this one, including itself
     on_machine = 1
     waited = 0.0  # seconds
     failed_within = False
-    at_end = False  # all processes have ended the run alike
+    at_end = False  # all processes have reached the same end of the run
 
     @property
     def leads(self) -> bool:
@@ -70,7 +70,7 @@ class SerialComm:
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Words (size,) of all processes; None if one is late by `patience` seconds."""
+        """Return the words (size,) of all processes; None if one is late by `patience` seconds."""
         return np.array([word])
 
     def bcast(self, thing: T | None = None) -> Any:
@@ -113,7 +113,7 @@ class SerialComm:
         return numbers
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:
-        """Sum integers: any order gives equal bits."""
+        """Sum integers, which have equal bits in any order."""
         return array
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:

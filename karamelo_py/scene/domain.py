@@ -32,16 +32,16 @@ THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 class Domain:
     """A box with a grid of square cells from its lower corner.
 
-    The grid extends past an upper corner that is no multiple of `h` by less than a cell. `lo` and
-    `hi` (3,) are 0 in unused directions. Without `h`, the first solid sets the cell size.
+    If a side is not a multiple of `h`, the grid extends past the upper corner by less than a cell.
+    `lo` and `hi` (3,) are 0 in unused directions. Without `h`, the first solid sets it.
     """
 
     thin = False
     thickness = 1.0  # in 2D; cross-section in 1D
-    across: Any = None  # fix that prescribes the strain across
+    across: Any = None  # fix that prescribes the strain across a 2D scene
     mark: Mark | None = None
     periodic: tuple[int, ...] = ()  # directions
-    shear = 0.0  # velocity gradient of images, x along y
+    shear = 0.0  # velocity gradient dvx/dy of periodic images
     node_fields: tuple[type, ...] = ()
 
     def __init__(self, dimension: int, lo: Sequence[float], hi: Sequence[float], h: float | None):
@@ -66,18 +66,18 @@ class Domain:
         return round((self.hi[k] - self.lo[k]) / (self.h or 1.0))
 
     def with_images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ends (3,) of the grid, beyond the domain in periodic directions."""
+        """Return both ends (3,) of the grid, beyond the domain in periodic directions."""
         more = np.zeros(3)
         more[list(self.periodic)] = GHOSTS * (self.h or 0.0)
         return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Factor of volumes at `x` (n, d): the thickness, or the length or area per angle."""
+        """Return a factor of volumes at `x` (n, d): the thickness, or length or area per angle."""
         hoops = self.kin.hoops
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of the positions `x` (n, >= dimension) in the closed box."""
+        """Return the mask (n,) of positions `x` (n, >= dimension) in the closed box."""
         inside = np.ones(len(x), dtype=bool)
         for axis in range(self.dimension):
             inside &= x[:, axis] >= self.lo[axis] - self.tolerance

@@ -20,11 +20,11 @@ NOTHING_THERE = "fixes of this group have no effect there"
 
 
 class AnyGroup(Named):
-    """A group of points or nodes; `all` includes later ones.
+    """A group of points or nodes; `all` includes those that are added later.
 
-    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members other
-    than `all`; and ``add(region, solids)``, which returns the number added, 0 if the region is not
-    known yet.
+    Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members of a
+    group other than `all`; and ``add(region, solids)``, which returns the number of new members, 0
+    if the region is not known yet.
     """
 
     kind = ""
@@ -42,7 +42,7 @@ class AnyGroup(Named):
 
     @property
     def members(self) -> np.ndarray:
-        """Member numbers from 0, ascending: (n,) int64."""
+        """Return numbers of members from 0, ascending: (n,) int64."""
         return np.arange(self.total(), dtype=np.int64) if self.all else self.chosen()
 
     total: Callable[[], int]
@@ -72,7 +72,7 @@ class AnyGroup(Named):
 class ParticleGroup(AnyGroup):
     kind = "particles"
     script_kind = "a group of points, or all"
-    # From the lowest bit of a byte on, and 64 spare bits.
+    # Membership from the lowest bit of each byte on, with 64 spare bits at the end.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
@@ -107,7 +107,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Membership of `count` points, one bit each, in whole 64-bit words."""
+        """Return the membership of `count` points, one bit each, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -149,11 +149,11 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by position, stored as a definition, so that later grids have members, too."""
+    """Nodes by position; its definition is stored, so that nodes of later grids are included."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
-    awaits_solids = False  # later solids may add members
+    awaits_solids = False  # members may come with later solids
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)
@@ -182,7 +182,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """Refuse a group that looks like a wall at an upper edge but lies past it."""
+        """Refuse a group of nodes meant as a wall at an upper edge but outside the domain."""
         domain, method = self.hub.domain, self.hub.update.method
         if self.all or method is None or method.own_grids or not len(self.nodes):
             return
@@ -218,7 +218,7 @@ class NodeGroup(AnyGroup):
 
 
 def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:
-    """Nodes inside the periodic cell, together with those a period apart; ascending."""
+    """Return nodes inside the periodic cell and their images one period apart, ascending."""
     places = lattice.places(numbers)
     for k in domain.periodic:
         period = domain.cells_of_period(k)

@@ -1,4 +1,4 @@
-"""The hub (Karamelo's Pointers): the state of a scene, for commands and styles."""
+"""The hub: the state of a scene, for commands and styles (Karamelo's class Pointers)."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from karamelo_py.script.values import Values
 
 
 class Catalogue(dict):
-    """Named parts in creation order, which get ``id`` and ``mark``."""
+    """Parts by name, in the order of creation; a new part gets an ``id`` and a ``mark``."""
 
     def __init__(self, kind: str, hub: Hub):
         super().__init__()
@@ -107,7 +107,7 @@ class Settings:
         self.ranks = 1
         self.comm = SerialComm()
         self.debug = False
-        self.trusts = False  # .geo files may run programs
+        self.trusts = False  # whether .geo files may run programs
 
 
 class Update:
@@ -120,7 +120,7 @@ class Update:
         self.transfer: Any = None
         self.scheme: Any = MUSL()
         self.scheme_mark: Mark | None = None
-        self.scheme_behind = 0  # runs before it was chosen
+        self.scheme_behind = 0  # number of runs before it was chosen
         self.thermal = False
         self.anti_locking = False  # F-bar
         self.half_start = False  # the first kick lasts half a step
@@ -131,7 +131,7 @@ class Update:
         self.boundary_mark: Mark | None = None
         self.warned_of_bounces = False
         self.warned_of: list[str] = []
-        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run, and its start
+        self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run; its start
 
     def first_time(self, name: str) -> bool:
         first = name not in self.warned_of
@@ -184,18 +184,18 @@ class Hub:
         self.settings = Settings()
         self.folder = Path.cwd()
         self.mark: Mark | None = None
-        # Nothing runs or is written in a rehearsal.
+        # In a rehearsal nothing runs, and nothing is written.
         self.rehearsing = False
         self.rehearsed = False
-        self.scouting = False  # the first run ends the rehearsal
-        self.begun = 0  # including the rehearsal
-        self.answered = False  # the script printed, wrote or ended something
-        self.checking = False  # the first run only reports
-        self.pausing = False  # stops before runs, which a program controls
-        self.open_ended = False  # a program may continue after the script
+        self.scouting = False  # end the rehearsal at the first run
+        self.begun = 0  # runs begun, including those in the rehearsal
+        self.answered = False  # the script has printed or written something
+        self.checking = False  # at the first run only report, for ``check``
+        self.pausing = False  # stop before runs, which a Python program controls
+        self.open_ended = False  # a Python program may add commands after the script
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
-        self.restart: Any = None  # until the script has rebuilt the scene
+        self.restart: Any = None  # restart file, until the script has rebuilt the scene
         self.domain: Any = None
         self.announced_dimension: int | None = None
         self.regions = Catalogue("region", self)
@@ -205,20 +205,20 @@ class Hub:
         self.elements = Catalogue("element", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
-        # Ids of points absent at the start, and of points deactivated by the script.
+        # Ids of points that enter later, and of points deactivated by the script.
         self.waiting, self.inactive = np.empty((2, 0), np.int64)
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
         self.dumps = Catalogue("dump", self)
-        self.values = Values()  # of fixes and computes; time, timestep, dt
+        self.values = Values()  # published by fixes and computes; time, timestep, dt
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
-        self.asked: set[str] = set()  # values and columns that statements read, later ones too
-        self.functions: dict[str, Any] = {}  # passed by a program
+        self.asked: set[str] = set()  # values and columns that statements use, including later ones
+        self.functions: dict[str, Any] = {}  # Python functions passed by a program
         self.in_run = 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
-        self._fits_run = 0  # last run whose arrays fit the scene
+        self._fits_run = 0  # last run whose arrays still fit the scene
         self.runs: list[dict[str, float]] = []
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []
@@ -233,7 +233,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """True after the first run; in a rehearsal also before runs that will begin."""
+        """Whether a run has begun, in a rehearsal also one that will begin."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -252,7 +252,7 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """Grids of the method, or of the domain."""
+        """Return the grids of the method, or the grid of the domain."""
         key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
             self._lattices = key, method.lattices(self) if method else [self.domain.lattice]
@@ -291,7 +291,7 @@ class Hub:
                         item.mark,
                         hint="in the plug-in, call self.publish in refresh, or set published = ()",
                     )
-        # A plug-in's compute may use random numbers.
+        # Values of all processes must agree, even if a plug-in uses random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -313,7 +313,7 @@ class Hub:
             self.console.warn(text)
 
     def rehearse(self) -> None:
-        """Try the rest of the script once, before the first expensive work."""
+        """Read the rest of the script once for errors, before the first expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
             other = self.rehearsal() if self.interpreter.has_more else self

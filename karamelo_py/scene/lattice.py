@@ -10,10 +10,10 @@ import numpy as np
 from karamelo_py.points.grid import Grid
 from karamelo_py.script.errors import ScriptError
 
-# Points this far past a face (in cells) are on it.
+# Points up to this distance past a face (in cells) are on it.
 RELATIVE_TOLERANCE = 1e-9
 MAX_NODES = 2**31 - 1  # 32 bits in kernels
-# Points or nodes per batch: large for NumPy, small for caches and memory.
+# Points or nodes per batch: many for NumPy's overhead, few for caches and memory.
 CHUNK = 1 << 18
 
 
@@ -21,9 +21,9 @@ class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
     It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
-    cell centres; nodes added for `least_nodes` per direction have no mass. Numbers of nodes begin
-    at `first`, of cells at `first_cell`; `shape` and `cells` (3,) count them, with 1 in unused
-    directions. Raises ScriptError for more than `MAX_NODES` nodes.
+    cell centres, too. At least `least_nodes` are made per direction; extra ones have no mass. Nodes
+    are numbered from `first` and cells from `first_cell`; `shape` and `cells` (3,) are their counts
+    per direction, 1 in unused ones. Raises ScriptError for more than `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -63,11 +63,11 @@ class Lattice:
         return math.prod(self.shape)
 
     def places(self, numbers: np.ndarray) -> np.ndarray:
-        """Indices (n, 3): node (i, j, k) has the number `first` + (i ny + j) nz + k."""
+        """Return indices (n, 3): node (i, j, k) has the number `first` + (i ny + j) nz + k."""
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """Positions (n, 3) of nodes, by default of all."""
+        """Return positions (n, 3) of nodes, by default of all."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing
@@ -86,13 +86,13 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Cells (n, d) of positions; outside the grid, the nearest ones."""
+        """Return cells (n, d) of positions; outside the grid, the nearest cells."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
 
     def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
-        """Numbers (k, n) of nodes at `steps` along each axis from the first node of `cells`."""
+        """Return numbers (k, n) of nodes `steps` along each axis from the first node of `cells`."""
         shape = np.array(self.shape[: self.dimension])
         places = (
             np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
@@ -137,10 +137,7 @@ def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield indices (m, d) from `first` to `last`, the last axis fastest.
-
-    About CHUNK / `weight` indices come at a time.
-    """
+    """Yield indices (m, d), m about CHUNK / `weight`, from `first` to `last`, last axis fastest."""
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 

@@ -15,7 +15,7 @@ except ImportError:  # Windows
 from karamelo_py.language.scene import Scene
 from karamelo_py.script.errors import ScriptError, render_message
 
-# Fraction of all memory that the system reserves and releases when needed.
+# Fraction of memory that the system reserves but releases when needed.
 SLACK = 0.03
 
 # Control group files, versions 2 and 1: limit, usage, and droppable cache in memory.stat.
@@ -29,21 +29,21 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes, swap included; `free` omits caches that the system does not report (ZFS)."""
+    """Bytes, including swap; caches that the system does not report (ZFS) are not `free`."""
 
     free: float
     whole: float
 
 
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
-    """Memory with caches and swap; None if the system does not report it.
+    """Return the memory available to `processes`, or None if the system does not report it.
 
-    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) all count.
+    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) apply.
     """
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # about numbers not needed here
+        with warnings.catch_warnings(action="ignore"):  # it warns of numbers that are not used here
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
@@ -65,7 +65,7 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
             continue
         top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
         limit_file, used_file, dropped = _OF_GROUPS[bool(controllers)]
-        # A container may see the outer path; its limit is then at the top.
+        # A container may see its path in the host; its limit is then at the top.
         inner = top / path.strip("/")
         for folder in (inner, *inner.parents[: len(inner.parts) - len(top.parts)]):
             limit, used = (_number(folder / name) for name in (limit_file, used_file))
@@ -100,7 +100,7 @@ def taken() -> int:
 
 
 GIB = 2**30
-MANY = 20_000_000  # points; placing more takes seconds
+MANY = 20_000_000  # points above which placing them takes seconds
 
 
 def in_words(count: float) -> str:
@@ -110,9 +110,9 @@ def in_words(count: float) -> str:
 
 class Room(NamedTuple):
     whole: float  # bytes
-    of_one: int  # bytes, at least
+    of_one: int  # bytes of a point, at least
     already: int
-    single: bool  # precision
+    single: bool  # single precision
     say: Callable[[str], None] = lambda text: None
 
     @property
@@ -136,10 +136,10 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Room for points whose law has `state` state variables.
+    """Return the room for points whose law has `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers. The stored last
-    good state of a run has a position, a velocity and the state again.
+    A point has two positions, a velocity, a mass, the state and three integers; the last good state
+    that a run stores has a position, a velocity and the state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

@@ -10,7 +10,7 @@ from karamelo_py.language.arguments import Named
 class MaterialPart(Named):
     """A named law or component of a law, of a `kind` such as ``eos`` and a `style`.
 
-    `made` is the law, or `laws` by kind if the style has several; `given` are its arguments.
+    `made` is the law (if the style has several, `laws` are laws by kind), `given` the arguments.
     """
 
     def __init__(
@@ -30,7 +30,7 @@ class MaterialPart(Named):
         return self.laws[self.kind]
 
     def parts(self) -> Iterator["MaterialPart"]:
-        """Yield this and the parts that it was made of, and their parts."""
+        """Yield this part, the parts of which it consists, and their parts."""
         yield self
         for value in self.arguments.values():
             for one in value if isinstance(value, tuple) else (value,):
@@ -41,8 +41,8 @@ class MaterialPart(Named):
 class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
-    flat: type | None = None  # wraps the law in thin bodies and generalised plane strain
-    fluid: Any = None  # water in its pores: ``around(law)`` wraps the law
+    flat: type | None = None  # wrapper of the law in thin bodies and generalised plane strain
+    fluid: Any = None  # pore water; ``around(law)`` wraps the law
 
     @property
     def whole(self) -> NamedTuple:

@@ -1,8 +1,8 @@
 """Base classes of fixes and computes (Modify in LAMMPS and Karamelo).
 
-A fix overrides hooks, named as in Karamelo (docs/plugins.md): methods, called with a view of the
-group at that stage of each step, or compiled hooks of :func:`node_hook`, :func:`point_hook` or
-:func:`vector_hook`.
+A fix overrides hooks, which are named as in Karamelo (docs/plugins.md). A hook is a method, called
+with a view of the group at one stage of each step, or a compiled hook made by :func:`node_hook`,
+:func:`point_hook` or :func:`vector_hook`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -43,8 +43,8 @@ __all__ = [
 ]
 
 
-FIRST, USUAL, LAST = range(3)  # at a stage; USUAL: as in the script
-FROM_PYTHON = 3e-4  # seconds per call of a Python hook
+FIRST, USUAL, LAST = range(3)  # order within a stage; USUAL: as in the script
+FROM_PYTHON = 3e-4  # cost of a call of a Python hook, seconds
 
 
 class Publisher:
@@ -55,11 +55,11 @@ class Publisher:
     style: str = ""
     mark: Mark | None = None
     columns: Sequence[str] = ()  # dump columns that it reads
-    # Suffixes of values: "x" for ``ID_x``, "" for ``ID``.
+    # Suffixes of published values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
-    unit = NUMBER  # of its values
-    restrictions: Restrictions | None = None  # what it does not support
+    unit = NUMBER  # of the published values
+    restrictions: Restrictions | None = None  # options of a scene that it does not support
 
     def publish(self, name: str, value: float) -> None:
         if name not in self.published:
@@ -96,17 +96,17 @@ class Fix(Publisher):
     """Base of fixes, which act on a `group` during a run. Class attributes are traits."""
 
     group: Any = None
-    formulas: tuple = ()  # of compiled hooks: one or None per component
-    components: tuple = ()  # of a force in Python: a formula or None per direction
+    formulas: tuple = ()  # for compiled hooks: a formula or None per component
+    components: tuple = ()  # for a force in Python: a formula or None per direction
     first_step_only = False  # acts only in the first step after its definition
-    # Python hooks treat points or nodes separately and move none. They get local points in any
-    # order, before the first step in several calls. Sums need ``total``.
+    # True: Python hooks treat each point or node separately and move none. They get points of this
+    # process in any order, before the first step in several calls. Sums need ``total``.
     point_by_point = False
-    for_method = False  # read by the method; no hooks
-    # Prescribes nodal velocities in ``post_update_grid_state`` where there is a formula; contact
-    # does not change them.
+    for_method = False  # used by the method; it has no hooks
+    # Prescribes nodal velocities in ``post_update_grid_state`` in directions with a formula.
+    # Contact does not change them.
     prescribes_velocity = False
-    prescribes_rotation = False  # the angular velocity of its nodes, published as ID_s
+    prescribes_rotation = False  # prescribes the angular velocity of nodes, whose torque is ID_s
     # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
     # are all held.
     held_directions: tuple[int, ...] = ()
@@ -117,30 +117,30 @@ class Fix(Publisher):
     # ``initial_integrate``.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    by_sizes = False  # point sizes follow from volumes, without a thickness
+    by_sizes = False  # takes sizes of points from their volumes, for a thickness of 1
     impulsive = False  # removes a penetration within one step
-    leads_points = False  # prescribes the motion of points
+    leads_points = False  # prescribes velocities of points
     reads_itself = False  # its formulas may contain its own values
-    moves: Any = None  # rigid solid, by the forces on it
-    touches: Any = None  # rigid solid in contact with its points
-    links = False  # contact or joint between rigid bodies
+    moves: Any = None  # rigid solid that it moves by the forces on it
+    touches: Any = None  # rigid solid that is in contact with points
+    links = False  # is a contact or joint between rigid bodies
     ignites = False
-    follows_points = False  # force depends on positions of points (tools)
-    depth_of: Any = None  # depth (n,) of positions in a tool, for outlines in pictures
-    faces_of: Any = None  # present faces (m, d, d) of a tool or a body
+    follows_points = False  # the force depends on positions of points (tools)
+    depth_of: Any = None  # function: depth (n,) of positions in a tool, for outlines in pictures
+    faces_of: Any = None  # function: present faces (m, d, d) of a tool or a body
     accelerates = False  # formulas are forces per mass
-    exerts = False  # ID_x, ID_y, ID_z are a force, and its torque is summed on request
-    pressure: Any = None  # formula, if it presses on whole surfaces alone
-    presses = False  # it is the force of a surface on points
+    exerts = False  # publishes a force as ID_x, ID_y, ID_z, and on request its torque
+    pressure: Any = None  # formula of the pressure, if it is a pressure on whole surfaces
+    presses = False  # is the force of a surface on points
     brakes = False
     water_only = False  # prescribes the pressure of pore water
-    order = USUAL  # FIRST or LAST at each stage, wherever it is defined
-    # Python hooks add no energy; else the balance is not monitored.
+    order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
+    # True: Python hooks add no energy except summed work. Otherwise the balance is not monitored.
     conserves = False
-    # Calls ``between_steps()`` after multiples of this step number (0: never); True if points were
-    # deleted.
+    # ``between_steps()``, which returns True if it deleted points, is called after steps whose
+    # number is a multiple of this (0: never).
     every = 0
-    friction: float | None = None  # between its two `solids`, on the grid
+    friction: float | None = None  # between its two `solids`, in contact on the grid
     solids: tuple = ()  # if it has no group
 
     def __init__(self, hub: Scene, group: Any = None):
@@ -159,7 +159,7 @@ class Fix(Publisher):
 
     @property
     def of_bodies(self) -> bool:
-        """True if the fix moves, touches or links rigid bodies."""
+        """Whether the fix moves, touches or links rigid bodies."""
         return self.moves is not None or self.touches is not None or self.links
 
     @property
@@ -167,7 +167,7 @@ class Fix(Publisher):
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mask (m, k) of the prescribed components of `nodes` at `x` (m, d), and their values.
+        """Return a mask (m, k) of prescribed components of `nodes` at `x` (m, d), and values.
 
         Implicit schemes call this instead of the hooks of the fix. The default reads `formulas`.
         """
@@ -180,7 +180,7 @@ class Fix(Publisher):
         return mask, values
 
     def points_within(self) -> np.ndarray | None:
-        """Numbers of the points of the group on which the fix acts; None for all."""
+        """Return numbers of the points on which the fix acts; None: all of its group."""
         return None
 
     def defined(self) -> None:
@@ -190,7 +190,7 @@ class Fix(Publisher):
         """Called before the fix is deleted; raises ScriptError if other fixes need it."""
 
     def seconds(self) -> float:
-        """Estimated core seconds per step, for ``check``."""
+        """Return the estimated core seconds per step, for ``check``."""
         from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())
         return FROM_PYTHON if from_python and not self.first_step_only else 0.0
 
@@ -227,8 +227,8 @@ def per_direction(
 ) -> tuple:
     """Require one formula (or NULL, unless `all_given`) per direction of the domain.
 
-    Further components may be NULL or zero, as in published inputs. With `around`, a third component
-    acts around the axis of bodies that twist.
+    Components beyond the dimension may be NULL or 0, as in published inputs. With `around`, the
+    third component acts around the axis of bodies that twist.
     """
     domain = hub.require_domain()
     d, twists = domain.dimension, isinstance(domain.kin, Twisted)

@@ -1,4 +1,4 @@
-"""Checks of parts, and exceptions of plug-ins."""
+"""Checks of styles, and exceptions of plug-ins."""
 
 import inspect
 import linecache
@@ -173,7 +173,7 @@ def _wrong_items(fix: Fix, moment: str, hook: CompiledHook) -> Iterator[str]:
 
 
 def misfit(function: Callable, count: int) -> str:
-    """Reason why a function cannot be called with `count` arguments, or ""."""
+    """Return the reason why a function cannot be called with `count` arguments, or ""."""
     try:
         inspect.signature(getattr(function, "py_func", function)).bind(*range(count))
     except TypeError as error:
@@ -266,7 +266,7 @@ def _wrong_size(kind: type[Field], domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Present use of a column, unless by this field (None: a law)."""
+    """Return what else shows a column than this field (None: than a law), or ""."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -311,10 +311,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert exceptions in the code of plug-ins to ScriptErrors.
-
-    They name the plug-in, or else the `usual` part.
-    """
+    """Convert exceptions in plug-ins to ScriptErrors that name the plug-in or the `usual` part."""
     try:
         yield
     except faults.KNOWN:
@@ -330,7 +327,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
         if not suspects:
             raise
         plugin, mark = suspects[0]
-        if not (mark or isinstance(error, Undefined)):  # report the line that called it
+        if not (mark or isinstance(error, Undefined)):  # mark the line of the script that called it
             mark = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
         cause = f"{faults.cause_of(error)}{mark}"
         raise faults.fault(plugin.name, cause, plugin.mark, faults.TRACEBACK) from error
@@ -339,7 +336,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
 def _owner(parts: list[PartInUse], file: str) -> PartInUse | None:
     path = Path(file).resolve()
     for plugin in parts:
-        with suppress(TypeError, OSError):  # built-in modules have no source
+        with suppress(TypeError, OSError):  # built-in functions have no source
             if Path(inspect.getfile(plugin.kind)).resolve() == path:
                 return plugin
     for plugin in parts:

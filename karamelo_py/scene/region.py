@@ -13,14 +13,14 @@ from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError
 
 EXTERIOR = "exterior"
-HALVINGS = 12  # bisections to a surface
+HALVINGS = 12  # bisections that locate a surface
 
 
 class Region(Named):
     """Base of region styles, which override `contains`.
 
-    `lo` and `hi` (d,) bound the shape, infinite if open; `exterior` inverts it; `parts` are the
-    regions it combines.
+    `lo` and `hi` (d,) bound the shape and are infinite where it is open; `exterior` inverts the
+    region; `parts` are the regions that it combines.
     """
 
     skin: Any = None  # `Skin`, of a region from a file
@@ -41,7 +41,7 @@ class Region(Named):
         self.dimension = dimension = self.domain.dimension
         self.parts = tuple(parts)
         self.unknown: bool = bool(np.isnan([*lo, *hi]).any()) or any(p.unknown for p in self.parts)
-        # Bounding box, infinite if open; 0 in unused directions.
+        # Bounding box, infinite where it is open, 0 in unused directions.
         self.box_lo, self.box_hi = np.zeros((2, 3))
         self.box_lo[:dimension] = -np.inf if exterior else lo
         self.box_hi[:dimension] = np.inf if exterior else hi
@@ -60,17 +60,17 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
-        """True if all faces are known to be parallel to the axes."""
+        """Whether all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
     def sheet(self) -> np.ndarray | None:
-        """Simplices (m, d, d) of a named set of faces, which has no volume; None otherwise."""
+        """Simplices (m, d, d) if the region is a set of faces, without a volume; otherwise None."""
         return None
 
     @property
     def flat(self) -> bool:
-        """True if some part is a line or surface without an inside."""
+        """Whether a part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -83,19 +83,20 @@ class Region(Named):
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of `x` (n, >= d) in or on the shape."""
+        """Return the mask (n,) of `x` (n, >= d) in or on the shape, ignoring `exterior`."""
         raise NotImplementedError
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Mask (n,) of the positions `x` (n, >= d) in the region."""
+        """Return the mask (n,) of positions `x` (n, >= d) in the region."""
         inside = self.contains(x)
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Distance (n,) of `x` (n, >= d) from the surface, negative outside; ignores `exterior`.
+        """Return the depth (n,) of `x` (n, >= d), negative outside; `exterior` is ignored.
 
-        It is a lower bound, up to `reach`, and linear near plane parts of the surface. The default
-        tests `contains` along the axes, and misses shapes thinner than `reach`.
+        A lower bound of the distance from the surface is enough, up to `reach`, but it must be
+        linear near plane parts of the surface. The default tests `contains` along the axes, and
+        misses shapes thinner than `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -112,14 +113,11 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
-        """Mask (n,) of positions where the surface of `other` is this one.
-
-        None if that is not known.
-        """
+        """Return the mask (n,) of positions where both surfaces coincide; None: unknown."""
         return None
 
     def shape(self) -> Any:
-        """Argument of `kernels.surfaces.depth` for `distance`, or None."""
+        """Return this shape for `kernels.surfaces.depth`, or None if it has no kernel."""
         return None
 
     def outline(self) -> Any:
@@ -127,7 +125,7 @@ class Region(Named):
         return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Depth (n,) in the region, see `distance`."""
+        """Return the depth (n,) in the region, see `distance`."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 
@@ -139,7 +137,7 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Refuse a lower end (argument number `argument`) above the upper end."""
+    """Raise ScriptError if the lower end (argument number `argument`) is above the upper end."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

@@ -1,4 +1,4 @@
-"""Other points for a solid before the first run."""
+"""Replace the points of a solid before the first run."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
-    """Place the points `kept` of a solid: a mask, or numbers that may repeat."""
+    """Return a placement of the points `kept` of a solid: a mask, or numbers that may repeat."""
     volume = solid.volume0 / solid.domain.depth(solid.x0[:])
     return Placement(
         x0=solid.x0[kept],
@@ -24,7 +24,7 @@ def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
 
 
 def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
-    """Refuse if groups of points or contacts store the numbers that would change."""
+    """Raise ScriptError if groups of points or contacts store the numbers that would change."""
     later = [one for one in hub.solids.values() if one.index >= solid.index]
     affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
     for group in hub.groups.values():

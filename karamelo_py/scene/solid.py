@@ -19,18 +19,18 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # below COLD, WARM below others: probably in Celsius
+COLD, WARM = 60.0, 200.0  # K: T0 < COLD, and WARM less than in others, is in Celsius
 
 
 class Solid(Named):
-    """Base of solid styles, which `put` their points.
+    """Base of solid styles, which create their points and call `put`.
 
     Parameters
     ----------
     material
         Material of the points.
     h
-        Cell size; the domain's if solids have a common grid (ulmpm).
+        Cell size; if solids have a common grid (ulmpm), the cell size of the domain.
     T0
         Initial temperature; default: the material's.
     GlueToSolid
@@ -38,13 +38,13 @@ class Solid(Named):
     """
 
     catalogue = "solids"
-    source = "region"  # argument that gives the points, for messages
-    # Volumes of points and of the shape from a file; per radian if axisymmetric.
+    source = "region"  # name of the argument for the points, for messages
+    # Volumes of the points, and of the shape in a file; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
     elements = ""
     region: Region | None = None
     ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
-    warm = False  # points have individual temperatures
+    warm = False  # points have different temperatures
 
     @property
     def rigid(self) -> bool:
@@ -73,11 +73,11 @@ class Solid(Named):
             )
         self._compare_temperatures(hub)
         self.index = len(hub.solids)
-        self.initial: dict[str, np.ndarray] = {}  # columns (n,) of its points
+        self.initial: dict[str, np.ndarray] = {}  # initial columns (n,) of points
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        # Karamelo scripts give T0 in mechanical runs, too.
+        # Karamelo scripts have a T0 in mechanical runs, too: no error.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
                 f"T0 = {self.T0:g} has no effect: the material has no temperature",
@@ -113,10 +113,7 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Store the points.
-
-        Raises ScriptError for none, too many, or points left of the axis.
-        """
+        """Store the points; raise ScriptError for none, too many, or points left of the axis."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -130,7 +127,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.kin.hoops:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # no mass on the axis
+            if count and radius.min() <= 0:  # on the axis it would have no mass
                 raise ScriptError(
                     f"points at x = {radius.min():g}: x is the radius here "
                     f"({self.domain.kin.word}), and points lie at x > 0",
@@ -166,7 +163,7 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
-        """Positions (n, d); computed on each access for large solids."""
+        """Initial positions (n, d); for large solids they are computed at each access."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:
@@ -230,7 +227,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """True if points coincide; large solids are sampled."""
+    """Return whether points of the two solids coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():
@@ -245,7 +242,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """Hashes (n,) of positions, ignoring round-off."""
+    """Return hashes (n,) of positions, ignoring round-off."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
-    # Primes separate positions; overflow only mixes the bits.
+    # Primes make hashes of different positions differ; overflow does no harm.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]

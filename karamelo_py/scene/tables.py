@@ -43,7 +43,7 @@ def _is_dump(path: Path) -> bool:
 
 
 def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
-    from karamelo_py.output import snapshots  # with XML, for dumps only
+    from karamelo_py.output import snapshots  # imports XML, which only dumps need
 
     *_, last = snapshots.read(path)
     domain = hub.require_domain()
@@ -64,9 +64,9 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 
 
 def read_xyz(path: Path) -> dict[str, np.ndarray]:
-    """Last frame of an .xyz file: positions, velocities and masses.
+    """Read positions, velocities and masses from the last frame of an .xyz file.
 
-    Rows are an element, x, y, z, unless the second line has the Properties of extended XYZ.
+    Rows are element, x, y, z, unless the second line has the Properties of extended XYZ.
     """
     lines = read_text(path).rstrip().splitlines()
     begin, first = 0, 0
@@ -97,9 +97,9 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_table(path: Path) -> dict[str, np.ndarray]:
-    """Columns separated by commas, semicolons or blanks; # begins a comment line.
+    """Read columns separated by commas, semicolons or blanks; # begins a comment line.
 
-    The first row names them, else they are "1", "2", ...
+    Names are in the first row; without names, columns are "1", "2", ...
     """
     rows = []
     try:

@@ -21,12 +21,9 @@ class HeightsFile(InputFile):
 
 
 class Raster(NamedTuple):
-    """Heights (ny, nx) at the centres of square cells, rows from the south.
+    """Heights (ny, nx) at the centres of square cells, rows from the south; NaN where unknown."""
 
-    They are NaN where unknown.
-    """
-
-    corner: np.ndarray  # (2,) lower corner
+    corner: np.ndarray  # (2,) position of the lower corner
     cell: float
     heights: np.ndarray
 
@@ -93,7 +90,7 @@ def _of_geotiff(path: Path) -> Raster:
 
 
 def read_profile(path: Path) -> np.ndarray:
-    """Read positions and heights (n, 2), along increasing positions."""
+    """Read positions and heights (n, 2), sorted by position."""
     profile = np.column_stack([*read_table(path).values()][:2])
     if profile.shape[1] < 2 or len(profile) < 2 or (np.diff(profile[:, 0]) <= 0).any():
         raise ScriptError(
@@ -105,18 +102,15 @@ def read_profile(path: Path) -> np.ndarray:
 
 
 def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.ndarray:
-    """Segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
+    """Return segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
     x, z = np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([z[:1], z, z[-1:]])
     corners = np.column_stack([np.append(x, ends)[::-1], np.append(z, [bottom] * 2)[::-1]])
-    corners[:2] = corners[1::-1]  # the bottom from left to right
+    corners[:2] = corners[1::-1]  # left to right at the bottom
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 def faces_of(x: np.ndarray, y: np.ndarray, z: np.ndarray, bottom: float) -> np.ndarray:
-    """Triangles (m, 3, 3) around the ground below heights (ny, nx).
-
-    Seen from outside, they are counter-clockwise.
-    """
+    """Return triangles (m, 3, 3) around the ground below heights (ny, nx), facing outwards."""
     ny, nx = z.shape
     top = np.stack([*np.meshgrid(x, y), z], axis=2)
     low = top.copy()

@@ -81,7 +81,7 @@ class View:
         cls._shown = frozenset(name for name, value in attributes if isinstance(value, Shown))
 
     def __init__(self) -> None:
-        # By attribute or field class: array given to the hook, and a copy.
+        # By attribute or field class: the array given to the hook, and a copy of it.
         self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: arrays.Control) -> None:
@@ -107,7 +107,7 @@ class View:
             self._handed_out[key] = array, array.copy() if written else array
         return self._handed_out[key][0]
 
-    _get: Callable[[type], np.ndarray]  # (n, components) of a declared field
+    _get: Callable[[type], np.ndarray]  # returns a declared field, (n, components)
     _put: Callable[[type, np.ndarray], None]
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -160,7 +160,7 @@ def _declared(kind: type, of: str, missing: str = "") -> Callable:
 
 
 class NodesView(View):
-    """Nodes `index` (n,) of a group with mass, at one stage of a step.
+    """The nodes of a group that have mass, numbered `index` (n,), at one stage of a step.
 
     Example: ``nodes.force += nodes.mass[:, None] * self.gravity``.
     """
@@ -187,7 +187,7 @@ class NodesView(View):
         self.index = members[s.nodes.sums[members, arrays.MASS] > 0]
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over the group's nodes of all processes."""
+        """Sum terms (n,) or (n, k) over the nodes of the group in all processes."""
         terms = np.asarray(terms, float)
         local = slice(None) if self._foreign is None else self._foreign[self.index] == 0
         return self._simulation.points.summed(terms[local])
@@ -222,7 +222,7 @@ class NodesView(View):
 
     @Shown
     def force(self) -> np.ndarray:
-        """Internal plus external force (n, d); set it in ``post_particles_to_grid``."""
+        """Internal plus external force (n, d); may be changed in ``post_particles_to_grid``."""
         return self._vectors("sums", arrays.of_force(self._kin))[self.index]
 
     @force.writer
@@ -239,7 +239,7 @@ class NodesView(View):
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d) before the momentum update, or those that deform the points."""
+        """Velocities (n, d) before the momentum update; later, for the velocity gradient."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -271,11 +271,11 @@ class NodesView(View):
 
 
 class PointsView(View):
-    """Points of a group at one stage of a step, ordered by id.
+    """The points of a group at one stage of a step, ordered by id.
 
-    If hooks treat each point separately (`Fix.point_by_point`), they are local points in storage
-    order, in `pieces` of blocks with rows, and their positions are read-only. Before the first step
-    (`in_steps` False) these are only some of the points.
+    For hooks that treat each point separately (`Fix.point_by_point`), they are the points of this
+    process in storage order, as `pieces` (block, rows), and positions are read-only. Before the
+    first step (`in_steps` False) a view has only some of the points.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -399,9 +399,9 @@ class PointsView(View):
     def set_velocity_gradient(self, component: int, gradient: Callable) -> None:
         """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
-        ``gradient(moves, step)``, called if there are any, returns derivatives (n, d) of a velocity
-        `component` in coordinates of the grid (reference positions if not `moves`). `step` is much
-        smaller than a cell.
+        ``gradient(moves, step)``, which is called only if it is needed, returns derivatives (n, d)
+        of a velocity `component`, by present positions if `moves`, otherwise by reference ones.
+        `step`, for finite differences, is much smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -414,7 +414,7 @@ class PointsView(View):
                 slopes = np.nan_to_num(gradient(s.frame.moves, simulation.hub.domain.h / 16)).T
             moment = np.zeros((d * d, len(rows)), kept.dtype)
             moment[here] = slopes[:, places]
-            if not s.transfer.traits.keeps_gradient:  # B = D grad v, as computed from nodes
+            if not s.transfer.traits.keeps_gradient:  # store B = D grad v
                 x = points.x[simulation.now] if points.home is None else points.home
                 x = np.ascontiguousarray(x[:, rows])
                 gradients, grid = moment, points.grid[rows]
@@ -440,14 +440,11 @@ class PointsView(View):
         self.impose(impose_temperature, values)
 
     def ignite(self, since: np.ndarray) -> None:
-        """Light explosives, times (n,) ago; below 0 later."""
+        """Ignite explosives at times (n,) before now; negative times are in the future."""
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` with the number of each point from `values` (n,).
-
-        Only points whose law is a `law` are included.
-        """
+        """Call ``kernel(matter, rows, numbers)`` for points whose law is a `law`; `values` (n,)."""
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -508,9 +505,10 @@ def set_columns(
     ids: np.ndarray | None = None,
     mark: Mark | None = None,
 ) -> None:
-    """Set columns of points (ids from 0; default all) between steps, to numbers or (n,).
+    """Set columns of points between steps, to numbers or arrays (n,).
 
-    Raises ScriptError for derived columns, wrong shapes, and values that are not finite.
+    `ids` are counted from 0; by default all points are set. Raises ScriptError for derived columns,
+    wrong shapes, and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

@@ -77,9 +77,9 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 
 
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
-    """Elements (n, count); lines continue until they have `count` numbers.
+    """Return elements (n, count), each of which may continue over several lines.
 
-    Extra numbers on the last line, such as inner nodes of C3D8I, are ignored, as in CalculiX.
+    As in CalculiX, further numbers on the last line, such as inner nodes of C3D8I, are ignored.
     """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
@@ -148,7 +148,7 @@ class _Deck:
         self.parts: dict[str, DeckPart] = {}
         self.instances: list[DeckBody] = []
         self.whole = self.scope = DeckPart()
-        # Sets of the assembly by numbers of an instance: nodes?, name, instance, items.
+        # Sets of the assembly: whether of nodes, name, instance, items numbered in the instance.
         self.assembly: list[tuple[bool, str, str, list]] = []
         for keyword in _keywords(path):
             reads = _READ.get(keyword.name)
@@ -306,7 +306,7 @@ class _Deck:
                     sets.extend(name, f"{instance}.{item}")
                 else:
                     sets.add(name, owner, item)
-        if self.instances:  # assembly sets made of INSTANCE.SET and of each other
+        if self.instances:  # sets of the assembly may contain INSTANCE.SET and each other
             pairs = (self.whole.nodes, merged.nodes), (self.whole.groups, merged.elements)
             for of_deck, sets in pairs:
                 for name, items in of_deck.items():

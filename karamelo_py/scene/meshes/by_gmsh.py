@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 READS = (".msh", ".msh2", ".msh4", ".med", ".unv", ".cgns")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# Names that differ from Gmsh's in lower case.
+# Families whose name is not Gmsh's in lower case.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
@@ -26,7 +26,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
-    """Open a model; other models of the process stay open."""
+    """Open a new model; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -46,14 +46,14 @@ def _model(path: Path) -> Iterator[ModuleType]:
 
 
 def begin(gmsh: ModuleType) -> None:
-    """Initialize Gmsh without its reset of SIGPIPE.
+    """Initialize Gmsh, but undo its reset of SIGPIPE.
 
-    After the reset, a closed pipe or a closed live page would end the program.
+    Otherwise a closed pipe, or a closed live page, would end the program.
     """
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
-        with contextlib.suppress(ValueError):  # main thread only
+        with contextlib.suppress(ValueError):  # not in the main thread
             signal.signal(signal.SIGPIPE, before)
 
 
@@ -99,7 +99,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
             hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
         ) from None
-    except Exception as error:  # Gmsh's only class of errors
+    except Exception as error:  # Gmsh raises no subclass
         raise ScriptError(
             f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
             argument="file",
@@ -120,9 +120,9 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """Content that Gmsh's library drops: names of empty groups; groups by element.
+    """Content of a file that Gmsh's library drops: names of empty groups, and groups by element.
 
-    In versions 1 and 2 all elements of an entity get its groups.
+    When Gmsh reads versions 1 and 2, it gives all elements of an entity all groups of the entity.
     """
 
     def __init__(self, path: Path):
@@ -153,7 +153,7 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
     for dim, number in gmsh.model.getPhysicalGroups():
         names.setdefault((dim, number), gmsh.model.getPhysicalName(dim, number).strip())
     entities = {} if names else dict.fromkeys(gmsh.model.getEntities(), "")
-    names |= entities  # such as the properties of Nastran
+    names |= entities  # names of entities, such as the properties of Nastran
     # By element type: nodes, and groups (-1: none).
     left_out: dict[str, int] = {}
     by_kind: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
@@ -163,7 +163,7 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
             continue
         for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
             name, _, _, count, *_ = gmsh.model.mesh.getElementProperties(kind)
-            if not count:  # parts of elements that a level set cuts
+            if not count:  # pieces of elements that a level set has cut
                 left_out[name] = left_out.get(name, 0) + len(elements)
                 continue
             if not entities and of_file and of_file.groups is not None:

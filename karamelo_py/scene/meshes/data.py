@@ -7,14 +7,14 @@ import numpy as np
 
 from karamelo_py.script.errors import unknown
 
-# Keys are families of cells: meshio's type names without the number of nodes.
+# By family of cells: meshio's type without the number of nodes.
 DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
 }  # fmt: skip
 
 
-_MANY = 100  # names; messages list only a few of more
+_MANY = 100  # names; if there are more, messages list only a few
 
 
 class CellBlock(NamedTuple):
@@ -83,8 +83,8 @@ class Mesh(NamedTuple):
         name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh numbers its groups and may name them. A number used in only one dimension needs
-            # no dimension as a prefix.
+            # Gmsh numbers its groups and may name them. A number that occurs in one dimension only
+            # needs no prefix.
             taken = {*names}
             once = [n for n in names if n.rpartition(":")[2] not in taken or ":" not in n]
             named = [name for name in once if not name.isdigit()] or once

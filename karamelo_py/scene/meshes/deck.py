@@ -1,4 +1,4 @@
-"""Parts of decks, merged to one mesh."""
+"""Content of keyword decks by part, merged to one mesh."""
 
 import itertools
 from collections import Counter, defaultdict
@@ -52,9 +52,9 @@ def included(keyword: DeckKeyword, name: str, above: tuple[Path, ...]) -> Path:
 
 
 def table_of(keyword: DeckKeyword, least: int, most: int, widths: Sequence[int] = ()) -> np.ndarray:
-    """Numbers (n, most) of the data lines, separated by commas or in columns of `widths`.
+    """Return numbers (n, most) of data lines, separated by commas or in columns of `widths`.
 
-    Omitted numbers are 0.
+    Omitted numbers are 0. Raises ScriptError for fewer than `least`.
     """
     ends = list(itertools.accumulate(widths))
     starts = [0, *ends[:-1]]
@@ -100,19 +100,16 @@ class DeckPart:
         self.skipped: Counter[str] = Counter()
         self.nodes: SetItems = {}
         self.groups: SetItems = {}
-        self.sides: dict[str, list[tuple[str, str]]] = {}  # elements or their set; S1, S2, ...
+        self.sides: dict[str, list[tuple[str, str]]] = {}  # (element or set, S1 or S2 ...)
         self.faces: dict[str, list[np.ndarray]] = {}  # node numbers of the deck (n, c)
-        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # of later nodes
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # for later nodes
 
     def add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
         self.numbers.append(numbers)
         self.places.append(places)
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Ascending node numbers (n,) and their positions.
-
-        The last definition of a node counts.
-        """
+        """Return ascending node numbers (n,) and positions, by the last definition of each node."""
         if not self.numbers:
             return np.empty(0, np.int64), np.empty((0, 3))
         numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
@@ -163,7 +160,7 @@ class Numbering(NamedTuple):
     mesh: np.ndarray  # (n,)
 
     def of(self, numbers: np.ndarray) -> np.ndarray:
-        """Numbers in the mesh (m,), or -1."""
+        """Return the numbers (m,) in the mesh, or -1."""
         if not len(self.deck):
             return np.full(len(numbers), -1)
         at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
@@ -178,17 +175,14 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, as functions that list numbers of the mesh.
-
-    They are functions because a deck may have many sets.
-    """
+    """Sets by name, as functions that list numbers of the mesh, since a deck may have many sets."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)
         self.numbering: dict[str, Numbering] = {}
 
     def add(self, name: str, instance: str, items: SetItems | np.ndarray, key: str = "") -> None:
-        """Add items, or the set `key` of items, by numbers of an instance."""
+        """Add items, or the set `key` of items, with numbers of an instance."""
         numbering = self.numbering.get(instance, NO_NUMBERS)
 
         def listed() -> np.ndarray:

@@ -10,13 +10,13 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# relative to size^dimension
+# smallest volume relative to size^dimension
 _FLAT = 1e-12
 # Distance from the plane of a 2D mesh, relative to its size.
 _PLANE = 1e-9
 _CHUNK = 4096
-# Below this fraction of curved elements, folds at an edge come from the mesher, and signed sums are
-# right. Otherwise nodes have another order.
+# If fewer curved elements than this fraction are folded at an edge, the mesher made the folds, and
+# signed sums are right. Otherwise the nodes are in another order.
 _FOLDED = 0.01
 
 
@@ -49,7 +49,7 @@ SHAPES = {
     )
 }
 
-# Corners whose mean is a further node of second-order elements: edges, then faces.
+# Corners between which the further nodes of second-order elements lie: edges, then faces.
 MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -74,7 +74,7 @@ class MeshElements(NamedTuple):
     corners: np.ndarray
     nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
-    bulge: float = 0.0  # distance of `nodes` from the straight shape over size
+    bulge: float = 0.0  # distance of `nodes` from the straight element, over its size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
         """Reverse the elements `which` (n,); corners only."""
@@ -87,7 +87,7 @@ class MeshElements(NamedTuple):
 def elements_of(
     mesh: Mesh, dimension: int, group: str | int | None = None, *, lower: bool = False
 ) -> list[MeshElements]:
-    """Elements of `dimension` in a mesh or its `group`, one item per type.
+    """Return elements of `dimension` in a mesh or its `group`, one item per type.
 
     `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
     no elements, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
@@ -144,7 +144,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Natural coordinates of the nodes, or only of the corners if the others are unknown."""
+    """Return natural coordinates of the nodes, or only of the corners if others are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -160,7 +160,7 @@ def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
         coordinates = coordinates[: min(count, len(coordinates))]
         if _exponents(shape.name, len(coordinates)) is not None:
             return coordinates
-        coordinates = coordinates[: len(coordinates) - 1]  # the centre node moves no boundary
+        coordinates = coordinates[: len(coordinates) - 1]  # without the centre node
     return coordinates[: len(shape.corners)]
 
 
@@ -177,7 +177,7 @@ def _exponents(name: str, count: int) -> tuple[tuple[int, ...], ...] | None:
             spaces = [flat, linear] if p == 2 else [flat]
         elif name == "pyramid":
             return None
-        else:  # complete, or serendipity (Arnold & Awanou 2011)
+        else:  # complete polynomials, or serendipity (Arnold & Awanou 2011)
             spaces = [list(every)]
             if p > 1 and d > 1:
                 spaces.append([e for e in every if sum(k for k in e if k > 1) <= p])
@@ -196,7 +196,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements: older formats repeat the elements of two physical groups."""
+    """Drop repeated elements: older formats repeat elements that are in two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -217,10 +217,10 @@ def _check_plane(positions: np.ndarray, dimension: int) -> None:
 
 
 def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarray]:
-    """Elements with positive orientation, volumes (n,) and centroids (n, d).
+    """Return elements with positive orientation, volumes (n,) and centroids (n, d).
 
     Integrals of det J and x det J are exact, also with curved edges and warped faces. Raises
-    ScriptError for a flat or twisted element; a few curved ones may be twisted near an edge.
+    ScriptError for a flat or twisted element; a few curved elements may be folded at an edge.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -230,7 +230,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     twisted = np.zeros(len(nodes), bool)
     for first in range(0, len(nodes), _CHUNK):
         batch = slice(first, first + _CHUNK)
-        # Relative to the first node, to save digits far from the origin.
+        # Positions relative to the first node have more digits far from the origin.
         local = nodes[batch] - nodes[batch, :1]
         weights, x = _integrated(shape, reference, local)
         volume[batch] = weights.sum(axis=1)
@@ -266,7 +266,7 @@ def _integrated(shape: Shape, reference: tuple, nodes: np.ndarray) -> tuple[np.n
 
 @lru_cache
 def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (q,), shape functions (q, c) and slopes (q, c, d) at Gauss points."""
+    """Return weights (q,), shape functions (q, c) and slopes (q, c, d) at Gauss points."""
     shape = SHAPES[name]
     exponents = _exponents(name, len(reference))
     order = max(map(max, exponents)) if exponents else 1  # a pyramid is a cube with merged corners
@@ -291,7 +291,7 @@ def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _functions(name: str, reference: tuple, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (q, c) of nodes at `reference`, and slopes (q, c, d), at `points`."""
+    """Return shape functions (q, c) and slopes (q, c, d) at `points`, for nodes at `reference`."""
     if name == "pyramid":
         return _of_pyramids(points)
     exponents, inverse = _coefficients(name, reference)

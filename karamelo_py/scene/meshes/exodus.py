@@ -30,7 +30,7 @@ SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
     "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
 }
-# Edges along z come before those at the top; further nodes are ignored.
+# Nodes of edges along z come before nodes at the top edges; further nodes are ignored.
 ORDER = {
     ("hexahedron", 20): [*range(12), *range(16, 20), *range(12, 16)],
     ("wedge", 15): [*range(9), *range(12, 15), *range(9, 12)],
@@ -38,7 +38,7 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
-    """Arrays and types of elements by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+    """Return arrays and element types by name, of netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:

@@ -1,4 +1,4 @@
-"""Accept Gmsh geometries that only describe a shape, by a list of commands."""
+"""Accept only Gmsh geometries with known commands that describe a shape."""
 
 import re
 import tomllib
@@ -14,8 +14,8 @@ _TOKEN = re.compile(
     re.S,
 )
 _LONGEST = 1000  # characters; Gmsh cuts longer strings and reads the rest as commands
-# Skipping a condition, loop or macro, Gmsh searches for the first letters of these words (and of
-# If, For, Macro, Function) and drops the letter after a match, which may start a string.
+# When Gmsh skips a condition, loop or macro, it searches for the first letters of these words (and
+# of If, For, Macro, Function) and drops the next letter, which may be the beginning of a string.
 _ENDS = re.compile(r"EndIf|EndFor|Else|Return")
 _LOSES = re.compile(r"(?:^|[^A-Za-z_])[EFIMR]$")
 _MAY = "run a program, or read or write a file"
@@ -30,7 +30,7 @@ _GENERAL = re.compile(
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # write to a file if > follows the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # they write to a file if > follows the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
 _NAMES = frozenset(("For", "Macro", "Function"))
@@ -64,7 +64,7 @@ class _Token(NamedTuple):
 def refuse_commands(path: Path, *, trusted: bool = False) -> None:
     """Raise ScriptError for a geometry that does more than describe a shape.
 
-    If `trusted`, refuse only what ends the program.
+    If `trusted`, refuse only commands that end the program.
     """
     files: dict[Path, list[_Token]] = {}
     _collect(path, files, trusted)

@@ -7,17 +7,17 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Largest distance between equal vertices, relative to the size, because files have few digits.
+# Distance, relative to the size, within which vertices are equal, as files have few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # sample positions, about, that test whether one shell lies in another
+_SAMPLES = 4000  # approximate number of positions that test whether one shell lies in another
 _SETS = 8  # maximum number of sets of shells that do not overlap
 
 
 class Skin:
-    """Sets of `faces` (m, d, d), each closed.
+    """The surface of a shape: sets of faces (m, d, d), each closed.
 
-    A position is inside if a set encloses it or a face is within `tolerance`. With `open`, only
-    positions within `tolerance` of a face are.
+    A position is inside if a set encloses it or a face is within `tolerance`; with `open`, only in
+    the second case. `odd`: see `Surface`.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Outer faces (m, d, d), oriented outwards; in 1D pairs, the lower one first.
+    """Return outer faces (m, d, d), oriented outwards; in 1D in pairs, the lower end first.
 
     Quadrilaterals are split along the diagonal through their lowest-numbered node, so that
     neighbouring elements split a common face alike.
@@ -74,7 +74,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Simplices (m, d, d); in 3D, lines and nodes become triangles with repeated corners."""
+    """Return simplices (m, d, d); in 3D, lines and nodes become triangles with repeated corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -84,7 +84,7 @@ def flat_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def _once(rows: np.ndarray) -> np.ndarray:
-    """Ascending indices of rows (n, k) that occur an odd number of times."""
+    """Return ascending indices of rows (n, k) that occur an odd number of times."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -113,13 +113,13 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
-    """Closed shells of `points` (n, 3), `triangles` (m, 3).
+    """Return the closed shells of `points` (n, 3), `triangles` (m, 3).
 
     Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
     Raises ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
-    for sided in (True, False):  # oriented as in the file; else reoriented
+    for sided in (True, False):  # first with the orientation of the file, then without
         some = _single(triangles, sided=sided)
         some = some if sided else _turned(some)
         edge, way = _edges(some)
@@ -224,15 +224,15 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
     one, other = order[pairs], order[pairs + 1]
     flipped = m * (way[one] == way[other])
-    # Node k is triangle k as in the file, node m + k its reverse; linked nodes fit together. The
-    # triangle of the lowest number in each component stays as it is.
+    # Node k of this graph is triangle k as in the file, node m + k the reversed one; links connect
+    # nodes with consistent orientation. In each component the lowest triangle is not reversed.
     one, other = one % m, other % m
     label = _components(np.r_[one, one + m], np.r_[other + flipped, other + m - flipped], 2 * m)
     return np.where((label[:m] > label[m:])[:, None], triangles[:, ::-1], triangles)
 
 
 def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    """Lowest node of each node's component, with links from `a` to `b`."""
+    """Return the lowest node of each node's component in a graph with links from `a` to `b`."""
     lowest = np.arange(count)
     while (apart := lowest[a] != lowest[b]).any():
         ends = np.sort([lowest[a[apart]], lowest[b[apart]]], axis=0)

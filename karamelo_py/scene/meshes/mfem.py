@@ -34,9 +34,9 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Numbers of second-order nodes, from `first` on, by the corners between which they lie.
+    """Return numbers of second-order nodes, from `first` on, by the corners around them.
 
-    Edges, quadrilateral faces and elements follow each other, each in the order of appearance.
+    Nodes of edges come first, then of quadrilateral faces and of elements, in order of appearance.
     """
     numbers: dict[frozenset[int], int] = {}
     faces = {**FACES, "triangle": (), "quad": (), "line": ()}

@@ -24,7 +24,8 @@ def read_obj(path: Path) -> Mesh:
             elif word in names:
                 names[word] = tuple(rest)
             elif word == "f":
-                # Texture and normal follow a slash; negative numbers count from the last vertex.
+                # Ignore texture and normal after a slash; negative numbers count from the last
+                # vertex.
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
                 if min(corners) < 0 or max(corners) >= len(points):
@@ -49,7 +50,7 @@ def read_obj(path: Path) -> Mesh:
 
 
 def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
-    """Divide a polygon into a fan of triangles from a corner that sees all of it."""
+    """Divide a polygon into a fan of triangles from a corner from which all others are visible."""
     count = len(corners)
     for start in range(count):
         fan = [

@@ -1,7 +1,7 @@
 """Entry point for mesh files: chooses the reader.
 
-Decks of Abaqus, LS-DYNA and Nastran, Exodus, MFEM and OBJ have readers here. Gmsh reads its
-formats, MED, UNV and CGNS, and meshes geometries; meshio reads the rest.
+Abaqus, LS-DYNA, Nastran, Exodus, MFEM and OBJ have readers in this package. Gmsh reads its own
+formats, MED, UNV and CGNS, and meshes geometries; meshio reads all other formats.
 """
 
 import contextlib
@@ -34,11 +34,11 @@ from karamelo_py.script.errors import FAILURES, ScriptError
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
-# Gmsh takes other text for its geometry language.
+# Gmsh reads files that begin with other text as geometries.
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
 _BY_ENDING = (".unv", ".cgns")
 _HDF5 = b"\x89HDF"
-# Files of other programs with endings of meshes: first bytes, and advice.
+# First bytes of other files that may have the ending of a mesh, and advice.
 _FOREIGN = (
     (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
@@ -166,7 +166,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _read_all(path: Path) -> None:
-    """Raise ValueError for a damaged HDF5 file, on which Gmsh's libraries print or crash."""
+    """Read all of an HDF5 file; raise ValueError if it is damaged, since Gmsh would crash."""
     import h5py
 
     def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -192,7 +192,7 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _skip_close(file: Any, depth: int) -> None:
-    """Skip to the closing bracket; meshio's function never ends without one."""
+    """Skip to the closing bracket, without which meshio's function would not end."""
     while depth > 0:
         letter = file.read(1)
         if not letter:
@@ -201,7 +201,7 @@ def _skip_close(file: Any, depth: int) -> None:
 
 
 def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
-    # VTK's pixels, voxels and prisms with six sides, which meshio supports only in part.
+    # meshio supports pixels, voxels and hexagonal prisms of VTK only in part.
     partly = (8, "pixel", 4, 2), (11, "voxel", 8, 3), (16, "hexa_prism", 12, 3)
     for number, name, count, dimension in partly:
         meshio._common.num_nodes_per_cell.setdefault(name, count)
@@ -209,7 +209,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
         meshio._vtk_common.vtk_to_meshio_type.setdefault(number, name)
     meshio.ansys._ansys._skip_close = _skip_close
     try:
-        # meshio prints, and ends the process if no format fits.
+        # meshio prints messages, and ends the process if no format fits.
         with (
             contextlib.redirect_stdout(io.StringIO()),
             contextlib.redirect_stderr(io.StringIO()),
@@ -233,7 +233,7 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
 
 
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
-    """Sets of SU2's markers by name; meshio counts those whose names are words."""
+    """Return sets of SU2 by the names of markers, which meshio replaces by numbers."""
     number, named = 0, {}
     for name in re.findall(r"^MARKER_TAG *= *(\S+)", path.read_text("latin-1"), re.M):
         number = int(name) if name.isdigit() else number + 1
@@ -278,7 +278,7 @@ def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
-    """An exception as one line; meshio hides that no format fits."""
+    """Return an exception as one line, clearer than meshio's if no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:

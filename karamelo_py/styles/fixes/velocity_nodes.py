@@ -85,9 +85,8 @@ class VelocityNodes(Fix):
     Parameters
     ----------
     velocity
-        vx, vy, vz, one per dimension: functions of x0, y0, z0, time and published values.
-        NULL leaves a component free. After ``leq`` or ``geq``, the velocity is an upper or lower
-        bound.
+        vx, vy, vz, one per dimension: functions of x0, y0, z0, time and published values. NULL
+        leaves a component free. After ``leq`` or ``geq``, the velocity is an upper or lower bound.
     mu
         Coefficient of friction (Coulomb). The wall is at rest in NULL directions. On nodes that it
         holds or bounds, the tangential force is at most mu times the normal force. With `velocity`
