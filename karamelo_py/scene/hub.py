@@ -233,7 +233,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """Whether a run has begun, in a rehearsal also one that will begin."""
+        """True after a run has begun, in a rehearsal also one that will begin."""
         return bool(self.begun or self.update.step)
 
     @property

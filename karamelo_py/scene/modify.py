@@ -159,7 +159,7 @@ class Fix(Publisher):
 
     @property
     def of_bodies(self) -> bool:
-        """Whether the fix moves, touches or links rigid bodies."""
+        """True if the fix moves, touches or links rigid bodies."""
         return self.moves is not None or self.touches is not None or self.links
 
     @property

@@ -60,7 +60,7 @@ class Region(Named):
 
     @property
     def aligned(self) -> bool:
-        """Whether all faces are known to be parallel to the axes."""
+        """True if all faces are known to be parallel to the axes."""
         return bool(self.parts) and all(region.aligned for region in self.parts)
 
     @property
@@ -70,7 +70,7 @@ class Region(Named):
 
     @property
     def flat(self) -> bool:
-        """Whether a part is a line or surface without an inside."""
+        """True if a part is a line or surface without an inside."""
         return any(region.flat for region in self.parts)
 
     @property
