@@ -81,10 +81,12 @@ def test_threads_and_restarts_change_no_bit(run_script):
     assert final(threads).read_text("utf-8") == whole
 
 
-def test_the_width_of_a_cell_does_not_matter(run_interpreted):
-    """Of a layer that shears under gravity: one cell wide, or four."""
+@pytest.mark.parametrize("averaging", ["false", "true"])
+def test_the_width_of_a_cell_does_not_matter(run_interpreted, averaging):
+    """Of a layer that shears under gravity: one cell wide, or four; with F-bar and without."""
+    run = f"anti_volumetric_locking({averaging})\nrun(12)"
     one, four = (
-        columns(final(run_interpreted(FLOW.format(wide=wide) + "run(12)", folder=str(wide))))
+        columns(final(run_interpreted(FLOW.format(wide=wide) + run, folder=f"{averaging}{wide}")))
         for wide in (1, 4)
     )
     first = four["x"] < 1 / 8
@@ -230,13 +232,44 @@ def test_threads_and_restarts_change_no_bit_of_a_sheared_cell(run_script):
     assert final(threads).read_text("utf-8") == lines
 
 
+SLIDING = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension(2, 0, 0.5, -0.25, 1.25, 0.125)
+    boundary(periodic, x)
+    region(layer, block, 0, 0.5, 0, 1)
+    material(m, linear, 1000, 2e6, 0.3)
+    solid(layer, region, layer, 2, m, 0.125)
+    region(ground, block, {ends}, -INF, 0)
+    fix(ground, {ground}, 0.2)
+    fix(weight, body_force, all, 5, -5)
+    p = 1000*5*(1 - y0)
+    fix(rest, initial_stress, all, -3/7*p, -p, -3/7*p, 0, 0, 0)
+    compute(v, average_velocity, all)
+    log_modify(custom, time, v_x, v_y)
+    set_output(time(0.1))
+    run_time(0.5)
+"""
+SURFACE = "contact/surface, all, ground"
+PLANE_OF = "contact/minimize_penetration/plane, layer, 0, 0, 0, 0, 1, 0"
+
+
+@pytest.mark.parametrize("ground", [SURFACE, PLANE_OF])
+def test_a_layer_slides_on_ground_without_ends(run_script, ground):
+    """Coulomb: acceleration g_x - mu g_y, through the seam. Ground that ends is refused."""
+    log = run_script(SLIDING.format(ends="-INF, INF", ground=ground)).log
+    acceleration = np.diff(log["v_x"][[1, -1]]) / np.diff(log["Time"][[1, -1]])
+    assert abs(acceleration / 4 - 1) < 0.005
+    if ground == SURFACE:
+        err = run_script(SLIDING.format(ends="0, INF", ground=ground), status=1).err
+        assert "boundary(periodic) does not support fix contact/surface" in err
+
+
 REFUSED = {
     "method(tlmpm, FLIP, linear, 1)": "method tlmpm",
     "method(ulmpm, FLIP, cpgimp, 1)": "the basis cpgimp",
     "method(ulmpm, XPIC, linear, 2)": "transfer XPIC",
     "method(ulmpm, FLIP, linear, 1)\nscheme(usl)": "scheme usl",
     "method(ulmpm, FLIP, linear, 1)\nscheme(quasi-static)": "scheme quasi-static",
-    "method(ulmpm, FLIP, linear, 1)\nanti_volumetric_locking(true)": "anti_volumetric_locking",
     "method(ulmpm, FLIP, linear, 1)\nboundary(delete)": "boundary(delete)",
 }
 SCENE = """
@@ -264,6 +297,14 @@ MISTAKES = [
     ({"water": "pore_water(m, n=0.4, permeability=1)"}, (), "does not support pore_water"),
     ({"directions": ", x, shear=1"}, (), "a sheared cell is periodic in x and y"),
     ({}, ("--gpu",), "does not support --gpu"),
+    (
+        {
+            "directions": ", x, y, shear=1",
+            "head": "anti_volumetric_locking(true)\n" + USUAL["head"],
+        },
+        (),
+        "boundary(periodic, shear=...) does not support anti_volumetric_locking",
+    ),
 ]
 
 

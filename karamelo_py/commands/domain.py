@@ -146,10 +146,12 @@ def boundary(
     periodic. Points return to the domain every 10 steps; until then, dumps may show them outside.
     Periodic directions need method ulmpm with a linear basis or splines, scheme musl, any transfer
     except XPIC, and one process without a GPU. They cannot be combined with other styles of
-    boundary, axisymmetry, F-bar, heat, contact of points, tools, free rigid bodies or pore_water.
+    boundary, axisymmetry, heat, contact of points, tools that end in a periodic direction, free
+    rigid bodies or pore_water.
 
     With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
-    initial_velocity_particles). Momentum is conserved to round-off; energy is not monitored.
+    initial_velocity_particles), without F-bar. Momentum is conserved to round-off; energy is not
+    monitored.
 
     In tlmpm and tlcpdi, the command has no effect: the separate grids of solids have no edge.
 

@@ -315,6 +315,20 @@ class Outside(NamedTuple):
     inner: NamedTuple
 
 
+def is_endless(shape: NamedTuple, axis: int) -> bool:
+    """Return True if a shape is the same at all positions along `axis`."""
+    if isinstance(shape, Joined | Common):
+        return all(is_endless(part, axis) for part in shape.parts)
+    if isinstance(shape, Outside):
+        return is_endless(shape.inner, axis)
+    if isinstance(shape, HalfSpace):
+        return bool(shape.normal[axis] == 0)
+    if isinstance(shape, Convex):
+        round_about = shape.across[axis] and np.isfinite(shape.radius)
+        return not (shape.planes[:, axis].any() or round_about)
+    return False
+
+
 @point_function()
 def depth(shape, kin, x, reach):
     """Return the depth of `x` in a shape, negative outside. It is exact where below `reach`."""

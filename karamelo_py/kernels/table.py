@@ -25,7 +25,14 @@ from karamelo_py.kernels.equations.corrected_acceleration import (
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain, Normal
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.equations.periodic import Join, JoinVelocity, Seam, ask_to_sort
+from karamelo_py.kernels.equations.periodic import (
+    Join,
+    JoinMean,
+    JoinMeanStress,
+    JoinVelocity,
+    Seam,
+    ask_to_sort,
+)
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
 from karamelo_py.points.transfers import stores_moment
@@ -329,7 +336,7 @@ def _after_others(row, s):
 @in_scene.on(Sweep)
 def _in_company(row, s):
     """Add tasks that join the pass, and rows before it; F-bar adds a pass before strains."""
-    averages = average_volumes(row) if isinstance(s.averaging, fbar.FBar) else ()
+    averages = average_volumes(row, s) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)
     before: tuple = ()
@@ -402,21 +409,22 @@ def _next_term(k: int) -> tuple:
     return Sweep(visit, moves=False, reported=None), NodeTask(xpic.ExtendSeries())
 
 
-def average_volumes(row: Sweep) -> tuple:
+def average_volumes(row: Sweep, s: Setup) -> tuple:
     """Average the coming strain's volume change at the nodes (F-bar)."""
     if not (row.gathers and any(isinstance(task, strain.Strain) for task in row.visit.tasks)):
         return ()
     trial = strain.TrialStrainOfLastStep() if row.of_last_step else strain.TrialStrain()
     visit = Visit((trial,), (fbar.Volumes(),), OldWeights())
     sweep = Sweep(visit, row.share, row.of_last_step, moves=False, reported=None)
-    return sweep, NodeTask(fbar.TakeMean())
+    return sweep, *JOIN_MEANS(s), NodeTask(fbar.TakeMean())
 
 
 def average_stress(s: Setup) -> tuple:
     if not isinstance(s.averaging, fbar.FBar):
         return ()
     visit = Visit((fbar.SetMeanStress(),), (fbar.AveragedForce(),), OldWeights())
-    return NodeTask(fbar.TakeMeanStress()), Sweep(visit, moves=False, reported=None)
+    sweep = Sweep(visit, moves=False, reported=None)
+    return *JOIN_STRESSES(s), NodeTask(fbar.TakeMeanStress()), sweep
 
 
 def corrected(s: Setup) -> tuple:
@@ -470,6 +478,7 @@ def sort_in_time(s: Setup) -> tuple:
     return (Once(ask_to_sort),) if isinstance(s.control.ranks, Seam) else ()
 
 
+JOIN_MEANS, JOIN_STRESSES = seams(JoinMean, {}), seams(JoinMeanStress, {})
 SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
 SEAM_AGAIN = SceneTask(
     seams(JoinVelocity, sheared.OF_VELOCITY),
@@ -509,10 +518,10 @@ FORCE = Scatter((InternalForce(),), OldWeights())
 # v* = v + dt f / m with loads, prescribed velocities, contact; heat flow
 UPDATE = (
     SceneTask(sort_in_time),
+    AVERAGED,
     SEAM,
     FRICTION,
     LOSS,
-    AVERAGED,
     HEAT,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,

@@ -15,8 +15,12 @@ PERIODIC = Restrictions(
     "periodic", "no boundary(periodic)",
     only={"method": ("ulmpm",), "scheme": ("musl",), "basis": HATS_AND_SPLINES, "kinematics": FLAT},
     without=("heat", "series", "delete", "reflect", "ranks", "gpu", "pore_water", "rigid_body"),
-    but={"F-bar": "quadratic-spline, which locks less",
-         "tools": "walls by fix velocity_nodes: a tool covers one period"},
+    but={"ending tools": "a plane, or a region without ends in periodic directions: "
+         "region(ground, block, -INF, INF, -INF, 0)"},
+)  # fmt: skip
+SHEARED = Restrictions(
+    "sheared", "boundary(periodic) without shear",
+    but={"F-bar": "quadratic-spline, which locks less"},
 )  # fmt: skip
 WALLS = {
     "grids of solids": "method(ulmpm, ...), or walls by fix(ID, contact/surface, all, region): no "

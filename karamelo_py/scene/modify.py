@@ -152,6 +152,10 @@ class Fix(Publisher):
     def all_formulas(self) -> list[Expression]:
         return list(_formulas_in(tuple(vars(self).values())))
 
+    def is_endless(self, axis: int) -> bool:
+        """True if a tool is the same at all positions along an axis."""
+        return False
+
     @property
     def of_rigid_points(self) -> bool:
         soft = (solid for solid in self.hub.solids.values() if not solid.rigid)

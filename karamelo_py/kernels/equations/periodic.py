@@ -11,6 +11,7 @@ from typing import NamedTuple
 from karamelo_py.compiler import index
 from karamelo_py.compiler.fields import StepField, SummedField, field
 from karamelo_py.kernels.arrays import TIMESTEP
+from karamelo_py.kernels.equations.fbar import NodalMean, NodalStress
 from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.totals import counts
 
@@ -77,6 +78,25 @@ class JoinVelocity(NamedTuple):
     def at_node(task, kin, nodes, n, dt):
         if _is_lowest(task.axis, nodes, n):
             _join(task.axis, nodes, nodes.velocity, n)
+
+
+@node_task
+class JoinMean(NamedTuple):
+    """Gives all images of a node the sum of an average, before its division (F-bar)."""
+
+    axis: Axis
+
+    of = NodalMean
+    goes_through = ("nodal mean", "in use")
+
+    def at_node(task, kin, nodes, n, dt):
+        if _is_lowest(task.axis, nodes, n):
+            _join(task.axis, nodes, field(nodes.fields, task.of), n)
+
+
+class JoinMeanStress(JoinMean):
+    of = NodalStress
+    goes_through = ("nodal stress", "in use")
 
 
 def _is_lowest(axis, nodes, n):

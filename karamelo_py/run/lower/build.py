@@ -152,7 +152,10 @@ def features(hub: Hub) -> Iterator[Feature]:
                 "yielding walls", "", words, "velocities without geq, leq and mu", fix.mark
             )
         if (fix.solids and fix.friction is None) or fix.follows_points:
-            yield Feature("tools", "", f"fix {fix.style}", f"no fix {fix.style}", fix.mark)
+            words, instead = f"fix {fix.style}", f"no fix {fix.style}"
+            yield Feature("tools", "", words, instead, fix.mark)
+            if not all(map(fix.is_endless, hub.domain.periodic)):
+                yield Feature("ending tools", "", words, instead, fix.mark)
 
 
 def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | None]]:
@@ -161,6 +164,8 @@ def _restricted(hub: Hub) -> Iterator[tuple[Restrictions | None, str, Mark | Non
         yield CORRECTED, "mass=corrected", update.method.mark
     if box.periodic:
         yield boundary.PERIODIC, "boundary(periodic)", None
+    if box.shear:
+        yield boundary.SHEARED, "boundary(periodic, shear=...)", None
     if update.boundary != "error":
         words = f"boundary({update.boundary})"
         yield boundary.RESTRICTIONS[update.boundary], words, update.boundary_mark

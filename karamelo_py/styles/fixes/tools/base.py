@@ -97,6 +97,10 @@ class PlaneTool(ToolFix):
         if not self.hub.rehearsing:  # a rehearsal lacks some values
             unit(self.now(*self.towards))
 
+    def is_endless(self, axis: int) -> bool:
+        normal = self.towards[axis]
+        return normal.is_constant and normal.constant == 0
+
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
         """Depth (n,) of points, and the normal (d,)."""
         normal = unit(self.now(*self.towards))

@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.compiler import address_of_python
 from karamelo_py.kernels.equations.internal_force import ContactLoss, Lever
+from karamelo_py.kernels.surfaces import is_endless
 from karamelo_py.kernels.touching import (
     ASIDE,
     CALL,
@@ -130,6 +131,9 @@ class ContactSurface(StiffTool):
 
     def depth_of(self, points: PointTable) -> np.ndarray:
         return self.depth(points.position.astype(float) - self.moved(1.0)[0])
+
+    def is_endless(self, axis: int) -> bool:
+        return is_endless(self.region.outline(), axis)
 
     def faces_of(self) -> np.ndarray | None:
         skin = self.region.skin
