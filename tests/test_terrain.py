@@ -2,6 +2,7 @@
 
 from math import cos, radians, sin, tan
 
+import meshio
 import numpy as np
 import pytest
 
@@ -39,6 +40,39 @@ def test_a_geotiff_is_the_same_raster(tmp_path):
     (tmp_path / "none.tif").write_bytes(b"no raster")
     with pytest.raises(ScriptError, match="cannot be read"):
         read_raster(tmp_path / "none.tif")
+
+
+def cloud(plane=lambda x, y: 1 + 0.5 * x - 0.25 * y, count=60):
+    """Scattered points of a plane, and the corners of a box of 4 by 3 at (10, 20)."""
+    x, y = np.random.default_rng(1).random((2, count)) * [[4], [3]]
+    x, y = np.append(x, [0, 4, 0, 4]), np.append(y, [0, 0, 3, 3])
+    return np.column_stack([10 + x, 20 + y, plane(x, y)])
+
+
+@pytest.mark.parametrize("name", ["cloud.xyz", "cloud.csv", "cloud.ply", "cloud.vtk"])
+def test_a_cloud_of_points_is_interpolated(tmp_path, name):
+    """Linear interpolation is exact on a plane; the raster covers the box."""
+    points, path = cloud(), tmp_path / name
+    if path.suffix in (".xyz", ".csv"):
+        np.savetxt(path, points, delimiter="," if path.suffix == ".csv" else " ")
+    else:
+        meshio.Mesh(points, [("vertex", np.arange(len(points))[:, None])]).write(path)
+    raster = read_raster(path)
+    x, y = np.meshgrid(*raster.centres)
+    exact = 1 + 0.5 * np.minimum(x - 10, 4) - 0.25 * np.minimum(y - 20, 3)
+    assert np.abs(raster.heights - exact).max() < 1e-6
+    assert raster.cell == pytest.approx((12 / 64) ** 0.5)
+    ends = raster.corner + raster.cell * np.array(raster.heights.shape[::-1])
+    assert (raster.corner <= (10, 20)).all() and (ends >= (14, 23)).all()
+
+
+@pytest.mark.parametrize(
+    ("rows", "says"), [("1 2\n3 4\n", "has 2 columns"), ("1 2 3\n2 3 4\n3 4 5\n", "on a line")]
+)
+def test_a_cloud_spans_an_area(tmp_path, rows, says):
+    (tmp_path / "cloud.xyz").write_text(rows, encoding="utf-8")
+    with pytest.raises(ScriptError, match=says):
+        read_raster(tmp_path / "cloud.xyz")
 
 
 def test_ground_is_closed_and_has_its_volume():

@@ -1,4 +1,4 @@
-"""Rasters of heights (ESRI ASCII grids, GeoTIFF), and profiles."""
+"""Rasters of heights (ESRI ASCII grids, GeoTIFF, clouds of points), and profiles."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -12,12 +12,14 @@ from karamelo_py.script.reading import read_text
 from karamelo_py.script.terms import number_of
 
 GEOTIFF = (".tif", ".tiff")
+TABLES = (".csv", ".xyz")
+CLOUDS = (*TABLES, ".ply", ".vtk", ".vtu", ".vtp")
 NO_DATA = -9999.0
 FORM = "ncols, nrows, xllcorner, yllcorner, cellsize (and NODATA_value), then rows from the north"
 
 
 class HeightsFile(InputFile):
-    endings = (".asc", ".txt", ".csv", ".grd", *GEOTIFF)
+    endings = (".asc", ".txt", ".grd", *GEOTIFF, *CLOUDS)
 
 
 class Raster(NamedTuple):
@@ -38,6 +40,8 @@ def read_raster(path: Path) -> Raster:
     """Read a raster; raises ScriptError for a wrong header, size or number."""
     if path.suffix.lower() in GEOTIFF:
         return _of_geotiff(path)
+    if path.suffix.lower() in CLOUDS:
+        return _of_cloud(path)
     words, head = read_text(path).split(), {}
     while len(words) > 1 and number_of(words[0]) is None:
         number = number_of(words[1])
@@ -87,6 +91,39 @@ def _of_geotiff(path: Path) -> Raster:
         raise ScriptError(message, argument="file", expected="square cells along the axes")
     corner = np.array([transform.c, transform.f + heights.shape[0] * transform.e])
     return Raster(corner, transform.a, heights[::-1])
+
+
+def _of_cloud(path: Path) -> Raster:
+    """Interpolate points linearly (Delaunay triangles); cells have the points' mean spacing."""
+    try:
+        from scipy.interpolate import LinearNDInterpolator
+        from scipy.spatial import QhullError
+    except ImportError:
+        raise ScriptError(
+            f"{path}: a cloud of points needs SciPy",
+            argument="file",
+            hint="pip install scipy, or gdal_grid -of AAIGrid, which writes an ESRI grid",
+        ) from None
+    if path.suffix.lower() in TABLES:
+        points = np.column_stack([*read_table(path).values()])
+    else:
+        from karamelo_py.scene.meshes.reading import points_of
+
+        points = points_of(path)
+    form = "rows of x, y and z that span an area"
+    if points.shape[1] != 3:
+        message = f"{path} has {points.shape[1]} columns"
+        raise ScriptError(message, argument="file", expected=form)
+    lo, hi = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    try:
+        height = LinearNDInterpolator(points[:, :2] - lo, points[:, 2])
+    except (QhullError, ValueError):
+        message = f"the points of {path} are on a line, or too few"
+        raise ScriptError(message, argument="file", expected=form) from None
+    cell = float(np.sqrt(np.prod(hi - lo) / len(points)))
+    x, y = (np.arange(np.ceil(side / cell - 1e-9) + 1) * cell for side in hi - lo)
+    inside = np.meshgrid(np.minimum(x, hi[0] - lo[0]), np.minimum(y, hi[1] - lo[1]))
+    return Raster(lo - cell / 2, cell, height(*inside))
 
 
 def read_profile(path: Path) -> np.ndarray:

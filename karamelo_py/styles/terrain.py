@@ -20,7 +20,9 @@ class Heights(Enclosed):
     ----------
     file
         In 3D a raster of z over x and y: an ESRI ASCII grid (.asc), or GeoTIFF (.tif, with the
-        package rasterio). In 2D a profile: a file with two columns, x and height y.
+        package rasterio); or a cloud of points (with SciPy): a table of x, y and z (.xyz, .csv), or
+        a file that meshio reads (.ply, .vtk, .vtu). In 2D a profile: a file with two columns, x
+        and height y.
     x, y
         Position of the raster's lower corner in the scene; default: its coordinates in the file. In
         2D x alone, of the first row.
@@ -34,6 +36,8 @@ class Heights(Enclosed):
 
     Notes
     -----
+    A cloud is interpolated linearly on a raster with the mean spacing of its points.
+
     Heights are at the centres of cells; between four centres the surface has two triangles,
     and it is level beyond the outer ones. The raster must cover the domain. A landslide is the
     difference of two such regions, the initial surface and the slip surface. fix contact/surface

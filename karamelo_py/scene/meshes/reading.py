@@ -232,6 +232,11 @@ def _by_meshio(path: Path, file_format: str | None = None, why: str | None = Non
     return Mesh(points, cells, sets, {}, {})
 
 
+def points_of(path: Path) -> np.ndarray:
+    """Read the points (n, 3) of a cloud or a mesh; raises ScriptError if meshio cannot."""
+    return _by_meshio(path).points
+
+
 def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np.ndarray]]:
     """Return sets of SU2 by the names of markers, which meshio replaces by numbers."""
     number, named = 0, {}
