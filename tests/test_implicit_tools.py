@@ -312,3 +312,46 @@ def test_contact_bears_a_body_after_long_load_steps(run_interpreted, scheme):
     if scheme == "quasi-static":  # with inertia the state depends on the time
         long, short = logs
         assert long.c_y[-1] == pytest.approx(short.c_y[-1], rel=1e-9)
+
+
+FREE = """
+    method(ulmpm/contacts, FLIP, linear, 1)
+    scheme(quasi-static, limit=stop)
+    dimension(2, 0, 2, 0, 2, 0.25)
+    region(ground, block, {ends}, 0, 1)
+    region(box, block, 0.5, 1.5, 1, 1.5)
+    material(rubber, linear, 1, 1e5, 0)
+    material(steel, rigid, 8)
+    solid(ground, region, ground, 2, rubber, 0.25, 0)
+    solid(box, region, box, 2, steel, 0.25, 0)
+    region(low, block, INF, INF, INF, 0)
+    group(low, nodes, region, low, all)
+    fix(low, velocity_nodes, low, 0, 0)
+    fix(b, rigid_body, box, {loads})
+    fix(rub, contact/friction, ground, box, 0.3)
+    set_dt({dt})
+    set_output(1)
+    log_modify(custom, step, time, b_x, b_y, b_rz, b_vy, b_fx, b_fy, low_x, low_y)
+    run_time(1)
+"""
+
+
+def test_a_free_body_rests_in_load_steps(run_script):
+    """A box of 4 kg on a column of its width: sigma H / E, and its weight."""
+    text = FREE.format(ends="0.5, 1.5", loads="gravity=(0, -0.1*time)", dt=0.5)
+    log = run_script(text).log
+    assert log.b_fy == pytest.approx([0, 0.2, 0.4], rel=1e-5)
+    assert log.low_y == pytest.approx(log.b_fy, rel=1e-5) and not log.b_vy.any()
+    assert 1.25 - log.b_y == pytest.approx([0, 2e-6, 4e-6], rel=2e-3, abs=1e-12)
+    assert np.abs(log.b_rz).max() < 1e-12
+
+
+def test_a_free_body_slides_beyond_the_limit_of_friction(run_script):
+    """Pushed by 40 N t, with mu N = 12 N: no equilibrium beyond t = 0.3; and one without a floor."""
+    text = FREE.format(ends="0, 2", loads="gravity=(0, -10), force=(40*time, 0)", dt=0.25)
+    result = run_script(text)
+    assert result.log.Time[-1] == pytest.approx(0.3, rel=2e-3)
+    assert result.log.b_fx[1:] == pytest.approx(-40 * result.log.Time[1:], rel=1e-8)
+    assert "limit load: no equilibrium beyond" in result.out + result.err
+    loose = run_script(text.replace("1, 1.5)", "1.5, 2)"), status=1, folder="loose").err
+    assert "solid 'box' is not held along" in loose and "fixed=(" in loose

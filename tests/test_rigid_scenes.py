@@ -25,6 +25,23 @@ def test_a_heavy_disk_bends_a_beam(run_script, refine, within):
     assert late(log, "clamp_y", 0.9) == pytest.approx(2000, rel=0.05)
 
 
+def test_a_heavy_disk_bends_a_beam_in_one_load_step(run_script):
+    text = (INPUTS / "in.heavy_disk").read_text("utf-8")
+    for old, new in {
+        "method(tlmpm,": "scheme(quasi-static)\nmethod(ulmpm/contacts,",
+        "neo-hookean": "linear",
+        "min(time/0.2, 1)": "time",
+        "fix(touch,": "#",
+        "fix(calm,": "#",
+        "set_output(20)": "set_dt(1)",
+    }.items():
+        assert old in text
+        text = text.replace(old, new)
+    log = run_script(text).log
+    assert log.deflection[-1] == pytest.approx(log.exact[-1], rel=0.02)
+    assert [log.d_fy[-1], log.clamp_y[-1]] == pytest.approx([2000, 2000], rel=1e-8)
+
+
 @pytest.mark.parametrize(
     ("change", "within"),
     [

@@ -14,6 +14,7 @@ from karamelo_py.run.listening import Trouble, when, where
 from karamelo_py.run.no_number import no_number
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
+from karamelo_py.scene.modify import moved
 from karamelo_py.scene.solid import named, solid_with
 
 DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
@@ -170,6 +171,11 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
         if simulation.steps.above_limit():
             seen = f"{name} at {where(old)} is thrown out of the domain"
             return Trouble(seen, smaller, "point-lost")
+        body = moved(hub).get(solid_with(hub, number))
+        if body is not None:
+            seen = f"the rigid body '{body.moves.id}' leaves the domain at {where(new)}"
+            hint = "a larger domain, or a region that stops it, with fix contact/bodies"
+            return Trouble(f"{seen} (point {number})", hint, "body-left")
         loose = _loose(simulation, number, old, LOOSE * h)
         keep = f"; against fracture, {energy.WHOLE}" if loose else ""
         for fix in hub.fixes.values():

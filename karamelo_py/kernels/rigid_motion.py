@@ -476,14 +476,21 @@ def finish_step(body, control, dimension):
     for a in range(6):
         work.after[a], work.given[a] = work.momentum[a] - total[a], 0.0
     _velocities_of(body, work.after)
-    u, M, old, partly = work.u, work.mass, work.slope, False
+    u, M, partly = work.u, work.mass, False
     for k in range(3):
         state.v[k], state.spin[k] = u[k], u[3 + k]
-        state.move[k] = u[k]
         state.momentum[k] = M[3 + k, 3] * u[3] + M[3 + k, 4] * u[4] + M[3 + k, 5] * u[5]
         partly = partly or not body.dofs[3 + k]
+    move(body, dt, dimension, partly)
+    publish(body, values)
+
+
+@noinline
+def move(body, dt, dimension, by_spin):
+    """Move a body by its velocities; rotate by its constant spin or, if free, momentum."""
+    state, old = body.state[0], body.solution.slope
     old[:3, :3] = state.R
-    if partly:
+    if by_spin:
         _turn_by_spin(body, dt)
     else:
         _drift_about(body, 0, 0.5 * dt)
@@ -498,9 +505,14 @@ def finish_step(body, control, dimension):
             for c in range(3):
                 rotation += state.R[a, c] * old[b, c]
             state.spread[a, b] = (rotation - (1.0 if a == b else 0.0)) / dt
-        work.before[a] = state.x[a]
-        state.x[a] += dt * u[a]
+        body.solution.before[a] = state.x[a]
+        state.move[a] = body.solution.u[a]
+        state.x[a] += dt * state.move[a]
     _set_angle(state, dt, dimension)
+
+
+@noinline
+def publish(body, values):
     for k in range(body.slots.shape[0]):
         column = body.slots[k, 1]
         about = _about_origin(body, column - NUMBERS) if column >= NUMBERS else body.numbers[column]

@@ -18,6 +18,9 @@ LAST_GOOD = Path("last_good.*.h5")
 MOST_REPEATED = 100  # steps, for the last rows of log and dumps
 
 
+CHANGES = {"left-domain": "boundary(delete)", "body-left": "another fix rigid_body of the same ID"}
+
+
 class OthersWait(Exception):
     """This process cannot write a file while others still send data for it."""
 
@@ -77,7 +80,7 @@ class LastGood(NamedTuple):
         if simulation.step < step:
             present.give(self.hub)
         self._end_outputs()
-        change = "boundary(delete)" if code == "left-domain" else simulation.remedy
+        change = CHANGES.get(code, simulation.remedy)
         return self._resume(path, f"{'before energy grew; ' * grown}with {change}")
 
     def _write_before_growth(self, end: int) -> Path | None:

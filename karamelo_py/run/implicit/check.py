@@ -36,6 +36,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         yield "solves water in pores directly, not with solver=amg", "solver=direct, or auto", None
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
+    yield from _of_bodies(hub)
     kin = method.kinematics(hub)
     if method.fields_per_solid and isinstance(kin, Twisted):
         yield "knows no friction of contact around an axis (twist=true)", _EXPLICIT, method.mark
@@ -120,6 +121,19 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
                 f"ulmpm/contacts; or {_EXPLICIT}",
                 fix.mark,
             )
+
+
+def _of_bodies(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
+    update = hub.update
+    fixes = [fix for fix in hub.fixes.values() if fix.of_bodies]
+    for fix in fixes:
+        if update.scheme.traits.inertia or fix.links:
+            yield f"does not support fix {fix.style}", _EXPLICIT, fix.mark
+        elif not update.method.fields_per_solid:
+            instead = f"method(ulmpm/contacts, ...), or {_EXPLICIT}"
+            yield f"supports fix {fix.style} only in ulmpm/contacts", instead, update.method.mark
+    if fixes and update.scheme.solver == "amg":
+        yield "solves for rigid bodies directly, not with solver=amg", "solver=direct, or auto", None
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:

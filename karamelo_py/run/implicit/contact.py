@@ -62,6 +62,14 @@ class Contact:
         self.jumps = equations.for_all_components(self.jump).tocsr()
         self.respond(np.zeros((m, self.d)), supposed=True)
 
+    def meet(self, nodes: np.ndarray) -> None:
+        """Suppose that the nearest pairs of a body, with `nodes` (m,), are closed if none is."""
+        own = nodes[self.first] | nodes[self.second]
+        if np.any(own) and not np.any(self.close[own]):
+            near = CLOSE * float(np.min(self.s.grids.spacing))
+            self.close |= own & (self.gap <= self.gap[own].min() + near)
+            self.respond(np.zeros((len(nodes), self.d)), supposed=True)
+
     def _shares(self) -> np.ndarray:
         equations = self.equations
         mass = equations.mass / self._around(equations.positions[:, 0], self.s.grids.spacing[0])

@@ -15,6 +15,7 @@ from karamelo_py.kernels.equations.twist import (
     TorqueOfLoads,
     UpdateAround,
 )
+from karamelo_py.kernels.free_bodies import FreeBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.rigid import PUBLISH, RigidBodies, RigidSums
 from karamelo_py.kernels.step import DONE, GAINED, SORT, STOPPED, take_rows
@@ -30,6 +31,7 @@ from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.pore_water import Seepage, is_wet
+from karamelo_py.run.implicit.rigid_bodies import RigidBodies
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool
 from karamelo_py.run.no_number import no_number
@@ -270,13 +272,17 @@ class LoadSteps:
         fixed, velocities = self._prescribed(equations)
         led = equations.led[:, None]
         bound = fixed | led
-        velocities = np.where(led, equations.velocity_of_rigid, velocities)
+        moving = RigidBodies(equations, simulation) if isinstance(s.bodies, FreeBodies) else None
+        of_rigid = equations.velocity_of_rigid
+        if moving is not None:
+            of_rigid = np.where(moving.nodes[:, None], moving.velocities, of_rigid)
+        velocities = np.where(led, of_rigid, velocities)
         if self.moduli is None:
             self.moduli = equations.moduli()
         separate = isinstance(s.contact, SeparateFields)
         contact = Contact(equations, self.moduli.of_grids) if separate else None
         if not self.dynamic:
-            self._check_held(equations, bound, contact)
+            self._check_held(equations, bound, contact, moving)
         if before is None:
             inertia: Rest | Motion = Rest(equations)
         else:
@@ -288,6 +294,7 @@ class LoadSteps:
         newton = Newton(self.scheme, equations, ~bound, inertia, pushing, external, dt, *more)
         newton.scale(self.moduli, self.scheme.stabilisation)
         newton.seepage = Seepage(equations, hooks, dt) if is_wet(equations) else None
+        newton.bodies = moving
         try:
             jump = np.where(bound, velocities * dt, 0.0)
             u, iterations, residual = newton.solve(jump, self._interrupted)
@@ -313,7 +320,7 @@ class LoadSteps:
         self.unknowns = int(np.count_nonzero(~bound))
         self.corrections += iterations
         reaction = newton.reaction(u)
-        solution = newton.seepage, u, fixed, reaction, iterations, residual
+        solution = newton.seepage, moving, u, fixed, reaction, iterations, residual
         return Equilibrium(equations, inertia, pushing, *solution)
 
     def _prescribed(self, equations: Equations) -> tuple[np.ndarray, np.ndarray]:
@@ -375,6 +382,8 @@ class LoadSteps:
         update[nodes, change : change + d] = 0
         for one in result.pushing:
             one.publish()
+        if result.bodies is not None:
+            result.bodies.finish(-result.reaction, s.control, s.blocks)
         if isinstance(s.contact, RigidBodies):
             forces = np.where(result.fixed, 0.0, -result.reaction)
             led = result.equations.led
@@ -391,7 +400,13 @@ class LoadSteps:
         values = self.simulation.setup.control.values
         return f"step {int(values[TIMESTEP]) + 1}, time {float(values[TIME]):.6g}"
 
-    def _check_held(self, equations: Equations, fixed: np.ndarray, contact: Contact | None) -> None:
+    def _check_held(
+        self,
+        equations: Equations,
+        fixed: np.ndarray,
+        contact: Contact | None,
+        moving: RigidBodies | None,
+    ) -> None:
         s = equations.s
         bodies = equations.bodies()
         motions = equations.rigid_motions
@@ -410,6 +425,13 @@ class LoadSteps:
             how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(rows) else "is held by nothing"
             raise self._loose(self._solid_at(equations, nodes), how)
+        if moving is not None and contact is not None and (loose := moving.loose(contact)):
+            way = f"is not held along {loose[1]}" if len(loose[1]) == 1 else "can rotate"
+            raise self._error(
+                f"solid '{loose[0]}' {way}, and there is no inertia",
+                f"fixed=({loose[1]}) in fix rigid_body, contact from the start, with friction "
+                "(fix contact/friction), or scheme(musl)",
+            )
 
     def _loose(self, solid: str, how: str) -> ScriptError:
         return self._error(
@@ -443,6 +465,7 @@ class Equilibrium(NamedTuple):
     inertia: Rest | Motion
     pushing: list[Contact | PushingTool]
     seepage: Seepage | None
+    bodies: RigidBodies | None
     u: np.ndarray
     fixed: np.ndarray  # held components
     reaction: np.ndarray

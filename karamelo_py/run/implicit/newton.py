@@ -13,6 +13,7 @@ from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import MOST_MOVED, Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.pore_water import Seepage
+from karamelo_py.run.implicit.rigid_bodies import RigidBodies
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -83,6 +84,7 @@ class Newton:
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
         self.kept: dict = {}  # solver data between corrections
         self.seepage: Seepage | None = None
+        self.bodies: RigidBodies | None = None
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
 
@@ -102,7 +104,10 @@ class Newton:
         u = np.zeros_like(jump)
         for iteration in range(scheme.iterations + 1):
             balance = self.balance(u)
-            residual = self._norm(balance, free) / self._size(u)
+            residual = self._norm(balance, free)
+            if self.bodies is not None:
+                residual = float(np.hypot(residual, self.bodies.norm(self.bodies.rest(balance))))
+            residual /= self._size(u)
             if self.seepage is not None:
                 residual = max(residual, self.seepage.residual(scheme.tolerance))
             if residual <= scheme.tolerance and not (iteration == 0 and np.any(jump)):
@@ -134,7 +139,9 @@ class Newton:
         return "factors" in self.kept and solvers.changed_sign(self.kept["factors"])
 
     def _size(self, u: np.ndarray) -> float:
-        norms = self._norm(self.external), self._norm(self.inner), self.inertia.size(u)
+        norms = [self._norm(self.external), self._norm(self.inner), self.inertia.size(u)]
+        if self.bodies is not None:
+            norms.append(self.bodies.norm(self.bodies.load))
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
@@ -156,9 +163,12 @@ class Newton:
             equations.linearise(self.dt, self.ghost)
             A, b = equations.whole, balance.ravel() - equations.whole @ jump.ravel()
             solvers.hold(A, ~free, self.inertia.diagonal * equations.mass)
+            whole = self.bodies
             for one in self.pushing:
                 more = one.matrix()
                 b -= more @ jump.ravel()
+                if whole is not None and isinstance(one, Contact):
+                    whole.couple(more, free, balance - (more @ jump.ravel()).reshape(jump.shape))
                 solvers.hold(more, ~free, np.zeros(len(free)))
                 A = A + more
             b[~free.ravel()] = 0
@@ -172,6 +182,9 @@ class Newton:
                 options = rigid.reshape(len(b), -1), accuracy, self.kept
                 if self.seepage is not None:
                     x = self.seepage.solve(A, b, jump, free, self.kept).reshape(free.shape)
+                elif whole is not None:
+                    moved = whole.solve(A, b, self.kept)
+                    return np.where(free, moved, jump + moved)
                 else:
                     x = solvers.solve(self.scheme.solver, A, b, *options).reshape(free.shape)
         except solvers.Singular:

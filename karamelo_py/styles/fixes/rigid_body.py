@@ -100,6 +100,9 @@ class RigidBody(Fix):
     without fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through held
     nodes, and without fix contact/bodies through each other.
 
+    In load steps (scheme quasi-static) with ulmpm/contacts its loads and contact are in equilibrium
+    at the end of each step; motion and turning are displacements per unit of time.
+
     See Also
     --------
     contact/rigid_body, contact/bodies, joint, velocity_particles, method ulmpm/contacts
@@ -113,7 +116,6 @@ class RigidBody(Fix):
     restrictions = Restrictions(
         "rigid_body", "a prescribed motion: fix velocity_particles",
         without=("delete", "reflect", "single", "pore_water", "ranks", "gpu"),
-        but={"implicit": "scheme(musl), or a prescribed motion: fix velocity_particles"},
     )  # fmt: skip
     published = (
         "x", "y", "z", "rx", "ry", "rz", "vx", "vy", "vz", "wx", "wy", "wz",
@@ -326,6 +328,8 @@ class RigidBody(Fix):
             if name not in allowed:
                 expected = "some of " + ", ".join(allowed)
                 raise _wrong(part, f"the body has no direction '{name}'", expected)
+            if [one.text for one in fixed.listed()].count(name) > 1:
+                raise _wrong(part, f"'{name}' is named twice", "each direction once")
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
                 raise _wrong(part, f"{name} is fixed, and {word} prescribes it", "one of the two")
