@@ -195,8 +195,7 @@ MISTAKES = {
         "earlier runs",
         "before",
     ),
-}
-  # fmt: skip
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("right", MISTAKES)
