@@ -347,7 +347,7 @@ def test_a_free_body_rests_in_load_steps(run_script):
 
 
 def test_a_free_body_slides_beyond_the_limit_of_friction(run_script):
-    """Pushed by 40 N t, with mu N = 12 N: no equilibrium beyond t = 0.3; and one without a floor."""
+    """Pushed by 40 N t, with mu N = 12 N: no equilibrium beyond t = 0.3."""
     text = FREE.format(ends="0, 2", loads="gravity=(0, -10), force=(40*time, 0)", dt=0.25)
     result = run_script(text)
     assert result.log.Time[-1] == pytest.approx(0.3, rel=2e-3)

@@ -133,7 +133,11 @@ def _of_bodies(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
             instead = f"method(ulmpm/contacts, ...), or {_EXPLICIT}"
             yield f"supports fix {fix.style} only in ulmpm/contacts", instead, update.method.mark
     if fixes and update.scheme.solver == "amg":
-        yield "solves for rigid bodies directly, not with solver=amg", "solver=direct, or auto", None
+        yield (
+            "solves for rigid bodies directly, not with solver=amg",
+            "solver=direct, or auto",
+            None,
+        )
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:

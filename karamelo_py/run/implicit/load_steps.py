@@ -31,7 +31,7 @@ from karamelo_py.run.implicit.equations import Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.newton import Broken, Failed, Loose, Newton, TooFar, Wrong, counted
 from karamelo_py.run.implicit.pore_water import Seepage, is_wet
-from karamelo_py.run.implicit.rigid_bodies import RigidBodies
+from karamelo_py.run.implicit.rigid_bodies import MovingBodies
 from karamelo_py.run.implicit.solvers import Singular, release
 from karamelo_py.run.implicit.tools import PushingTool
 from karamelo_py.run.no_number import no_number
@@ -272,7 +272,7 @@ class LoadSteps:
         fixed, velocities = self._prescribed(equations)
         led = equations.led[:, None]
         bound = fixed | led
-        moving = RigidBodies(equations, simulation) if isinstance(s.bodies, FreeBodies) else None
+        moving = MovingBodies(equations, simulation) if isinstance(s.bodies, FreeBodies) else None
         of_rigid = equations.velocity_of_rigid
         if moving is not None:
             of_rigid = np.where(moving.nodes[:, None], moving.velocities, of_rigid)
@@ -405,7 +405,7 @@ class LoadSteps:
         equations: Equations,
         fixed: np.ndarray,
         contact: Contact | None,
-        moving: RigidBodies | None,
+        moving: MovingBodies | None,
     ) -> None:
         s = equations.s
         bodies = equations.bodies()
@@ -425,11 +425,11 @@ class LoadSteps:
             how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(rows) else "is held by nothing"
             raise self._loose(self._solid_at(equations, nodes), how)
-        if moving is not None and contact is not None and (loose := moving.loose(contact)):
-            way = f"is not held along {loose[1]}" if len(loose[1]) == 1 else "can rotate"
+        if moving and contact and (unheld := moving.loose(contact)):
+            how = f"is not held along {unheld[1]}" if len(unheld[1]) == 1 else "can rotate"
             raise self._error(
-                f"solid '{loose[0]}' {way}, and there is no inertia",
-                f"fixed=({loose[1]}) in fix rigid_body, contact from the start, with friction "
+                f"solid '{unheld[0]}' {how}, and there is no inertia",
+                f"fixed=({unheld[1]}) in fix rigid_body, contact from the start, with friction "
                 "(fix contact/friction), or scheme(musl)",
             )
 
@@ -465,7 +465,7 @@ class Equilibrium(NamedTuple):
     inertia: Rest | Motion
     pushing: list[Contact | PushingTool]
     seepage: Seepage | None
-    bodies: RigidBodies | None
+    bodies: MovingBodies | None
     u: np.ndarray
     fixed: np.ndarray  # held components
     reaction: np.ndarray

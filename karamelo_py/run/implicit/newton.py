@@ -13,7 +13,7 @@ from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import MOST_MOVED, Equations, Moduli
 from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.pore_water import Seepage
-from karamelo_py.run.implicit.rigid_bodies import RigidBodies
+from karamelo_py.run.implicit.rigid_bodies import MovingBodies
 from karamelo_py.run.implicit.tools import PushingTool
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
@@ -84,7 +84,7 @@ class Newton:
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
         self.kept: dict = {}  # solver data between corrections
         self.seepage: Seepage | None = None
-        self.bodies: RigidBodies | None = None
+        self.bodies: MovingBodies | None = None
         with counted(seconds, "stress"):
             self.inner = equations.respond(np.zeros_like(external), dt)
 

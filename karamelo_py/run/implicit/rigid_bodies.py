@@ -66,7 +66,7 @@ class BodyMotion:
         motion.publish(body, control.values)
 
 
-class RigidBodies:
+class MovingBodies:
     """Unknown motions (k) of all free bodies, within Newton's method."""
 
     def __init__(self, equations: Equations, simulation: SceneState):
@@ -102,8 +102,8 @@ class RigidBodies:
         unknown = sp.diags(free.ravel().astype(float))
         own = (below @ self.T).tocsr()
         # Directions without contact have no load, and do not move.
-        weak = max(WEAK * float(np.abs(contact.data).max(initial=0.0)), 1e-300)
-        self.parts = unknown @ contact @ self.T, below @ unknown, own + sp.diags(weak * self.lever**2)
+        weak = max(WEAK * float(np.abs(contact.data).max(initial=0.0)), 1e-300) * self.lever**2
+        self.parts = unknown @ contact @ self.T, below @ unknown, own + sp.diags(weak)
         self.left = self.rest(balance)
 
     def solve(self, A: sp.spmatrix, b: np.ndarray, kept: dict) -> np.ndarray:
@@ -126,7 +126,7 @@ class RigidBodies:
             first = end
 
     def loose(self, contact: Contact) -> tuple[str, str] | None:
-        """Let bodies meet what is near; return a solid and a direction of a load that nothing bears.
+        """Let bodies meet what is near; return a solid and a direction not held.
 
         Directions without load or contact need not be held.
         """

@@ -323,12 +323,13 @@ class RigidBody(Fix):
 
     def _hold(self, fixed: Argument | None) -> None:
         allowed = [WAYS[k] for k in self.ways]
-        for part in fixed.listed() if fixed else ():
+        parts = fixed.listed() if fixed else []
+        for part in parts:
             name = part.text
             if name not in allowed:
                 expected = "some of " + ", ".join(allowed)
                 raise _wrong(part, f"the body has no direction '{name}'", expected)
-            if [one.text for one in fixed.listed()].count(name) > 1:
+            if [one.text for one in parts].count(name) > 1:
                 raise _wrong(part, f"'{name}' is named twice", "each direction once")
             if self.led[WAYS.index(name)] is not None:
                 word = "motion" if name in "xyz" else "turning"
