@@ -5,13 +5,11 @@ gives forces f at these nodes, so T^T f plus the loads on the body vanish in equ
 are linear within a step; the points of the body then rotate exactly.
 """
 
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 
 from karamelo_py.kernels import rigid_motion as motion
-from karamelo_py.kernels.arrays import DT
+from karamelo_py.kernels.arrays import DT, Block, Control
 from karamelo_py.run.implicit import solvers
 from karamelo_py.run.implicit.contact import Contact
 from karamelo_py.run.implicit.equations import Equations
@@ -19,10 +17,10 @@ from karamelo_py.run.state import SceneState
 from karamelo_py.styles.fixes.rigid_body import WAYS, RigidBody, bodies_of
 
 WEAK = 1e-9  # relative size below which constraints hold nothing
-UNBORNE = 1e-2  # fraction of a load; contact of a ball at few nodes bears it in part at first
+UNSUPPORTED = 1e-2  # fraction of a load; a ball meets few nodes at first
 
 
-class BodyMotion:
+class LoadedBody:
     """Motion of one body, its `nodes` (n,) among the nodes of the equations, and the loads on it.
 
     `motions` (n, d, 6) are velocities of the nodes per unit of the body's velocity and spin,
@@ -48,7 +46,9 @@ class BodyMotion:
         translating = np.broadcast_to(np.eye(3), turning.shape)
         self.motions = np.concatenate([translating, turning], axis=2)[:, :d]
 
-    def finish(self, q: np.ndarray, forces: np.ndarray, blocks: tuple, control: Any) -> None:
+    def finish(
+        self, q: np.ndarray, forces: np.ndarray, blocks: tuple[Block, ...], control: Control
+    ) -> None:
         """Move the body by `q` (6,), publish, and let its points move with it in this step."""
         fix, body, dt, d = self.fix, self.body, float(control.values[DT]), forces.shape[1]
         state, work = fix.state[0], body.solution
@@ -72,7 +72,7 @@ class MovingBodies:
     def __init__(self, equations: Equations, simulation: SceneState):
         hub, tags = simulation.hub, simulation.setup.bodies.bodies
         pairs = zip(bodies_of(hub), tags, strict=True)
-        self.bodies = [BodyMotion(fix, body, equations) for fix, body in pairs]
+        self.bodies = [LoadedBody(fix, body, equations) for fix, body in pairs]
         m, d = len(equations.nodes), equations.d
         columns, self.velocities = [np.zeros((m, d, 0))], np.zeros((m, d))
         self.nodes = np.zeros(m, bool)
@@ -117,7 +117,7 @@ class MovingBodies:
         self.q += q
         return (u + self.T @ q).reshape(self.velocities.shape)
 
-    def finish(self, forces: np.ndarray, control: Any, blocks: tuple) -> None:
+    def finish(self, forces: np.ndarray, control: Control, blocks: tuple[Block, ...]) -> None:
         dt, first = float(control.values[DT]), 0
         for one in self.bodies:
             q, end = one.led * dt, first + len(one.ways)
@@ -140,7 +140,7 @@ class MovingBodies:
             motions[one.nodes] = one.motions[:, :, one.ways] / lever
             _, sizes, ways = np.linalg.svd(contact.constraints(motions, nodes))
             loose = ways[np.sum(sizes > WEAK * sizes.max(initial=0.0)) :]
-            unborne = loose.T @ (loose @ (load / lever))
-            if np.abs(unborne).max(initial=0.0) > UNBORNE * np.abs(load / lever).max(initial=0.0):
-                return one.fix.body.id, WAYS[one.ways[np.abs(unborne).argmax()]]
+            rest = loose.T @ (loose @ (load / lever))
+            if np.abs(rest).max(initial=0.0) > UNSUPPORTED * np.abs(load / lever).max(initial=0.0):
+                return one.fix.body.id, WAYS[one.ways[np.abs(rest).argmax()]]
         return None
