@@ -122,29 +122,37 @@ def test_a_pool_of_mpi(folder):
     assert numbers("sweep.csv") == numbers("here.csv")
 
 
-SBATCH = """#!/bin/sh
-cp "$1" job.$$.sh
+SUBMIT = """#!/bin/sh
+cat "$@" > job.$$.sh
 setsid sh job.$$.sh > job.$$.txt 2>&1 &
-echo "Submitted batch job $!"
+echo "Submitted batch job <$!.host>"
 """
+QUEUES = [
+    ("slurm", "sbatch", "scancel"),
+    pytest.param("pbs", "qsub", "qdel", marks=pytest.mark.full),
+    pytest.param("lsf", "bsub", "bkill", marks=pytest.mark.full),
+]
 
 
 @pytest.mark.usefixtures("starts_are_cheap")
-def test_a_queue_of_jobs(folder, monkeypatch):
-    """sbatch and scancel of a Slurm that starts jobs on this machine at once."""
+@pytest.mark.parametrize(("queue", "submit", "cancel"), QUEUES)
+def test_a_queue_of_jobs(folder, monkeypatch, queue, submit, cancel):
+    """The queue starts jobs on this machine at once; bsub reads their scripts from its input."""
     if find_spec("dask_jobqueue") is None:  # importing it here would take over Ctrl-C
         pytest.skip("no dask-jobqueue")
     import dask
 
     (folder / "bin").mkdir()
-    for name, text in ("sbatch", SBATCH), ("scancel", '#!/bin/sh\nkill -- "-$1"\n'):
+    for name, text in (submit, SUBMIT), (cancel, '#!/bin/sh\nkill -- "-$1"\n'):
         (folder / "bin" / name).write_text(text, encoding="utf-8")
         (folder / "bin" / name).chmod(0o755)
     monkeypatch.setenv("PATH", f"{folder / 'bin'}:{os.environ['PATH']}")
-    slurm = {"cores": 1, "memory": "1GB", "interface": "lo", "python": REAL, "death-timeout": 30}
-    with dask.config.set({f"jobqueue.slurm.{name}": value for name, value in slurm.items()}):
-        assert main(["sweep", "in.lin", *WORDS, "-jobs", "1", "-on", "slurm", "-o", "far.csv"]) == 0
-    assert len([*folder.glob("job.*.sh")]) == 1
+    dask.config.refresh()  # defaults of dask-jobqueue that the end of an earlier set has removed
+    job = {"cores": 1, "memory": "1GB", "interface": "lo", "python": REAL, "death-timeout": 30}
+    with dask.config.set({f"jobqueue.{queue}.{name}": value for name, value in job.items()}):
+        assert main(["sweep", "in.lin", *WORDS, "-jobs", "1", "-on", queue, "-o", "far.csv"]) == 0
+    (script,) = folder.glob("job.*.sh")
+    assert "distributed.cli.dask_worker" in script.read_text("utf-8")
     assert main(["sweep", "in.lin", *WORDS, "-o", "here.csv"]) == 0
     assert numbers("far.csv") == numbers("here.csv")
 

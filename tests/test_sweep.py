@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -85,7 +86,7 @@ def test_a_refused_variant_shows_its_error_without_earlier_warnings(folder):
 def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     words = ["-var", "N=2,4", "-var", "kind=linear,cubic", "-var", "speed=3", "-jobs", "2"]
     recorded = "v_x,mean:c_x,min:c_x,max:Step,when:c_x:1.575,way=max(max:c_x - first:c_x, 0)/N"
-    assert main(["sweep", "in.flight", *words, "-record", recorded]) == 0
+    assert main(["sweep", "in.flight", *words, "-record", recorded]) == 1
     table = pandas.read_csv(folder / "sweep.csv")
     assert list(table["N"]) == [2, 2, 4, 4] and list(table["kind"]) == ["linear", "cubic"] * 2
     good, bad = table[table.kind == "linear"], table[table.kind == "cubic"]
@@ -105,9 +106,9 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
     assert bad["reason"].str.contains("unknown basis style 'cubic'; did you mean 'cubic-").all()
     assert (folder / good["folder"].iloc[0] / "log.mpm").exists()
     out = capsys.readouterr().out
-    assert "2 of 4 runs are done, 2 are not" in out
+    assert "2 of 4 runs are done, 2 refused; the table is sweep.csv" in out
     last = out.splitlines()[-1]
-    assert last.startswith("2 of them were refused before any step, by a mistake of the script: ")
+    assert last.startswith("refused before any step, by a mistake of the script: ")
     assert last.count("unknown basis style 'cubic'") == 1
     beside = json.loads((folder / "sweep.json").read_text())
     assert beside["threads"] == 1 and beside["versions"]["numba"] and beside["processor"]
@@ -116,7 +117,7 @@ def test_a_sweep_is_a_table_that_pandas_reads(folder, capsys):
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_run_that_breaks_off_has_no_values(folder):
     words = ["-var", "speed=3,300", "-record", "v_x", "-record", "max:c_x"]
-    assert main(["sweep", "in.flight", *words]) == 0
+    assert main(["sweep", "in.flight", *words]) == 1
     good, bad = records.read(folder / "sweep.csv")
     assert good["v_x"] == "3" and bad["status"] == "failed" and "moves by 6 cells" in bad["reason"]
     assert read_log(folder / bad["folder"])["v_x"].size > 0  # though it has a log
@@ -177,7 +178,7 @@ def test_a_sweep_that_is_interrupted_amid_a_run_goes_on(folder, monkeypatch, cap
     monkeypatch.setattr(Launch, "run", counted)
     assert main(["sweep", *words]) == 130
     assert "1 of 2 runs are in sweep.csv; the same command continues" in capsys.readouterr().err
-    assert main(["sweep", *words, "-limit", "0.3"]) == 0
+    assert main(["sweep", *words, "-limit", "0.3"]) == 1
     assert begun == ["3", "4", "4"]
     assert [row["status"] for row in records.read(folder / "sweep.csv")] == ["done", "too long"]
 
@@ -211,7 +212,7 @@ def test_an_interrupted_sweep_goes_on(folder, capsys):
     size = second.stat().st_size
     time.sleep(0.3)
     assert second.stat().st_size == size
-    assert main(["sweep", *words, "-limit", "3"]) == 0
+    assert main(["sweep", *words, "-limit", "3"]) == 1
     rows = records.read(folder / "sweep.csv")
     assert [row["status"] for row in rows] == ["done", "too long"]
     assert rows[1]["reason"] == "given up after 3 s"
@@ -367,6 +368,12 @@ def test_a_narrow_table_cuts_no_value_off(width):
     for word in (*names, *values, "max:growth", "1.500e+10", "failed:", "inside"):
         assert word in text, (word, text)
     assert ("987654" in text) == (width == 200)
+    rows = [row | {"factor": f"number {k}"} for k in range(25)]
+    console.print(study.results_table(rows, SimpleNamespace(**vars(long), out="s.csv"), console))
+    text = console.export_text()
+    listed = [k for k in range(25) if f"number {k} " in text]
+    assert listed == [*range(10), *range(15, 25)]
+    assert re.search(r"⋮ .* 5 more[\s\S]*s\.csv", text)
 
 
 def test_facts_and_logs_of_several_runs(tmp_path):

@@ -45,6 +45,7 @@ _FACTS = ("seconds", "points", "steps")
 HERE = socket.gethostname()
 OF_MACHINE = ("processor", "cores", "system", "versions")
 _STATUS = 24  # least width of the status while facts are shown
+LISTED = 10  # first and last rows on the terminal
 
 
 class Pool(Protocol):
@@ -328,11 +329,17 @@ def results_table(rows: Sequence[Row], study: Study, console: Console) -> Table:
     from rich.text import Text
 
     words, facts = [item.word for item in study.items], list(_FACTS)
+    omitted = len(rows) - 2 * LISTED
+    shown_rows = [*rows[:LISTED], None, *rows[-LISTED:]] if omitted > 1 else rows
     while True:
         columns = [*words, *facts]
         table = plain_table(study.names, columns, study.title or None)
         table.add_column("status", overflow="fold", min_width=_STATUS if facts else 6)
-        for each in rows:
+        for each in shown_rows:
+            if each is None:
+                cells = [""] * (len(study.names) + len(columns) - 1)
+                table.add_row("⋮", *cells, f"{omitted} more are in {study.out}")
+                continue
             end = ended(each)
             style = {"done": "green", "failed": "red", "refused": "red"}.get(each["status"])
             cells = [shown(each[name]) for name in (*study.names, *columns)]

@@ -1,6 +1,7 @@
 """karamelo-py sweep: a script with many values of its variables."""
 
 from argparse import ArgumentParser, Namespace
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,8 +18,9 @@ Runs a script with every combination of values of its variables, and writes one 
   karamelo-py sweep in.file -var N=10,20,40 -var basis=linear,quadratic-spline -record err,max:Etot
 
 Each run has a separate folder, named after its values, in a folder named after the table. A run
-that fails is recorded with its reason, and the sweep continues. The exit status is 1 if all fail or
-one is killed. An interrupted sweep continues where it stopped when the same command is given again.
+that fails is recorded with its reason, and the sweep continues. The exit status is 0 if all runs
+are done, else 1. An interrupted sweep continues where it stopped when the same command is given
+again.
 Processor, threads and versions are written next to the table (sweep.json)."""
 
 
@@ -67,21 +69,18 @@ def run(options: Namespace) -> int:
         messages = out.parent / rows[0]["folder"] / "err.txt"
         hint = f"{messages} has all its messages" if messages.is_file() else None
         raise ScriptError(f"no run is done: {rows[0]['reason']}", hint=hint)
-    return int(any(row["status"] == "killed" for row in rows))
+    return int(any(row["status"] != "done" for row in rows))
 
 
 def tell(rows: Sequence[Row], study: Study) -> None:
     console = terminal()
     console.print(results_table(rows, study, console))
-    done = sum(row["status"] == "done" for row in rows)
-    others, old = len(rows) - done, len(rows) - study.ran
+    ends, old = Counter(row["status"] for row in rows), len(rows) - study.ran
+    done = ends.pop("done", 0)
     text = f"{done} of {plural(len(rows), 'run')} {'is' if done == 1 else 'are'} done"
-    text += f", {others} {'is' if others == 1 else 'are'} not (see reason)" if others else ""
+    text += "".join(f", {count} {status}" for status, count in ends.items())
     text += f"; {old} were known" if old > 0 else ""
     print(f"{text}; the table is {study.out}")
-    refused = [row["reason"] for row in rows if row["status"] == "refused"]
+    refused = dict.fromkeys(row["reason"] for row in rows if row["status"] == "refused")
     if refused and done:
-        print(
-            f"{len(refused)} of them {'was' if len(refused) == 1 else 'were'} refused before any "
-            "step, by a mistake of the script: " + "; ".join([*dict.fromkeys(refused)][:3])
-        )
+        print(f"refused before any step, by a mistake of the script: {'; '.join([*refused][:3])}")
