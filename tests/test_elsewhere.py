@@ -342,7 +342,6 @@ def test_leaving_does_not_wait_for_a_case(folder):
         place.close()
         assert not outcome.done()
         free.set()
-    assert outcome.cancelled()
 
 
 @pytest.mark.usefixtures("starts_are_cheap")

@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import re
+import select
 import shlex
 import signal
 import socket
@@ -192,7 +193,7 @@ class Launch:
         return outcome
 
     def _wait(self, process: Any, begun: float) -> tuple[float | None, bool]:
-        pause, memory = 0.005, None
+        memory = None
         while process.returncode is None:
             if self.stop.is_set() or (self.limit and time.perf_counter() - begun > self.limit):
                 if WAIT4:
@@ -206,12 +207,22 @@ class Launch:
                 # Linux counts kibibytes, macOS bytes.
                 memory = ended[2].ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
             if process.returncode is None:
-                time.sleep(pause)
-                pause = min(1.5 * pause, 0.1)
+                await_end(process.pid)
         if self.stop.is_set():
             raise Stop
         late = bool(self.limit) and time.perf_counter() - begun > self.limit
         return memory, late and process.returncode != 0
+
+
+def await_end(pid: int) -> None:
+    """Wait until a process ends, at most 0.1 s."""
+    try:
+        handle = os.pidfd_open(pid)
+    except (AttributeError, OSError):  # not Linux
+        time.sleep(0.02)
+        return
+    select.select([handle], [], [], 0.1)
+    os.close(handle)
 
 
 def kind_of(values: Iterable[str]) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ others have compiled. The log, the record and the files named by `-keep` come ba
 sees the folder of the study, it moves them there.
 """
 
+import asyncio
 import hashlib
 import logging
 import os
@@ -17,7 +18,7 @@ import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, suppress
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
@@ -40,6 +41,12 @@ from karamelo_py.script.syntax import CommandCall
 PATIENCE = 10  # seconds for a scheduler to answer
 TO_CLOSE = 3  # seconds for connections to close
 TRIES = 3
+# Of a Dask cluster on this machine: its three processes take 2 % of a core, by default 10 %.
+FRUGAL = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
 CLASS = re.compile(r"(\w+)\.\w+")  # of a module next to the script
 IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w, ]+)", re.MULTILINE)
 QUOTED = re.compile(r'"([^"\n]*)"')
@@ -280,10 +287,10 @@ class Elsewhere:
         self.kernels: dict[str, bytes] = {}
         self.sent: Any = None
         self.places: dict[str, str] = {}  # machines by names of folders
-        # Callbacks run in the thread that talks to the machines, which must not wait.
-        self.retries = ThreadPoolExecutor(1)
-        self.closing = False
         self.gone = False  # Dask accepts cases then, and never ends them
+        self.loop = asyncio.new_event_loop()
+        self.loop.set_exception_handler(lambda *_: None)  # cases that are left at the end
+        Thread(target=self.loop.run_forever, daemon=True).start()
         self.mark = Path(parcel.study) / parcel.mark
         with reported(self.mark):
             self.mark.touch()
@@ -292,42 +299,53 @@ class Elsewhere:
         return self.places.get(folder.name, "")
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
-        outer: Future = Future()
-        self._try(case, folder, outer, 1)
-        return outer
+        return asyncio.run_coroutine_threadsafe(self._outcome(dict(case), folder), self.loop)
 
-    def _try(
-        self, case: Mapping[str, str], folder: Path, outer: Future, tries: int, *contents: Any
-    ) -> None:
-        def finished(inner: Future) -> None:
-            try:
-                result = inner.result()
-            except Exception as error:  # the machine, its disk, or its copy of the files
-                words = f"{type(error).__name__}: {error}".splitlines()[0]
-                self._again(case, folder, outer, tries, words)
-                return
-            if result.asks or result.refused_by is not None:
-                self._again(case, folder, outer, tries, result.outcome.reason, result)
-                return
-            try:
-                outer.set_result(self._received(result, folder))
-            except Exception as error:  # a full disk here
-                outer.set_exception(error)
+    async def _outcome(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
+        def killed(reason: str) -> CaseOutcome:
+            return CaseOutcome("killed", reason, {}, folder)
 
-        if self.gone:
-            reason = "not started: the connection is lost"
-            outer.set_result(CaseOutcome("killed", reason, {}, folder))
-            return
-        try:
+        tries, contents = 1, ()
+        while not self.gone:
             chosen: dict[str, Any] = {}
             if self.refusing:  # a preference: Dask would wait for ever for a worker that has gone
                 chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
-            future = self.executor.submit(
-                run_sent, self.parcel, dict(case), folder.name, *contents, **chosen
-            )
-            future.add_done_callback(finished)
-        except Exception as error:  # the executor has gone
-            outer.set_result(CaseOutcome("killed", f"not started: {error}", {}, folder))
+            try:
+                sent = self.executor.submit(
+                    run_sent, self.parcel, case, folder.name, *contents, **chosen
+                )
+            except Exception as error:  # the executor has gone
+                return killed(f"not started: {error}")
+            result, reason, contents = None, "", ()
+            try:
+                result = await asyncio.wrap_future(sent)
+            except (Exception, asyncio.CancelledError) as error:  # the machine or its disk
+                reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            if result and not result.asks and result.refused_by is None:
+                return self._received(result, folder)
+            try:
+                if result and result.asks:
+                    contents = (self._contents(),)
+                    continue
+                if result and result.refused_by:
+                    self.refusing.add(result.refused_by)
+                    if willing := self._willing():
+                        self.size = min(self.size, sum(willing.values()))
+                        await asyncio.sleep(0.2)  # Dask may move the case to a worker that refuses
+                        continue
+                    tries = TRIES
+                tries += 1
+                if tries > TRIES and result:
+                    return self._received(result, folder)
+                if tries > TRIES:
+                    return killed(f"lost {TRIES} times: {reason}")
+                self.sent = None  # it may be lost, too
+                self.workers()  # an error if the scheduler has gone
+            except Exception as error:  # the scheduler does not answer, or a full disk here
+                self.gone = True
+                error_words = f"{type(error).__name__}: {error}".splitlines()[0]
+                return killed(f"{reason}; not sent again: {error_words}")
+        return killed("not started: the connection is lost")
 
     def _willing(self) -> dict[str, int]:
         return {name: n for name, n in self.workers().items() if name not in self.refusing}
@@ -338,46 +356,6 @@ class Elsewhere:
             contents = {name: (root / name).read_bytes() for name, _ in self.parcel.files}
             self.sent = self.send({**contents, **self.kernels})
         return self.sent
-
-    def _again(
-        self, case: Mapping[str, str], folder: Path, outer: Future, tries: int, reason: str,
-        answer: Returned | None = None,
-    ) -> None:  # fmt: skip
-        def again() -> None:
-            try:
-                count = tries + 1
-                if answer and answer.asks:
-                    self._try(case, folder, outer, tries, self._contents())
-                    return
-                if answer and answer.refused_by:
-                    self.refusing.add(answer.refused_by)
-                    if willing := self._willing():
-                        self.size = min(self.size, sum(willing.values()))
-                        count = tries
-                        time.sleep(0.2)  # Dask may move the case to an idle worker that refuses it
-                    else:
-                        count = TRIES + 1
-                if count <= TRIES:
-                    self.sent = None  # it may be lost, too
-                    self.workers()  # an error if the scheduler has gone
-                    self._try(case, folder, outer, count)
-                elif answer:
-                    outer.set_result(self._received(answer, folder))
-                else:
-                    lost = f"lost {TRIES} times: {reason}"
-                    outer.set_result(CaseOutcome("killed", lost, {}, folder))
-            except Exception as error:  # the scheduler does not answer, or a full disk here
-                words = f"{reason}; not sent again: {type(error).__name__}: {error}".splitlines()[0]
-                self.gone = True
-                outer.set_result(CaseOutcome("killed", words, {}, folder))
-
-        if self.closing:
-            outer.cancel()
-            return
-        try:
-            self.retries.submit(again)
-        except RuntimeError:  # closed in this moment
-            outer.cancel()
 
     def _received(self, result: Returned, folder: Path) -> CaseOutcome:
         if result.files:
@@ -392,8 +370,6 @@ class Elsewhere:
 
     def close(self) -> None:
         """Leave without waiting for cases that run."""
-        self.closing = True
-        self.retries.shutdown(wait=False, cancel_futures=True)
         self.ends.close()
         self.mark.unlink(missing_ok=True)
         for left in self.mark.parent.glob(".case-*"):
@@ -435,17 +411,17 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
     if find_spec(needed) is None:
         hint = "pip install '.[dask]' in the folder of karamelo-py"
         raise ScriptError(f"-on {options.on} needs {needed.replace('_', '-')}", hint=hint)
+    import dask
     from distributed import Client, LocalCluster
     from distributed.comm.registry import get_backend
 
     try:
         if options.on == "local":
-            cluster: Any = LocalCluster(
-                n_workers=jobs,
-                threads_per_worker=1,
-                dashboard_address=":0",
-                silence_logs=logging.CRITICAL,
-            )
+            with dask.config.set(FRUGAL):
+                cluster: Any = LocalCluster(
+                    n_workers=jobs, threads_per_worker=1, dashboard_address=":0",
+                    silence_logs=logging.CRITICAL,
+                )  # fmt: skip
             _closed(ends, cluster.close, timeout=PATIENCE)
         elif options.on in QUEUES:
             before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}

@@ -171,12 +171,13 @@ class Study:
 
         try:
             while queue or running:
-                while len(running) < self.place.size and (item := ready()):
+                # With several places each has a next case, and need not wait for this process.
+                size = self.place.size
+                while len(running) < size + size * (size > 1) and (item := ready()):
                     queue.remove(item)
                     case, folder = item
                     started.add(kind_of(case.values()))
                     running[self.place.submit(case, folder)] = case
-                    display.started[tuple(case.values())] = time.perf_counter()
                 done, _ = wait(running, timeout=0.25, return_when=FIRST_COMPLETED)
                 for future in done:
                     case = running.pop(future)
@@ -186,16 +187,19 @@ class Study:
                     display.finish(case, self.rows[tuple(case.values())])
                 if done and time.perf_counter() > self.next_write:
                     self.write()
-                display.tick([case for case, _ in queue], list(running.values()))
+                at_once = [*running.values()][:size]
+                for case in at_once:
+                    display.started.setdefault(tuple(case.values()), time.perf_counter())
+                display.tick(queue, at_once)
                 if self.page:
-                    self._show(queue, list(running.values()), display)
+                    self._show(queue, at_once, display)
         finally:
             self.write()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
         """Show the state; KeyboardInterrupt if the study was stopped on the page."""
         of = self.most or display.count + len(self.rows) - display.finished
-        left = display.left([case for case, _ in queue], running)
+        left = display.left(queue, running)
         folders = [self.folder / folder_name(case) for case in running]
         places = [
             (case, folder, display.since(case), self.place.machine(folder))
@@ -236,7 +240,7 @@ class _Display:
         line = ", ".join([_said(case), *numbers, f"{shown(result['seconds'])} s", ended(result)])
         print(f"{number} {line}", file=sys.stderr, flush=True)
 
-    def tick(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> None:
+    def tick(self, queue: Sequence[tuple], running: Sequence[Mapping]) -> None:
         if self.bar.disable:
             return
         # An adaptive study does not know how many runs remain.
@@ -257,13 +261,13 @@ class _Display:
     def since(self, case: Mapping) -> float:
         return time.perf_counter() - self.started[tuple(case.values())]
 
-    def left(self, queue: Sequence[Mapping], running: Sequence[Mapping]) -> float | None:
+    def left(self, queue: Sequence[tuple], running: Sequence[Mapping]) -> float | None:
         done = [result for result in self.study.rows.values() if result.get("wall_s")]
         if not self.finished or not done:
             return None
         cases = [{name: result[name] for name in self.study.names} for result in done]
         predict = guessed_time(cases, [result["wall_s"] for result in done])
-        rest = sum(predict(case) for case in queue)
+        rest = sum(predict(case) for case, _ in queue)
         rest += sum(max(predict(case) - self.since(case), 0.0) for case in running)
         return rest / min(self.study.place.size, max(len(queue) + len(running), 1))
 
