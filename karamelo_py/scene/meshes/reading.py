@@ -11,9 +11,8 @@ import warnings
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import meshio
 import numpy as np
 
 from karamelo_py.language.kinds import InputFile
@@ -31,6 +30,9 @@ from karamelo_py.scene.meshes.nastran import ENDINGS as NASTRAN
 from karamelo_py.scene.meshes.nastran import read_nastran
 from karamelo_py.scene.meshes.obj import read_obj
 from karamelo_py.script.errors import FAILURES, ScriptError
+
+if TYPE_CHECKING:
+    import meshio  # loaded with the first mesh: it takes a twelfth of a small scene's time
 
 GEOMETRIES = (".geo", ".geo_unrolled")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep")
@@ -52,10 +54,16 @@ _FOREIGN = (
 _BULK = re.compile(rb"^(SOL|CEND|BEGIN +BULK|GRID)\b", re.M | re.I)
 
 
+class _Endings:
+    def __contains__(self, ending: object) -> bool:
+        import meshio
+
+        of_meshio = meshio.extension_to_filetypes.keys() - {".svg"}
+        return ending in {*of_meshio, *GEOMETRIES, *CAD, *BY_GMSH, *EXODUS, *LSDYNA}
+
+
 class MeshFile(InputFile):
-    endings = {*meshio.extension_to_filetypes, *GEOMETRIES, *CAD, *BY_GMSH, *EXODUS, *LSDYNA} - {
-        ".svg"
-    }
+    endings = _Endings()
 
 
 def read(path: Path, dimension: int, trusted: bool = False, size: float | None = None) -> Mesh:
@@ -201,6 +209,8 @@ def _skip_close(file: Any, depth: int) -> None:
 
 
 def _by_meshio(path: Path, file_format: str | None = None, why: str | None = None) -> Mesh:
+    import meshio
+
     # meshio supports pixels, voxels and hexagonal prisms of VTK only in part.
     partly = (8, "pixel", 4, 2), (11, "voxel", 8, 3), (16, "hexa_prism", 12, 3)
     for number, name, count, dimension in partly:
@@ -246,7 +256,7 @@ def _markers(path: Path, sets: dict[str, list[np.ndarray]]) -> dict[str, list[np
     return named
 
 
-def _sets_of(mesh: meshio.Mesh) -> Iterator[tuple[str, list[np.ndarray]]]:
+def _sets_of(mesh: "meshio.Mesh") -> Iterator[tuple[str, list[np.ndarray]]]:
     for name, elements in mesh.cell_sets.items():
         if not name.startswith("gmsh:"):
             yield (
