@@ -41,7 +41,7 @@ def describe_parameter(parameter: Parameter) -> str:
     family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
     if parameter.keyword and parameter.optional and default is None:
         text = text.removesuffix(" or NULL")
-    if text == "anything":  # interpreted by the command or style
+    if text == "anything":  # the command or style interprets it
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]
     if parameter.variadic and parts[0].startswith("one of "):
@@ -58,7 +58,7 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def described(parameters: Iterable[Parameter]) -> Iterator[tuple[list[Parameter], list[str]]]:
-    """Parameters with a common description, and the lines that explain them: types, description.
+    """Yield parameters with a common description, and lines of types and description.
 
     A first sentence that only repeats the types is omitted.
     """
@@ -94,7 +94,10 @@ def print_help(
     commands: Iterable[str] = (),
     manuals: Callable[[], Mapping[str, tuple[str, str]]] = dict,
 ) -> int:
-    """Explain a command, style, argument or topic; `manuals`: summary and help by subcommand."""
+    """Print help on a command, style, argument or topic; return the exit status.
+
+    `manuals` returns summary and help text by subcommand.
+    """
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
             with registry.modules_of(Path()):
@@ -169,7 +172,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """Accept fixes, Fix and fix alike."""
+    """Return the name of a family, for fixes, Fix and fix alike."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 

@@ -31,7 +31,7 @@ from karamelo_py.run.mpi.comm import MpiComm, launched
 from karamelo_py.scene.comm import ENDING, handled_signals
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
-if TYPE_CHECKING:  # slow imports
+if TYPE_CHECKING:  # these imports are slow
     from karamelo_py.scene.hub import Hub
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
@@ -57,7 +57,7 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     launch.keep_to_oneself()
-    # Batch systems send these signals; mpiexec handles them for several processes.
+    # Batch systems send these signals. With several processes mpiexec handles them.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = launch.outcome_of(
@@ -155,7 +155,7 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return launch.ERROR
     options.command_line = arguments
-    if options.act is not _run:  # run imports more first
+    if options.act is not _run:  # `_run` calls it after its imports
         begun()
     with ExitStack() as options.ends:
         return options.act(options)
@@ -168,7 +168,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Use the last of the files that a shell has put after -restart."""
+    """Replace files that a shell has inserted after -restart by the last of them."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -186,7 +186,7 @@ def _one_file(arguments: list[str]) -> list[str]:
 
 
 def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
-    """Put a blank before values such as -1e6, which argparse takes for options."""
+    """Put a blank before values such as -1e6, which argparse would take as options."""
 
     def is_value(k: int) -> bool:
         if re.match(r"-\.?\d", arguments[k]):
@@ -358,7 +358,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.input and options.script:
         raise ScriptError(f"two scripts: {options.script} and {script}", expected="one script")
     if launched()[0] > 1 and not options.checking:
-        with leaving_at_once():  # before MPI
+        with leaving_at_once():  # before MPI starts
             import_module("karamelo_py.scene.hub")
         return launch.together(
             options.ranks, lambda comm: _carry_out(options, script, comm), debugging=options.debug

@@ -1,7 +1,7 @@
 """karamelo-py --ranks N: processes of mpiexec that report and end as one.
 
-Each reports over a socket to the `Launcher` in the user's process. Rank 0 gets terminal and
-signals. Output of mpiexec is shown only if nothing started.
+Each process reports over a socket to the `Launcher` in the user's process. Rank 0 gets the terminal
+and the signals. Output of mpiexec is shown only if no process has started.
 """
 
 import errno
@@ -41,7 +41,7 @@ OF_THE_SYSTEM = tuple(
     if hasattr(errno, name)
 )  # fmt: skip
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# Several threads per process; waiting processes yield if cores are few; root in a container.
+# Allow several threads per process; let waiting processes yield if cores are few; allow root.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -49,15 +49,15 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-# Four processes of a million points run 10 % faster: NumPy requests large pages only for new
+# Large pages make four processes of a million points 10 % faster. NumPy requests them only for new
 # arrays.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between polls
-GRACE = 2.0  # seconds for processes to end after mpiexec
-AT_ONCE = 3  # signals
+GRACE = 2.0  # seconds in which processes must end after mpiexec
+AT_ONCE = 3  # signals after which processes are killed
 LONGEST_FOLDER = 70  # characters: names of sockets must be short
 A_CORE = 16  # processes per core; more is a mistake
-# Seconds until a failed process ends the others: rank 0 reports the error.
+# Seconds until a failed process ends the others, in which rank 0 can report the error.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -128,7 +128,7 @@ class Launcher:
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
         self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
         self.reports: dict[int, Message] = {}
-        self.lost: list[Message] = []  # without a report, in order
+        self.lost: list[Message] = []  # processes that ended without a report, in order
         self.over = False
         self.signals: list[int] = []
         self.process: subprocess.Popen | None = None
@@ -138,7 +138,7 @@ class Launcher:
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
-            # A separate session: Ctrl-C reaches this process only.
+            # In a separate session, so that Ctrl-C is sent to this process only.
             self.process = subprocess.Popen(
                 self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
                 stderr=self.said, start_new_session=True,
@@ -148,7 +148,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in filter(None, self.links.values()):  # left over
+            for one in filter(None, self.links.values()):  # connections that are still open
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -159,7 +159,7 @@ class Launcher:
     def _pass_on(self, number: int, _: object) -> None:
         self.signals.append(number)
         first = next((link for link, one in self.links.items() if one.get("rank") == 0), None)
-        for one in filter(None, self.links.values()):  # a stopped one would be waited for
+        for one in filter(None, self.links.values()):  # mpiexec would wait for a stopped process
             with suppress(ProcessLookupError):
                 os.kill(one["pid"], signal.SIGCONT)
         if first is not None and 0 not in self.reports and len(self.signals) < AT_ONCE:
@@ -266,7 +266,7 @@ def _report_to_launcher(rank: int) -> None:
         link.connect(name)
         link.sendall(_line(rank=rank, pid=os.getpid()))
         if rank == 0:
-            # Libraries still write to mpiexec.
+            # Only Python's streams: libraries still write to mpiexec.
             out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
             sys.stdout = sys.__stdout__ = out
             sys.stderr = sys.__stderr__ = err
@@ -278,7 +278,7 @@ def _report_to_launcher(rank: int) -> None:
 
 
 def _stream(fd: int) -> TextIO:
-    usual = sys.__stderr__  # escapes unknown characters
+    usual = sys.__stderr__  # its error handler escapes unknown characters
     return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
 
 
@@ -300,7 +300,7 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """False if mpiexec pretends that output is a terminal."""
+    """Return False if output looks like a terminal because of mpiexec; None otherwise."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
@@ -325,20 +325,20 @@ def together(
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # mpiexec comments on a status; the launcher has it.
+        # The launcher has the status already, on which mpiexec would comment.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)
     if comm is None:
         end(status, text, tells=rank == 0, stays=True)
-        if status == INTERRUPTED:  # others are still starting
+        if status == INTERRUPTED:  # other processes may still be starting
             os._exit(status)
         return status
     if comm.parted:
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
-        _report(over=True)  # before waiting for the others
+        _report(over=True)  # report before waiting for the others
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:

@@ -1,11 +1,11 @@
 """End with a message if the program is interrupted during its imports.
 
-An interrupt there may surface as any error.
+An interrupt during an import may appear as any error.
 """
 
 import os
 
-SIGNALLED = 128  # plus the number of the signal
+SIGNALLED = 128  # exit status, plus the number of the signal
 INTERRUPTED = SIGNALLED + 2
 
 
@@ -14,15 +14,15 @@ def _leave(*_):
     os._exit(INTERRUPTED)
 
 
-# No import before `leaving_at_once`: Python would report an interrupt.
+# Nothing is imported before `leaving_at_once`, as Python would print an interrupt's traceback.
 try:
     import signal
 except KeyboardInterrupt:
     _leave()
 
 
-STUDY = "KARAMELO_PY_STUDY"  # pid
-_DEATH_SIGNAL = 1  # argument of prctl: signal at the parent's end
+STUDY = "KARAMELO_PY_STUDY"  # environment variable with the pid of a study
+_DEATH_SIGNAL = 1  # argument of prctl: signal when the parent ends
 
 
 def end_with(study: int) -> None:
@@ -43,7 +43,7 @@ def end_with(study: int) -> None:
 
 
 def _watch(study: int) -> None:
-    """End this process after the study, where the system does not."""
+    """End this process after the study, if the system does not."""
     import time
 
     import psutil

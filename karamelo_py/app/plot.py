@@ -31,13 +31,13 @@ def read_text(path: Path, expected: str | None = None) -> str:
 
 
 def read_rows(path: str | Path) -> list[dict[str, float]]:
-    """Rows of a log by column; words are NaN.
+    """Return the rows of a log as dictionaries by column; words become NaN.
 
-    A line # renames the columns; a cut line is skipped.
+    A line beginning with # gives new columns; an incomplete line is skipped.
     """
     names: list[str] = []
     path, rows = Path(path), []
-    # A line without an end may be cut: 2.4 of 2.4e+10.
+    # A line without a line end may be cut off: 2.4 of 2.4e+10.
     lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(
         None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)
@@ -55,7 +55,7 @@ def read_rows(path: str | Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Columns of a log; {} if it cannot be read."""
+    """Return the columns of a log; {} if it cannot be read."""
     try:
         rows = read_rows(folder / name)
     except ScriptError:

@@ -48,17 +48,17 @@ class SimulationError(ScriptError):
 
 
 class KarameloWarning(UserWarning):
-    """A warning as the command line shows it."""
+    """A warning, with the text that the command line shows."""
 
 
 class Quiet(Console):
-    """Prints nothing; warnings are Python warnings."""
+    """A console that prints nothing, and issues warnings as Python warnings."""
 
     def __init__(self) -> None:
         super().__init__(quiet=True)
 
     def warn(self, text: str) -> None:
-        """Warn at the line outside the package that called it."""
+        """Issue a warning at the line outside the package from which the call came."""
         level, frame = 1, sys._getframe()
         while frame.f_back and frame.f_globals.get("__name__", "").startswith("karamelo_py."):
             level, frame = level + 1, frame.f_back
@@ -68,7 +68,7 @@ class Quiet(Console):
 class Columns(Mapping, dict):  # type: ignore[metaclass]
     """Read-only columns by name.
 
-    A dict, for ``pandas.DataFrame(sim.log)``, though an empty one.
+    It is a subclass of dict only for ``pandas.DataFrame(sim.log)``; the dict itself is empty.
     """
 
     def __init__(self, names: Callable[[], list[str]], column: Callable[[str], np.ndarray]):
@@ -116,7 +116,7 @@ class Columns(Mapping, dict):  # type: ignore[metaclass]
 
 
 class LivePage:
-    """A page that follows a simulation, at its `address`."""
+    """A browser page that shows a simulation, at the URL `address`."""
 
     def __init__(self, page: Any):
         self._page = page
@@ -134,7 +134,7 @@ class LivePage:
 
 
 class PointColumns(Columns):
-    """Columns of the points; ``points["vx"] = values`` sets one between two runs.
+    """Columns of the points; ``points["vx"] = values`` sets a column between two runs.
 
     Positions, velocities, temperatures, stresses (of rate-form materials) and declared fields can
     be set, to a number or (n,).
@@ -206,11 +206,11 @@ class Simulation:
     Parameters
     ----------
     script
-        Name or text of a script, executed up to its first run command; ``run()`` without a number
-        continues from there. A str that names no file and contains a line break, a parenthesis or
-        an equals sign is text; a Path is a name.
+        Name or text of a script, which is executed up to its first run command; ``run()`` without a
+        number executes the rest. A str is taken as text if no file has this name and it contains a
+        line break, a parenthesis or an equals sign; a Path is always a name.
     out
-        Folder for log, dumps, plots and restart files. By default none is written.
+        Folder for log, dumps, plots and restart files. By default no files are written.
     threads
         Number of threads; by default all cores if the scene is large enough.
     gpu
@@ -222,24 +222,24 @@ class Simulation:
     alone
         Allow several processes of mpiexec, each with a separate scene.
     variables
-        Override assignments in the script, like ``-var``.
+        Values that override assignments in the script, like ``-var``.
 
     Raises
     ------
     SimulationError
-        For an error in the script, the number of threads, the folder, or a missing GPU.
+        For an error in the script, a wrong number of threads or folder, or a missing GPU.
 
     Notes
     -----
     Script commands are methods with the same arguments: ``sim.solid("body", "region", "box", 2,
     "rubber", 0.1, 0)`` is the line ``solid(body, region, box, 2, rubber, 0.1, 0)``. Strings are
-    names and formulas; None is NULL. ``sim.fix(ID, "python", group, function)`` takes a function,
-    ``sim.solid(ID, "points", columns, ...)`` arrays by name or a DataFrame.
+    names or formulas, and None is NULL. ``sim.fix(ID, "python", group, function)`` accepts a
+    function, ``sim.solid(ID, "points", columns, ...)`` a dictionary of arrays or a DataFrame.
 
-    Commands with a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
+    Commands that give a value, such as ``sim.value("Ek")`` and ``sim.xcm("all", "x")``, return it.
 
-    Simulations may run in different Python threads; calling one from a second thread raises
-    SimulationError.
+    Different simulations may run in different Python threads. Calling one simulation from two
+    threads at the same time raises SimulationError.
 
     Examples
     --------
@@ -268,7 +268,7 @@ class Simulation:
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
-        self._at_work = threading.RLock()  # held by the calling thread
+        self._at_work = threading.RLock()  # held by the thread that calls the simulation
         self._name = "a scene"
         with _as_simulation_error():
             hub.settings.threads = _threads_of(threads)
@@ -303,7 +303,7 @@ class Simulation:
             raise ScriptError(
                 f"{script!r} is no script", expected=SCRIPT, hint="variables by name, as in N=3"
             )
-        exists = os.path.exists(script)  # False for text too long for a name
+        exists = os.path.exists(script)  # also False if the text is too long for a name
         is_text = isinstance(script, str) and not exists and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
         try:
@@ -412,7 +412,7 @@ class Simulation:
         return _as_script_text(value)
 
     def run(self, steps: int | None = None) -> None:
-        """Take a number of steps; without one, execute the rest of the script."""
+        """Take `steps` steps; without a number, execute the rest of the script."""
         if steps is not None:
             self._do(f"run({_as_script_text(steps)})", "Simulation.run")
             return
@@ -440,7 +440,7 @@ class Simulation:
 
     @property
     def points(self) -> PointColumns:
-        """Columns of the points (x, vy, s11, seq ...), settable: arrays (n,) by id."""
+        """Columns of the points (x, vy, s11, seq ...), arrays (n,) by id, which can be set."""
         return PointColumns(self.hub)
 
     @property
@@ -450,7 +450,7 @@ class Simulation:
 
     @property
     def log(self) -> Columns:
-        """Columns of the last lines of the log with the same names."""
+        """Columns of the log, as arrays; if columns have changed, only of lines since then."""
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
@@ -490,7 +490,7 @@ class Simulation:
         width, height
             Size in inches.
         file
-            Also write a file: .png, .pdf or .svg.
+            File to which the picture is also written: .png, .pdf or .svg.
         look
             Options of dump pyplot: vmin, vmax, cmap, label, only, xmin, quantile, dpi ...
         """
@@ -513,8 +513,8 @@ class Simulation:
     def live(self) -> LivePage:
         """Open a browser page that follows later runs.
 
-        It has buttons to pause, step and stop. Close it with ``.close()``, or with the simulation.
-        Needs plotly.
+        The page has buttons to pause, step and stop. It is closed by its ``.close()``, or with the
+        simulation. The package plotly is needed.
         """
         from karamelo_py.app.live.run import RunPage
 
@@ -587,6 +587,6 @@ def _as_script_text(value: Any) -> str:
     if isinstance(value, str):
         words = value.split()
         texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
-        # Words separated only by blanks are not a formula.
+        # Words that are separated only by blanks are text, not a formula.
         return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
     raise TypeError(f"{value!r} is no number, text, True, False, None or function")

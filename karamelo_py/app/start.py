@@ -8,12 +8,12 @@ from karamelo_py.app.leaving import STUDY, end_with, leaving_at_once
 
 
 def main() -> int:
-    """Run the command line without the garbage collector: half the time of a small scene."""
+    """Run the command line without the garbage collector, in half the time for small scenes."""
     gc.disable()
     _open_what_is_closed()
     if study := os.environ.pop(STUDY, ""):
         end_with(int(study))
-    # Threads of OpenBLAS would wait for each other in load steps.
+    # In load steps, threads of OpenBLAS would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with leaving_at_once():
         from karamelo_py.app.cli import main as command
@@ -21,7 +21,7 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Open closed standard streams; otherwise files would get their descriptors."""
+    """Open standard streams that are closed; otherwise files would get their descriptors."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(handle)

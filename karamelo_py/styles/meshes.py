@@ -20,7 +20,7 @@ from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
-# A shape with fewer cells, or this many times longer than the domain, may be in other units.
+# A shape of fewer than CELLS cells, or OUT times as long as the domain, may be in other units.
 CELLS, OUT = 3, 20
 UNITS = {
     1e-3: "a file in millimetres, a script in metres",
@@ -30,7 +30,7 @@ UNITS = {
     1 / 0.0254: "a file in metres, a script in inches",
     1 / 25.4: "a file in millimetres, a script in inches",
 }
-CURVED = 0.01  # relative to an edge's length, as in a circle of 80 elements
+CURVED = 0.01  # distance from the straight edge over its length, as in a circle of 80 elements
 
 
 def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
@@ -43,7 +43,7 @@ def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:
 
 
 def _tell_of_units(hub: Hub, file: MeshFile, lo: np.ndarray, hi: np.ndarray) -> None:
-    """Warn of a shape probably in other units than the domain."""
+    """Warn of a shape that is probably in other units than the domain."""
     domain, used = hub.require_domain(), slice(len(lo))
     size, room = float((hi - lo).max()), float((domain.hi - domain.lo)[used].max())
     if CELLS * (domain.h or 0.0) < size < OUT * room:
@@ -93,9 +93,9 @@ class MeshRegion(Enclosed):
         (.e), MED, CGNS, MFEM, VTK and any other format that meshio reads; or a geometry (.geo,
         .step, .brep), which Gmsh meshes.
     group
-        Name or number of a physical group; in other formats, of a set, an instance, a block, a
-        property or a surface; in VTK, ``name:number`` of cell data. Default: the whole mesh. A
-        group of lower dimension, such as a boundary, serves to select nodes and to load its faces.
+        Name or number of a physical group (Gmsh), or of a set, an instance, a block, a property or
+        a surface in other formats; in VTK, ``name:number`` of cell data. Default: the whole mesh. A
+        group of lower dimension, such as a boundary, can be used to select nodes and to load faces.
     exterior
         The word ``exterior`` selects everything outside.
 
@@ -107,8 +107,8 @@ class MeshRegion(Enclosed):
     Notes
     -----
     Elements are lines in 1D, triangles and quadrilaterals in 2D, tetrahedra, hexahedra, wedges and
-    pyramids in 3D, by their corners, faces included. Non-planar faces with four corners are two
-    triangles. In 2D the mesh has z = 0.
+    pyramids in 3D. Edges are taken as straight, and a non-planar face with four corners as two
+    triangles. Faces belong to the region. In 2D the mesh must have z = 0.
 
     See Also
     --------
@@ -135,7 +135,7 @@ class MeshRegion(Enclosed):
         lo, hi = faces.min(axis=(0, 1)), faces.max(axis=(0, 1))
         _tell_of_units(hub, file, lo, hi)
         super().__init__(hub, lo, hi, exterior=exterior == EXTERIOR)
-        # Mesh files have fewer digits than double precision.
+        # Coordinates in mesh files have few digits.
         tolerance = max(self.tolerance, RELATIVE_TOLERANCE * float((hi - lo).max()))
         self.skin = Skin([faces], tolerance, odd=dimension == 1, open=flat)
 
@@ -153,7 +153,7 @@ class MeshRegion(Enclosed):
 
 
 class Near(Region):
-    """Positions whose cell contains part of a set of faces, edges or nodes."""
+    """Positions within half a cell of a set of faces, edges or nodes."""
 
     def __init__(self, region: MeshRegion):
         d = region.dimension
@@ -167,7 +167,7 @@ class Near(Region):
 
 
 def near_set(hub: Hub, name: str, file: Path, group: str | int) -> Region:
-    """Elements, or positions within half a cell of faces, edges or nodes."""
+    """Return the region of a set of elements, or positions within half a cell of other sets."""
     region = MeshRegion(hub, file, group)
     chosen = Near(region) if region.flat else region
     chosen.id = f"{name} ({file.name})"
@@ -179,13 +179,13 @@ _SINGLE = float(np.finfo(np.float32).eps)
 
 
 class STL(Enclosed):
-    """All positions inside a closed triangulated surface, surface included; in 3D.
+    """All positions in or on a closed triangulated surface, in 3D.
 
     Parameters
     ----------
     file
-        Triangles or quadrilaterals: STL (text or binary), OBJ, or any format that region mesh
-        reads, in the length unit of the script.
+        File of triangles or quadrilaterals: STL (text or binary), OBJ, or any format that region
+        mesh reads, in the length unit of the script.
     exterior
         The word ``exterior`` selects everything outside the surface.
 
@@ -226,7 +226,7 @@ class STL(Enclosed):
 class MeshSolid(Solid):
     """A body with one point in each element of a mesh, at the centroid.
 
-    It has the exact volume of the element (times x in axisymmetric domains).
+    The volume of each point is the volume of its element (times x in axisymmetric domains).
 
     Parameters
     ----------
@@ -242,9 +242,10 @@ class MeshSolid(Solid):
 
     Notes
     -----
-    Elements are as in region mesh; lower dimensions are ignored, and, with a warning, centroids
-    outside the domain. Elements of higher order have the volume within their curved edges. The cpdi
-    methods take elements of one shape, by their corners. In 2D the mesh has z = 0.
+    Elements are as in region mesh. Elements of lower dimension are ignored; elements with their
+    centroid outside the domain are, too, with a warning. Volumes of higher-order elements are those
+    within the curved edges. The cpdi methods need elements of one shape, with straight edges. In 2D
+    the mesh must have z = 0.
 
     See Also
     --------

@@ -16,10 +16,10 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of shapes with planes across some axes, round across the others."""
+    """Base of shapes that are bounded by planes along some axes and round in the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
-    across: Sequence[int] = ()  # axes across which it is round
+    across: Sequence[int] = ()  # axes in which it is round
     centre: Sequence[float] = ()
     radius: float
 
@@ -35,7 +35,7 @@ class Primitive(region.Region):
         if not self.across:
             return float(np.prod(sides))
         if (sides < (self.box_hi - self.box_lo)[: self.dimension]).take(self.across).any():
-            return None  # the edge of the domain cuts it
+            return None  # the domain cuts it
         n = len(self.across)
         ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * self.radius**n
         return ball * math.prod(float(sides[axis]) for axis, *_ in self.slabs)
@@ -63,21 +63,21 @@ class Primitive(region.Region):
 
 
 def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
-    """Planes (d + 1,) of a slab, see `Convex`; none at open ends."""
+    """Return planes (d + 1,) of a slab, see `Convex`; none at open ends."""
     normal = np.eye(d)[axis]
     return [np.append(n, at) for n, at in ((normal, lo), (-normal, -hi)) if math.isfinite(at)]
 
 
 class BlockRegion(Primitive):
-    """A box with faces along the axes, faces included.
+    """A box with faces normal to the axes, including its faces.
 
     Parameters
     ----------
     bounds
         In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D ``xlo, xhi, ylo, yhi, zlo, zhi``.
         Each is a number, or ``INF`` (or ``EDGE``) for the edge of the domain. Equal numbers make a
-        plane, a line or a point, for groups of nodes. A last word ``exterior`` selects everything
-        outside.
+        plane, a line or a point, for groups of nodes. With ``exterior`` as last argument:
+        everything outside.
 
     Example
     -------
@@ -107,14 +107,14 @@ class BlockRegion(Primitive):
 
 
 class Cylinder(Primitive):
-    """A disk in 2D, a cylinder along one of the axes in 3D, surface included.
+    """A disk in 2D, or a cylinder along one of the axes in 3D, including its surface.
 
     Parameters
     ----------
     shape
         In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y or
         z, the centre in the other directions (in the order x, y, z), the radius, and the ends,
-        which may be ``INF`` (or ``EDGE``). A last word ``exterior`` selects everything outside.
+        which may be ``INF`` (or ``EDGE``). With ``exterior`` as last argument: everything outside.
 
     Example
     -------
@@ -159,13 +159,13 @@ class Cylinder(Primitive):
 
 
 class Sphere(Primitive):
-    """A sphere in 3D, a disk in 2D, an interval in 1D, surface included.
+    """A sphere in 3D, a disk in 2D, or an interval in 1D, including its surface.
 
     Parameters
     ----------
     shape
-        Centre and radius: in 1D ``x, R``; in 2D ``x, y, R``; in 3D ``x, y, z, R``. A last word
-        ``exterior`` selects everything outside.
+        Centre and radius: in 1D ``x, R``; in 2D ``x, y, R``; in 3D ``x, y, z, R``. With
+        ``exterior`` as last argument: everything outside.
 
     Example
     -------
@@ -194,13 +194,14 @@ class Sphere(Primitive):
 
 
 class Plane(Primitive):
-    """All positions on one side of a plane, in 2D of a line, surface included.
+    """All positions on one side of a plane (in 2D of a line), including the plane.
 
     Parameters
     ----------
     plane
-        A position on the plane and a normal of any length, which points into the region: in 2D ``x,
-        y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. A last word ``exterior`` selects the other side.
+        A position on the plane, and a normal of any length that points into the region: in 2D ``x,
+        y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. With ``exterior`` as last argument, the other
+        side is selected.
 
     Example
     -------
@@ -208,7 +209,7 @@ class Plane(Primitive):
 
     Notes
     -----
-    It extends to the edges of the domain. For bodies with inclined faces, intersect such regions.
+    The region extends to the edges of the domain. For bodies with inclined faces, intersect planes.
 
     See Also
     --------
@@ -223,7 +224,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """Unknown, since the domain cuts off part of a half-space."""
+        """None (unknown): the domain cuts the half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
@@ -258,7 +259,7 @@ class Union(region.Region):
     Parameters
     ----------
     first, second, more
-        IDs of regions. A region defined with ``exterior`` is everything outside its shape.
+        IDs of regions. A region that was defined with ``exterior`` is everything outside its shape.
 
     Example
     -------
@@ -347,7 +348,7 @@ class Difference(region.Region):
         depth = np.minimum(first, -np.maximum.reduce(others))
         for operand in self.parts[1:]:
             same = self.parts[0].coincides(operand, x)
-            if same is not None:  # nothing is left, and clipping would search for a sheet
+            if same is not None:  # nothing is left; clipping would search for a thin sheet
                 depth[same] = np.minimum(depth[same], -reach)
         return depth
 

@@ -20,9 +20,9 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MISSED = 0.01  # of a shape's volume
-COARSE = 0.08  # of a box's or ball's volume
-MANY = 10  # per cell and direction
+MISSED = 0.01  # fraction of a shape's volume, for a warning
+COARSE = 0.08  # the same for a box or ball
+MANY = 10  # points per cell and direction, for a warning
 
 
 class RegionSolid(Solid):
@@ -39,10 +39,10 @@ class RegionSolid(Solid):
         Points per cell in each direction: 2 gives 4 points per cell in 2D, 8 in 3D.
     points
         ``regular``: equally spaced. ``gauss``: at the Gauss points of the cell, with their weights
-        as volumes. ``cut``: equally spaced, with boxes cut by the edge of the region. Default:
-        regular, except that, without domains of the basis (ugimp, cpgimp, cpdi), ``ppc`` 3 uses the
-        Gauss points with equal volumes, as in Karamelo, and regions from files (mesh, stl) are cut.
-        In ulmpm/contacts, regions with curved or inclined faces are cut.
+        as volumes. ``cut``: equally spaced, with the boxes of points cut at the edge of the region.
+        The default is ``cut`` for regions from files (mesh, stl), and in ulmpm/contacts for curved
+        or inclined faces; otherwise ``regular``, but Gauss points with equal volumes for ``ppc`` 3,
+        as in Karamelo. With cpdi, and in other methods with ugimp and cpgimp, it is ``regular``.
 
     Example
     -------
@@ -52,15 +52,15 @@ class RegionSolid(Solid):
 
     Notes
     -----
-    Cells start at the lower corner of the domain; in methods with a grid for each solid, at the
-    lower corner of the region's bounding box, cut at the domain.
+    Cells start at the lower corner of the domain, or, in methods with a grid for each solid, of the
+    region's bounding box within the domain.
 
-    A cut point has the volume and centroid of the remaining part of its box; a part of less than 10
-    % is merged with the nearest point. Round bodies have their volume to 0.01 %, and no
-    stair-stepped surface for contacting bodies to lock on. Fins and slots as thin as 10 % of h/ppc
-    have their mass to 3 %; a message warns of thinner ones, except in regions of plug-ins without
-    `distance`. With ugimp and cpgimp, cut points have square domains, which do not tile the edge;
-    cpdi refuses them.
+    A cut point has the volume and centroid of the part of its box inside the region; a part of less
+    than 10 % of the box is merged with the nearest point. The volume of round bodies is exact to
+    0.01 %, and bodies in contact do not lock on a stair-stepped surface. The mass of fins and slots
+    as thin as 10 % of h/ppc is exact to 3 %; a warning names thinner ones, except in regions of
+    plug-ins without `distance`. With ugimp and cpgimp, cut points have square domains, which do not
+    tile the edge; cpdi refuses cut points.
 
     See Also
     --------
@@ -88,7 +88,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
-        # Whole boxes make stair-steps; shapes from files have a known mass.
+        # Whole boxes make stair-steps, and a mass that differs from the mass of a shape in a file.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):
@@ -161,17 +161,17 @@ class RegionSolid(Solid):
 
 
 class PointsSolid(Solid):
-    """A body of points from a file or from Python, with their initial state.
+    """A body of points whose positions and initial state come from a file or from Python.
 
     Parameters
     ----------
     table
-        A file with columns of numbers and a row of names. Required: ``x``, ``y``, ``z`` (one per
+        A file with columns of numbers and a row of names. Required are ``x``, ``y``, ``z`` (one per
         dimension), and ``volume`` (in 2D for a thickness of 1, in axisymmetric domains the area in
-        the xy plane) or ``mass``. Optional: velocities (``vx`` ...), temperatures (``T``), Cauchy
-        stresses (``s11`` ..., of materials in rate form). Or the last snapshot of a dump of points
-        (dump particle, vtk or hdf5, or of LAMMPS), a .vtu or an .xyz file. In Python, a dictionary
-        of arrays or a DataFrame.
+        the xy plane) or ``mass``. Velocities (``vx`` ...), temperatures (``T``) and Cauchy stresses
+        (``s11`` ..., for materials in rate form) are optional. The file may also be a dump of
+        points (dump particle, vtk or hdf5, or of LAMMPS), of which the last snapshot is read, a
+        .vtu or an .xyz file. In Python, use a dictionary of arrays or a DataFrame.
     volume
         Volume of each point, if the file has none.
     GlueToSolid
@@ -184,11 +184,11 @@ class PointsSolid(Solid):
 
     Notes
     -----
-    Domains of a basis are squares or cubes of the volume of the point. The cpdi methods, whose
-    domains tile a body, refuse this style.
+    If the basis needs domains, they are squares or cubes with the volume of the point. The cpdi
+    methods refuse this style, since their domains must tile a body.
 
     Materials start without a history: other columns of a dump (``ep``, ``damage`` ...) are ignored.
-    ``read_restart`` continues a run with all of it.
+    To continue a run with its complete state, use ``read_restart``.
 
     See Also
     --------
@@ -241,7 +241,7 @@ class PointsSolid(Solid):
             )
         half = volumes[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        # The stress is at the temperature of the point.
+        # T comes first: the stress depends on the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
         self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)

@@ -10,7 +10,7 @@ from karamelo_py.scene.terrain import HeightsFile, faces_of, outline_of, read_pr
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.meshes import Enclosed
 
-AROUND = 4  # of ground beyond the domain
+AROUND = 4  # cells of ground beyond the domain
 
 
 class Heights(Enclosed):
@@ -24,10 +24,10 @@ class Heights(Enclosed):
         a file that meshio reads (.ply, .vtk, .vtu). In 2D a profile: a file with two columns, x
         and height y.
     x, y
-        Position of the raster's lower corner in the scene; default: its coordinates in the file. In
-        2D x alone, of the first row.
+        Position in the scene of the lower corner of the raster (in 2D of the first row, x only).
+        Default: the coordinates in the file.
     exterior
-        The word ``exterior`` selects everything above.
+        The word ``exterior`` selects everything above the surface.
 
     Example
     -------
@@ -38,10 +38,10 @@ class Heights(Enclosed):
     -----
     A cloud is interpolated linearly on a raster with the mean spacing of its points.
 
-    Heights are at the centres of cells; between four centres the surface has two triangles,
-    and it is level beyond the outer ones. The raster must cover the domain. A landslide is the
-    difference of two such regions, the initial surface and the slip surface. fix contact/surface
-    makes the ground a wall with friction.
+    Heights are at the centres of raster cells. Between four centres the surface consists of two
+    triangles; beyond the outer centres it is level. The raster must cover the domain. A landslide
+    is the difference of two such regions, the initial surface and the slip surface. fix
+    contact/surface makes the ground a wall with friction.
 
     See Also
     --------
@@ -108,7 +108,7 @@ class Heights(Enclosed):
         ):
             return None
         apart = np.abs(self.heights - other.heights) > self.tolerance
-        for axis in range(apart.ndim):  # of a cell, if one of its corners is
+        for axis in range(apart.ndim):  # a cell is apart if one of its corners is
             ends = np.moveaxis(apart, axis, 0)
             apart = np.moveaxis(ends[1:] | ends[:-1], 0, axis)
         cells = (
@@ -129,7 +129,7 @@ class Heights(Enclosed):
 
 
 def _cut(at: np.ndarray, z: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of `z` (m, n) at positions (n,) from lo to hi, extended level."""
+    """Cut columns of `z` (m, n) to positions (n,) from lo to hi, extended at constant height."""
     first = max(int(np.searchsorted(at, lo)) - 1, 0)
     last = min(int(np.searchsorted(at, hi)) + 1, len(at))
     at, z = at[first:last], z[:, first:last]

@@ -1,7 +1,7 @@
 """Workloads in separate processes, whose memory does not affect each other.
 
-``python -m karamelo_py.app.bench.apart`` takes a `Measurement` in JSON, and ends when its input is
-closed.
+``python -m karamelo_py.app.bench.apart`` reads a `Measurement` in JSON from its input, and ends
+when the input is closed.
 """
 
 import json
@@ -70,7 +70,7 @@ def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
         if job.ranks > 1:
             status = launch(job.ranks, words, module=MODULE)
         else:
-            # A separate session: Ctrl-C reaches this process only.
+            # In a separate session, so that Ctrl-C is sent to this process only.
             with subprocess.Popen(
                 [*COMMAND, *words], stdin=subprocess.PIPE, start_new_session=True
             ) as process:
@@ -84,8 +84,8 @@ class Scaled(NamedTuple):
     weak: bool
     points: int
     best: float  # particle-steps per second
-    exchange: float  # fraction of time in which the busiest process waits
-    imbalance: float  # mean fraction of longer waits
+    exchange: float  # fraction of time that the busiest process waits
+    imbalance: float  # mean fraction of time that processes wait beyond that
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:

@@ -1,6 +1,6 @@
 """karamelo-py bench: speed of this machine.
 
-Compare speeds within one bench only, since clocks change.
+Only speeds of the same bench are comparable, since clock rates change.
 """
 
 import json
@@ -198,7 +198,7 @@ def commit() -> str | None:
         ).stdout.strip()  # fmt: skip
 
     try:
-        git("ls-files", "--error-unmatch", "__init__.py")  # not a folder in another repository
+        git("ls-files", "--error-unmatch", "__init__.py")  # fails in other repositories
         return git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*")
     except (OSError, subprocess.SubprocessError):
         return None

@@ -28,18 +28,18 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-MOST_STEPS = 2500  # within which nothing leaves the domain
+MOST_STEPS = 2500  # after which points may leave the domain
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
-ALONE = 0.5  # limits a step above this fraction
-APART = 1.5  # trusted ratio of separate sweeps to a compiled step
+ALONE = 0.5  # a component above this fraction of a step limits it
+APART = 1.5  # up to this ratio to a compiled step, times of separate sweeps are trusted
 
 
 class Workload(NamedTuple):
     title: str
     script: str
     lead: int = 3  # steps before the measurement
-    karamelo: float | None = None  # published: million/s of one core of a small AMD EPYC
+    karamelo: float | None = None  # published speed, million/s on one core of a small AMD EPYC
 
 
 def _read_workloads() -> dict[str, Workload]:
@@ -64,7 +64,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Times each sweep, and the same call without points."""
+    """Row of a step that is timed, alternately with points and without."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -75,9 +75,9 @@ class Measured(NamedTuple):
     points: int
     speeds: list[float]
     bytes_per_particle: int
-    bytes_per_particle_step: float  # without caches
-    roofline: float  # of the memory bandwidth at the best speed
-    roofline_in_place: float  # of the bandwidth of arrays as large as the scene
+    bytes_per_particle_step: float  # memory traffic without caches
+    roofline: float  # fraction of the memory bandwidth at the best speed
+    roofline_in_place: float  # fraction of the bandwidth for arrays of the size of the scene
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
     waits: float  # seconds per step to start and join threads
@@ -102,7 +102,7 @@ class Measured(NamedTuple):
 
     @property
     def rest(self) -> float:
-        """Fraction of the step in control and waiting threads."""
+        """Fraction of the step in control flow and waiting threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
@@ -113,7 +113,7 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """Component with at least half of a step: ``overhead``, ``nodes`` or ``memory``.
+        """The component that takes half of a step or more: ``overhead``, ``nodes`` or ``memory``.
 
         Otherwise ``arithmetic`` (instructions or latency), or ``unknown`` if not `told_apart`.
         """
@@ -233,7 +233,8 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns the steps per repetition, and seconds taken and waited by each process.
+    Returns the number of steps per repetition, and for each repetition its seconds and the seconds
+    that each process waited.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -278,7 +279,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
         _take_step(simulation, timed)
         count += 1
         motion = s.control.motion[0]
-        if motion.drift > motion.drift_limit:  # tiles are out of date
+        if motion.drift > motion.drift_limit:  # points must be sorted into tiles again
             simulation.sort()
             begin(StepKind(scheme, Fused(), simulation.mode), s, NoHooks(), True)
     of_points, of_nodes = (
@@ -330,10 +331,10 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Bytes per particle-step without caches, bytes of the scene, parallel regions.
+    """Return bytes per particle-step without caches, bytes of the scene, parallel regions.
 
-    Point fields count per sweep that reads or writes them, node fields in node loops, buffers when
-    written and summed.
+    Point fields are counted in each sweep that reads or writes them, node fields in node loops, and
+    buffers when they are written and summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
@@ -374,7 +375,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes."""
+    """Return the bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)

@@ -17,18 +17,18 @@ from karamelo_py.app.bench.measure import (
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
-MOST = 200  # steps per repetition: no point leaves within five repetitions
+MOST = 200  # steps per repetition, so few that no point leaves in five
 SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
 
 
 class OnCard(NamedTuple):
     points: int
     speeds: list[float]
-    bytes_per_particle_step: float  # without caches
-    roofline: float  # of the memory bandwidth at the best speed
+    bytes_per_particle_step: float  # memory traffic without caches
+    roofline: float  # fraction of the memory bandwidth at the best speed
     bytes_on_card: int
     stages: dict[str, float]
-    made: float  # seconds to compile a step
+    made: float  # seconds to compile the step
     precision: str
 
     best, median, record = Solved.best, Solved.median, Solved.record

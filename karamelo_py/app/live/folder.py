@@ -1,4 +1,4 @@
-"""Live page of a folder with dumps and log."""
+"""Live page of a folder with dumps and a log."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
 PAUSE = 0.5  # seconds between polls
-FILES = 8  # read per poll, so that the first appear early
-WHOLE = (".h5", ".hdf5", ".pvd")  # files of many states
+FILES = 8  # read per poll, so that the first ones appear early
+WHOLE = (".h5", ".hdf5", ".pvd")  # files with many states
 
 
 class FolderPage:
@@ -32,7 +32,7 @@ class FolderPage:
         self._states: list[tuple[Path, int, int, float, int]] = []
         self._seen: dict[Path, float] = {}
         self._read: dict[Path, int] = {}
-        self._widths: dict[str, int] = {}  # columns by dump name
+        self._widths: dict[str, int] = {}  # number of columns by dump name
         self._log: dict[str, np.ndarray] = {}
         self._columns: list[str] = []
         self._dimension, self._column, self._more = 2, "", False
@@ -86,7 +86,7 @@ class FolderPage:
 
     def _add(self, path: Path, index: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
-        if not len(columns.get("x", ())):  # no points, or no positions
+        if not len(columns.get("x", ())):  # it has no points or no positions
             return
         self._columns = self._columns or [name for name in columns if name not in "xyz"]
         if not self._states:

@@ -16,14 +16,14 @@ from urllib.parse import parse_qsl, urlsplit
 
 from karamelo_py.script.errors import ScriptError
 
-PATIENCE = 1.0  # seconds for the last news at the end
+PATIENCE = 1.0  # seconds to send the last news at the end
 BEAT = 2.0  # seconds between messages, to notice closed pages
-STUCK = 30.0  # seconds without receipt: the page counts as closed
-AWAY = 180.0  # seconds without a sign of an open page, after the end; pages send one in 20
-UNKNOWN = 5.0  # seconds to send the secret word
-MOST = 64  # connections; leaves file descriptors for the run
+STUCK = 30.0  # seconds without receipt after which a page counts as closed
+AWAY = 180.0  # the same after the end of a run; open pages send a sign every 20 seconds
+UNKNOWN = 5.0  # seconds in which a client must send the secret word
+MOST = 64  # connections, so that file descriptors remain for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
-# A site could resolve another name to this machine.
+# Other host names are refused: a malicious site could resolve its name to this machine.
 HERE = ("127.0.0.1", "localhost", "::1")
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
@@ -44,9 +44,9 @@ Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 class Server:
     """Serves a page on this machine, at the URL `address`.
 
-    ``news(seen)`` returns the new `seen` and the news since the old one (0 at first), in server
-    threads. `answers` (bytes, JSON or None) and `actions` (POST) are functions of the query, by
-    name.
+    ``news(seen)``, which is called in threads of the server, returns the news since the state
+    `seen` (0 at first) and the new state. `answers` (to bytes, JSON or None) and `actions` (POST)
+    are functions of the query, by name.
     """
 
     def __init__(
@@ -57,16 +57,16 @@ class Server:
         self.page, self.news = page, news
         self.answers = {"plotly.js": _plotly, "points.js": _points, **answers}
         self.actions = {"here": lambda _: None, **actions}
-        self.heard = 0.0  # of the last request
+        self.heard = 0.0  # time of the last request
         self.version = 0
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}
         self.opened = False
-        self.framed = False  # in a notebook
+        self.framed = False  # shown in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        # Short poll interval: closing does not wait.
+        # With a short poll interval, closing does not wait.
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
@@ -85,7 +85,7 @@ class Server:
             )
 
     def stay(self) -> None:
-        """Wait until pages are closed or give no sign."""
+        """Wait until pages are closed or do not respond."""
         self.heard = time.monotonic()
         with self._changed:
             while not self.opened or (self._shown and time.monotonic() < self.heard + AWAY):
@@ -124,7 +124,7 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Limits connections; ignores pages that close while loading."""
+    """Server that limits connections, and ignores pages that close while loading."""
 
     daemon_threads = True
 
@@ -192,7 +192,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             name, words = self._asked()
             length = self.headers.get("Content-Length", "0")
             if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
-                self.rfile.read(int(length))  # else it would be read as the next request
+                self.rfile.read(int(length))  # the body would be read as the next request
             else:
                 self.close_connection = True
             if not self._is_from_here():

@@ -20,10 +20,10 @@ LINES = 12
 
 
 class StudyPage:
-    """The page of a study; `stopped` is set when a viewer ends it.
+    """The page of a study; `stopped` is set when a viewer ends the study.
 
-    `recorded` are recorded values, `axes` initial axes of the chart; folders are relative to
-    `base`.
+    `recorded` are names of recorded values, `axes` the initial axes of the chart; folders are
+    relative to `base`.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """Colour runs: ``judged(row)`` adds class and reason, `colours` maps classes."""
+        """Colour runs by class: ``judged(row)`` adds class and reason, `colours` are by class."""
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(

@@ -53,30 +53,30 @@ def _wrong(argument: Argument, message: str, expected: str) -> ScriptError:
 
 
 class RigidBody(Fix):
-    """Let a rigid solid move by the forces on it.
+    """Move a rigid solid by the forces on it.
 
     Parameters
     ----------
     solid
-        The solid, of material rigid.
+        ID of the solid, which must have the material rigid.
     velocity, spin
-        Initial velocity of its centre (one number per dimension) and angular velocity (one number
-        in 2D, three in 3D).
+        Initial velocity of the centre of mass (one number per dimension) and initial angular
+        velocity (one number in 2D, three in 3D).
     gravity
-        Acceleration, one formula per dimension.
+        Gravitational acceleration, one formula per dimension.
     force, torque
-        Further force on its centre and torque about it: functions of time and published values.
+        Additional force at the centre and torque about it: functions of time and published values.
     motion, turning
-        Prescribed velocity of its centre and angular velocity; NULL leaves a component free.
+        Prescribed velocity of the centre, prescribed angular velocity; NULL: free component.
     fixed
-        Directions in which it does not move: some of x, y, z, and rx, ry, rz for rotation.
+        Directions in which the body cannot move: any of x, y, z, and rx, ry, rz for rotation.
     pivot
-        Position that the body rotates about, as on a hinge or a ball joint.
+        Position about which the body rotates, as on a hinge or a ball joint.
     mass
-        Default: the mass of its points. In axisymmetry, masses and forces are per radian.
+        Mass; default: the mass of the points. In axisymmetry, masses and forces are per radian.
     inertia
-        Moment of inertia about its centre in 2D; in 3D about the axes x, y, z through it at the
-        start. Default: of its points, as squares or cubes, in proportion to the mass.
+        Moment of inertia about the centre in 2D; in 3D three moments, about axes x, y, z through
+        the centre at the start. Default: computed from the points (squares or cubes) and the mass.
 
     Example
     -------
@@ -85,20 +85,21 @@ class RigidBody(Fix):
 
     Notes
     -----
-    Publishes its centre ID_x, ID_y, ID_z; velocity ID_vx, ...; rotation ID_rx, ...; angular
-    velocity ID_wx, ...; force and torque of contact about the centre, ID_fx, ... and ID_tx, ... In
-    2D: x, y, vx, vy, rz, wz, fx, fy, tz. In 3D the rotation is a vector along the axis, at most PI
-    long.
+    Publishes the centre ID_x, ID_y, ID_z; the velocity ID_vx, ...; the rotation ID_rx, ...; the
+    angular velocity ID_wx, ...; the contact force ID_fx, ..., and its torque about the centre,
+    ID_tx, ... In 2D these are x, y, vx, vy, rz, wz, fx, fy, tz. In 3D the rotation is a vector
+    along the axis, with the angle (at most PI) as its length.
 
-    In ulmpm/contacts the body and other solids push each other on the grid (with fix
+    In ulmpm/contacts the body is in contact with other solids on the grid (friction: fix
     contact/friction); in other methods use fix contact/rigid_body. Velocities at the end of the
-    step are solved together with all impulses, so a light body may touch heavy ones. Momentum is
-    conserved to round-off. Velocities are at the middle of a step, unless scheme(..., start=half).
+    step and all contact impulses are solved together, so a light body may touch heavy ones.
+    Momentum is conserved to round-off. Velocities belong to the middle of a step, unless
+    scheme(..., start=half).
 
-    Formulas may contain its published values: force=(-k*(ID_x - x0), 0) is a spring. A fix with the
-    same ID replaces this one, and the body retains its velocity: to release it, repeat the line
-    without fixed. In axisymmetry it moves along the axis only. Rigid bodies pass through held
-    nodes, and without fix contact/bodies through each other.
+    Formulas may contain published values of this fix: force=(-k*(ID_x - x0), 0) is a spring. To
+    release a body between runs, repeat the line without fixed: the new fix replaces this one, and
+    the body retains its velocity. In axisymmetry, bodies move only along the axis. Rigid bodies
+    pass through held nodes, and, without fix contact/bodies, through each other.
 
     In load steps (scheme quasi-static) with ulmpm/contacts its loads and contact are in equilibrium
     at the end of each step; motion and turning are displacements per unit of time.
@@ -274,7 +275,7 @@ class RigidBody(Fix):
         return self._moved(faces.reshape(-1, faces.shape[2])).reshape(faces.shape)
 
     def _moved(self, x0: np.ndarray) -> np.ndarray:
-        """Present positions (n, d) of initial ones."""
+        """Return the present positions (n, d) for initial positions."""
         d, arm = self.hub.domain.dimension, np.zeros((len(x0), 3))
         arm[:, :d] = x0
         arm -= self.constants.start
@@ -302,7 +303,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Formulas by axis, or None; `ways` from 3 on are rotations."""
+        """Return a formula or None per axis; `ways` from 3 on are rotations."""
         items: list[Expression | None] = [None] * size
         if components is None:
             return items
@@ -337,7 +338,7 @@ class RigidBody(Fix):
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
-        """Pivot (3,) of the body; [] without one."""
+        """Return the pivot (3,) of the body; [] without one."""
         if pivot is None:
             return []
         if max(self.ways) < 3:
@@ -414,7 +415,7 @@ class RigidBody(Fix):
 
 
 def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments and axes (by columns)."""
+    """Return principal moments, and principal axes as columns."""
     off = np.abs(tensor - np.diag(np.diag(tensor))).max()
     if off <= NOT_ROUND * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)
@@ -423,16 +424,16 @@ def principal(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class ContactRigidBody(Fix):
-    """Contact of points with a rigid body, both ways, with friction.
+    """Apply contact between points and a free rigid body, with friction.
 
     Parameters
     ----------
     solid
-        The rigid body, with a fix rigid_body.
+        ID of the rigid solid, which must have a fix rigid_body.
     mu
         Coefficient of friction (Coulomb).
     region
-        Its surface at the start; default: the region that the solid fills.
+        Surface of the body at the start; default: the region that the solid fills.
 
     Example
     -------
@@ -442,16 +443,17 @@ class ContactRigidBody(Fix):
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
-    A point is a ball (in 2D a disk) with half the side of a cube of its volume as its radius. Its
-    impulse acts on the nodes of the point, and on the body at the point: a spring of 0.1 m/dt^2,
-    implicit in the velocity of the body at the end of the step, which hardens from a penetration of
-    1/8 of a cell on. Friction stops the slip, with at most mu times the normal impulse. Nodes held
-    by fix velocity_nodes do not yield.
+    A point is a ball (in 2D a disk) with a radius of half the side of a cube of its volume. The
+    contact impulse acts on the nodes around the point, and on the body at the point. It is that a
+    spring of stiffness 0.1 m/dt^2 gives, implicitly with the velocity of the body at the end of the
+    step; from a penetration of 1/8 of a cell on, the spring hardens. Friction stops the slip, with
+    at most mu times the normal impulse. Nodes held by fix velocity_nodes are not moved.
 
-    For ulmpm and tlmpm. A body rolls on its radius plus half a point: with a radius of 3 cells, its
-    acceleration on a slope is 3.6 % too large (2 % in 3D). Use ulmpm/contacts for liquids, and for
-    bodies that slide or are held by friction: a sliding box accelerates 0.04 % too much there and 5
-    % too little with this fix, where a box at rest creeps by 0.04 cells in 500 steps.
+    The fix is for ulmpm and tlmpm. A wheel rolls on its radius plus half a point, so its
+    acceleration on a slope is 3.6 % too large with a radius of 3 cells (2 % in 3D). Use
+    ulmpm/contacts for liquids, and for bodies that slide or are held by friction: the acceleration
+    of a sliding box is 0.04 % too large there, but 5 % too small with this fix, and a box at rest
+    creeps by 0.04 cells in 500 steps.
 
     See Also
     --------
@@ -503,7 +505,7 @@ class ContactRigidBody(Fix):
                 raise error
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Number of points in the body before the first step, and largest depth."""
+        """Return the number of points in the body before the first step, and the largest depth."""
         depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
         index = points.numbers - self.touches.first_id
         depth = depth[(index < 0) | (index >= self.touches.count)]

@@ -61,16 +61,16 @@ class Party(NamedTuple):
 
 
 class ContactBodies(Fix):
-    """Contact of rigid bodies with each other and with fixed regions, with friction.
+    """Apply contact of rigid bodies with each other and with fixed regions, with friction.
 
     Parameters
     ----------
     first, second, more
-        Rigid solids, each with a fix rigid_body, and regions that do not move. Any two may touch.
+        IDs of rigid solids, each with a fix rigid_body, and of fixed regions. Any two can collide.
     mu
         Coefficient of friction (Coulomb).
     restitution
-        Normal speed after a collision over the speed before, from 0 to 1.
+        Normal relative speed after a collision over the speed before, from 0 to 1.
 
     Example
     -------
@@ -78,18 +78,19 @@ class ContactBodies(Fix):
 
     Notes
     -----
-    Publishes the force on the first part as ID_x, ID_y, ID_z.
+    Publishes the force on the first solid or region as ID_x, ID_y, ID_z.
 
-    Works in every method, and together with contact with deformable solids. Stacks come to rest,
-    even a heavy body on light ones. Momentum and angular momentum are conserved to round-off, and
-    no collision adds energy. Collisions within a step are resolved one by one, fastest first.
+    The fix works in every method, together with contact with deformable solids. Stacks come to
+    rest, even with a heavy body on light ones. Momentum and angular momentum are conserved to
+    round-off. No collision adds energy. Collisions within a step are resolved singly, fastest
+    first.
 
-    Disks and spheres touch as a whole. Corners and edges of other shapes are rounded by balls of
-    0.05 cells, in 3D one per cell along edges. A fixed region is a wall or a container; a body with
-    motion=... is a moving one. Bodies that a joint connects do not touch.
+    Disks and spheres are exact. Corners and edges of other shapes are rounded by balls of 0.05
+    cells, in 3D one per cell along edges. A fixed region serves as a wall or a container, a body
+    with motion=... as a moving wall. There is no contact between bodies that a joint connects.
 
     The cost of a step grows with the number of pairs, and with the cube of the number of moving
-    bodies: use it for up to some tens.
+    bodies: use the fix for up to some tens of bodies.
 
     See Also
     --------
@@ -150,16 +151,16 @@ class Joint(Fix):
         along an axis without rotation; weld: no relative motion; spring: a force along the line
         between two positions.
     first, second
-        Rigid solids, each with a fix rigid_body. Without a second one, the ground.
+        IDs of rigid solids, each with a fix rigid_body. Default for `second`: the ground.
     at
-        Position of the joint, or end of a spring in the first body. Default: its centre.
+        Position of the joint, or of the spring's end in the first body. Default: its centre.
     end
-        End of a spring in the second body, or in the ground. Default: the body's centre.
+        Position of the spring's end in the second body or the ground. Default: the body's centre.
     axis
         Direction of a hinge (in 3D) or slider, fixed in the first body.
     stiffness, damping, length
-        Of a spring: force per extension, force per speed, and the length without force (default: at
-        the start).
+        For a spring: force per extension, force per speed of extension, and the unstretched length
+        (default: the initial length).
 
     Example
     -------
@@ -171,12 +172,12 @@ class Joint(Fix):
     -----
     Publishes the force on the first body as ID_x, ID_y, ID_z.
 
-    Joints hold from the first step on, until delete_fix. They are solved together with all contacts
-    of the bodies, so masses may differ by any ratio. A rotation displaces a joint by second order
-    in the step; the next step removes this.
+    A joint holds from the first step until delete_fix. Joints are solved together with all contacts
+    of the bodies, so masses may have any ratio. In a rotation, a joint opens by an error of second
+    order in the step, which the next step removes.
 
-    A spring with up to 1/dt^2 of stiffness per mass is explicit and dissipates nothing; a stiffer
-    one is implicit and damped by the step. Damping is implicit.
+    A spring is explicit and dissipates nothing up to a stiffness per mass of 1/dt^2; a stiffer one
+    is implicit, with numerical damping. Damping is implicit.
 
     See Also
     --------

@@ -15,7 +15,8 @@ class AngularVelocityNodes(Fix):
     Parameters
     ----------
     omega
-        In radians per time, from x to z, a function of x0, y0, time and published values.
+        Angular velocity in radians per time, positive from x to z, a function of x0, y0, time and
+        published values.
 
     Example
     -------
@@ -24,9 +25,9 @@ class AngularVelocityNodes(Fix):
 
     Notes
     -----
-    For scenes with axisymmetric(true, twist=true). Publishes the torque that holds the nodes, per
-    radian, as ID_s. The velocity around the axis is omega times the radius. Of several such fixes
-    on a node, the last decides.
+    The scene needs axisymmetric(true, twist=true). The velocity around the axis is omega times the
+    radius. Publishes the torque on the nodes, per radian, as ID_s. If several such fixes include a
+    node, the last one applies.
 
     See Also
     --------

@@ -16,7 +16,7 @@ from karamelo_py.styles.fixes.formulas import AXES, judge_friction, unlike
 
 
 def prescribe(node):
-    """Set v to the value one step earlier, as at a symmetry plane."""
+    """Set v* to the value and v to the value of the previous step, as at a symmetry plane."""
     return node.before, node.value, node.force, node.mass * (node.value - node.v_star) / node.kick
 
 
@@ -29,19 +29,19 @@ def prescribe_mapped(node):
 
 
 def prescribe_at_most(node):
-    """Bound v* from above; the total is the reaction, which pushes backwards."""
+    """Bound v* from above; the published sum is the reaction, which is negative."""
     allowed = min(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
 
 def prescribe_mapped_at_most(node):
-    """Bound v, too: otherwise stress does spurious work, and a rebound gains half of the energy."""
+    """Bound v, too. Otherwise stress does spurious work, and a rebound gains 50 % of the energy."""
     allowed = node.value if node.v_star == node.value else min(node.v, node.value)
     return allowed, allowed, node.force, 0.0
 
 
 def prescribe_at_least(node):
-    """Bound v* from below; the total is the reaction, which pushes forwards."""
+    """Bound v* from below; the published sum is the reaction, which is positive."""
     allowed = max(node.v_star, node.value)
     return node.v, allowed, node.force, node.mass * (allowed - node.v_star) / node.kick
 
@@ -51,7 +51,7 @@ def prescribe_mapped_at_least(node):
     return allowed, allowed, node.force, 0.0
 
 
-# By bound: hooks after the momentum update, and after velocities are mapped again.
+# By bound: the hooks after the momentum update, and after velocities are mapped again.
 HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
@@ -64,7 +64,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """Script argument: a formula, after leq or geq for a `bound`."""
+    """Script argument: a formula, or leq or geq and a formula, for a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
@@ -88,9 +88,9 @@ class VelocityNodes(Fix):
         vx, vy, vz, one per dimension: functions of x0, y0, z0, time and published values. NULL
         leaves a component free. After ``leq`` or ``geq``, the velocity is an upper or lower bound.
     mu
-        Coefficient of friction (Coulomb). The wall is at rest in NULL directions. On nodes that it
-        holds or bounds, the tangential force is at most mu times the normal force. With `velocity`
-        (not ``geq`` or ``leq``), friction also acts under tension.
+        Coefficient of friction (Coulomb). Friction acts in NULL directions, in which the wall is at
+        rest; its force is at most mu times the force in the other directions. Without ``geq`` or
+        ``leq``, friction also acts under tension.
 
     Example
     -------
@@ -102,18 +102,18 @@ class VelocityNodes(Fix):
 
     Notes
     -----
-    Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work
-    heats points with a temperature; the wall takes no heat.
+    Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work heats
+    points with a temperature; the wall takes no heat.
 
-    Of several such fixes on a node in one direction, the last decides: it publishes the whole
+    If several such fixes include a node and direction, the last one applies: it publishes the whole
     reaction, and only its friction acts. A bound that is not reached exerts no force.
 
-    A plane of such nodes inside the grid is a wall, like the ends of the grid. Splines are modified
-    in cells next to faces whose nodes are all held or bounded, so a group should extend to the last
-    cell with points of a body.
+    A plane of such nodes inside the grid is a wall. Splines are modified at cell faces whose nodes
+    are all held or bounded, as at the ends of the grid, so the group should extend over all cells
+    that the body touches.
 
-    In ulmpm/contacts, a fix that gives all components, on all corners of a solid's cells, holds all
-    nodes of the solid.
+    In ulmpm/contacts, if a fix prescribes all components at all corners of a solid's cells, all
+    nodes of the solid are held.
 
     See Also
     --------
@@ -142,15 +142,14 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all directions drags material along; others are clamps, rollers or
-        # symmetry planes.
+        # A wall that moves in all directions drags material; others are clamps or symmetry planes.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
         drags = drags and len(group.nodes) < hub.fields.node_count
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
-        # Contact may move nodes only in directions in which they are free.
+        # Contact moves nodes only in free directions.
         self.prescribes_velocity = not self.bound
         self.held_directions = tuple(k for k, v in enumerate(self.formulas) if v is not None)
 
@@ -248,12 +247,12 @@ class InitialVelocityNodes(Fix):
 
 
 class Reaction(Compute):
-    """Measure the force that holds nodes, published as ID_x, ID_y, ID_z.
+    """Measure the reaction at nodes with prescribed velocity, published as ID_x, ID_y, ID_z.
 
     Parameters
     ----------
     group
-        Group of nodes, or ``all``, with all or no nodes of each fix velocity_nodes.
+        Group of nodes, or ``all``. It must include all or no nodes of each fix velocity_nodes.
 
     Example
     -------
@@ -262,7 +261,7 @@ class Reaction(Compute):
 
     Notes
     -----
-    The sum of the reactions of the fixes velocity_nodes in the group; 0 before the first step.
+    The reactions of fixes velocity_nodes in the group are summed; 0 before the first step.
 
     See Also
     --------

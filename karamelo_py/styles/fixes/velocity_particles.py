@@ -18,7 +18,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
-ALIKE = 1e-6  # of a velocity or the wave speed; smaller differences are ignored
+ALIKE = 1e-6  # relative difference of velocities that is ignored
 DIFFERENT = " how they move, the other how they deform"
 
 
@@ -43,7 +43,7 @@ class VelocityOfPoints(Fix):
 
 
 class VelocityParticles(VelocityOfPoints):
-    """Prescribe the velocity of points, which push other bodies on the grid.
+    """Prescribe the velocity of points, as of a grip that moves other points through the grid.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ class VelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    Publishes the force that holds the points as ID_x, ID_y, ID_z. Of several such fixes on a point
-    in one direction, the last decides. It also overrides initial velocities and held nodes, with a
-    warning before the run.
+    Publishes the force on the points as ID_x, ID_y, ID_z. If several such fixes include a point and
+    direction, the last one applies. Prescribed velocities of points also override initial
+    velocities and held nodes, with a warning before the run.
 
-    Use two cells of points or more: nodes that other points reach move less, so the outer cell of a
-    grip deforms with the body. In ulmpm (linear, quadratic-spline, cubic-spline), the rest of a
-    solid squeezed by 20 % slips past a grip of one cell.
+    A grip should be at least two cells thick: its nodes near other points have a mean velocity, so
+    the outer cell of the grip deforms with the body. In ulmpm (linear, quadratic-spline,
+    cubic-spline), a solid squeezed by 20 % slips past a grip one cell thick.
 
     See Also
     --------
@@ -94,8 +94,8 @@ class InitialVelocityParticles(VelocityOfPoints):
 
     Notes
     -----
-    With transfers that store a velocity gradient or affine velocity (APIC, TPIC ...), points also
-    get the gradient of the formulas, so the first step preserves an affine motion.
+    If the transfer stores a velocity gradient or affine velocity (APIC, TPIC ...), points also get
+    the gradient of the formulas, so that the first step is exact for an affine motion.
 
     See Also
     --------
@@ -125,12 +125,12 @@ class InitialVelocityParticles(VelocityOfPoints):
 def gradient(
     evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
+    """Return derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
 
-    At the reference position, x and x0 are the same coordinate.
+    At points that have not moved, x and x0 vary together.
     """
     out = np.zeros_like(x, float)
-    # Single precision rounds positions.
+    # The tolerance allows for rounding in single precision.
     unmoved = (np.abs(x - x0) <= 0.01 * step).all(axis=1)
     for k in range(x.shape[1]):
         shift = np.zeros_like(out)
@@ -153,7 +153,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
             yield _said(other, axes, shared)
-    # A common velocity, then another for some points, is intended.
+    # Setting a common velocity, and then another for some points, is intended.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and 0 < len(shared) == len(simulation.points.members(other.group)):

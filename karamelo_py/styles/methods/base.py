@@ -21,9 +21,9 @@ from karamelo_py.script.errors import Mark, ScriptError
 LOADS = ("ContactForce", "ContactTorque")
 CORRECTED = Restrictions(
     "mass=corrected", "mass=lumped",
-    # With FLIP a vibrating body gains energy. The spread of other bases varies within a cell.
-    # Contact forces come later in a step: the lowest cells of a block at rest would have 5 % less
-    # stress, and 23 % less on a wall with a bound.
+    # Not with FLIP, with which a vibrating body gains energy, nor with bases of variable spread.
+    # Not with contact, whose forces come later in a step: the lowest cells of a block at rest would
+    # have 5 % less stress, and 23 % less on a wall with a bound.
     only={"transfer": ("APIC", "AFLIP", "ASFLIP", "MLS", "TPIC", "TFLIP"),
           "basis": ("quadratic-spline", "cubic-spline"), "method": ("ulmpm", "tlmpm")},
     without=("periodic", "pore_water", "implicit", "yielding walls"),
@@ -40,7 +40,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """True if the yield surface uses the averaged pressure (F-bar)."""
+    """Return whether the yield surface uses the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -61,7 +61,7 @@ class Method:
     Attributes
     ----------
     basis, basis_name
-        Tag of the basis, and its name in scripts.
+        Tag of the basis, and its name in scripts
     corrected
         Whether accelerations are corrected for the lumped masses.
     frame
@@ -90,25 +90,25 @@ class Method:
 
     @property
     def regular_points(self) -> bool:
-        """True if the basis has domains that tile a cell."""
+        """True if points are domains that must tile a cell."""
         return bool(self.basis.traits.shape)
 
     def contact_between(self, hub: Hub, lattices: Sequence[Lattice]) -> NamedTuple:
-        """Tag of contact between solids."""
+        """Return the tag of contact between solids."""
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Update the tag from the fixes, before every run."""
+        """Update `contact` from the fixes, before every run."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """State of contact for the next step, in node ranges `spans` (k, 2)."""
+        """Return the state of contact that the next step needs, in node ranges `spans` (k, 2)."""
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Copy the state of the contact `before` lowering."""
+        """Copy the state of contact from `before` the scene was lowered again."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
-        """Register a new solid."""
+        """Prepare the method for a new solid."""
 
     def lattices(self, hub: Hub) -> list[Lattice]:
         domain = hub.domain
@@ -116,21 +116,21 @@ class Method:
         return [self._lattice(domain.dimension, *ends, domain.h)]
 
     def rigid_fields(self, hub: Hub) -> np.ndarray:
-        """Mask (F,) of fields of rigid solids, or (0,)."""
+        """Return a mask (F,) of velocity fields of rigid solids, or (0,) without such fields."""
         return np.zeros(0, bool)
 
     def lattice_of(self, hub: Hub, solid: Solid) -> int:
         return 0
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """Nodes to hold where a fix gives the whole velocity of `nodes`."""
+        """Return the nodes to hold if a fix prescribes all velocity components of `nodes`."""
         return nodes
 
     def kinematics(self, hub: Hub) -> Any:
         return hub.domain.kin
 
     def averaging(self, hub: Hub) -> NamedTuple:
-        """Tag of averaging: `FBar` if volume changes are averaged."""
+        """Return the tag of averaging, `FBar` if volume changes are averaged."""
         if not hub.update.anti_locking:
             return PointByPoint()
         laws = [solid.material.law for solid in hub.solids.values()]
@@ -138,11 +138,11 @@ class Method:
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
-        """Initial positions and domain shapes, (n, w)."""
+        """Return initial positions and domain shapes, (n, w)."""
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
-        """Domain shapes (n, s), as the basis stores them."""
+        """Return domain shapes (n, s), as the basis stores them."""
         basis, half = type(self.basis), solid.half_size
         n, d = half.shape
         unit = np.eye(d)
@@ -166,10 +166,10 @@ class Method:
         return Lattice(dimension, lo, hi, h, basis.traits.nodes_per_cell, basis.traits.least_nodes)
 
     def check(self, hub: Hub) -> None:
-        """Refuse incompatible options; called before every run."""
+        """Raise ScriptError for incompatible options; called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         if scheme.traits.implicit:
-            return  # implicit schemes do not use these transfers
+            return  # implicit schemes have other transfers
         unsteady = (
             transfer.traits.inverts_spread and not basis.traits.steady_moment and self.frame.moves
         )
@@ -183,7 +183,7 @@ class Method:
 
 
 def _corners(element: Element, solid: Solid) -> np.ndarray:
-    """Corners (n, c, d) of elements or boxes, with volumes >= 0."""
+    """Return corners (n, c, d) of elements or boxes, oriented for volumes >= 0."""
     corners = solid.corners
     if corners is None:
         corners = solid.x0[:, None, :] + np.array(element.box) * solid.half_size[:, None, :]

@@ -22,7 +22,7 @@ class Convected(Method):
     Parameters
     ----------
     variant
-        The shape of the domains.
+        Shape of the domains.
 
     Attributes
     ----------
@@ -82,11 +82,11 @@ class Convected(Method):
 class ULCPDI(Convected, ULMPM):
     """CPDI: each point has a deforming domain, and interacts with the nodes around its corners.
 
-    All solids have one grid. No numerical fracture at any stretch, and no jump of forces when a
-    point crosses a cell face (Sadeghirad et al. 2011, 2013).
+    All solids have one grid. There is no numerical fracture at any stretch, and no jump of forces
+    when a point crosses a cell face (Sadeghirad et al. 2011, 2013). Variants:
 
     ``R4`` and ``R8``
-        parallelograms and parallelepipeds that follow the deformation of their point: robust;
+        parallelograms and parallelepipeds that deform with F of their point: robust;
     ``Q4`` and ``H8``
         quadrilaterals and hexahedra whose corners move with the grid: no gaps or overlaps;
     ``T3`` and ``Tet4``
@@ -102,8 +102,8 @@ class ULCPDI(Convected, ULMPM):
 class TLCPDI(Convected, TLMPM):
     """Total Lagrangian CPDI: initial domains on a separate grid for each solid.
 
-    Domains do not deform, so they cannot tangle. Solids do not interact on the grid. Variants: see
-    ulcpdi.
+    Domains do not deform, so they cannot tangle. Solids do not interact on the grid. The variants
+    are as in ulcpdi.
 
     Example
     -------

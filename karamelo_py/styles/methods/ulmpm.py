@@ -18,8 +18,8 @@ from karamelo_py.styles.methods.base import Method, publish_loads, slots_of_load
 class ULMPM(Method):
     """Updated Lagrangian MPM: weights follow the present positions; one grid for all solids.
 
-    Solids that meet on the grid move together there: contact without slip. Nodes near points of a
-    rigid solid take its velocity.
+    Solids with common nodes stick to each other: contact without slip. Nodes near points of a rigid
+    solid have the velocity of this solid.
 
     Example
     -------
@@ -27,9 +27,9 @@ class ULMPM(Method):
 
     Notes
     -----
-    Publishes the force on every rigid solid ID as ContactForce_ID_x, ContactForce_ID_y,
-    ContactForce_ID_z, and its torque about the origin as ContactTorque_ID_x and so on. About a
-    position c it is ContactTorque_ID - c x ContactForce_ID.
+    Publishes, for each rigid solid ID, the force on it as ContactForce_ID_x, ContactForce_ID_y,
+    ContactForce_ID_z, and the torque about the origin as ContactTorque_ID_x and so on. The torque
+    about a position c is ContactTorque_ID - c x ContactForce_ID.
     """
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
@@ -62,10 +62,11 @@ known_failure(
 class TLMPM(Method):
     """Total Lagrangian MPM: weights follow reference positions; each solid has its own grid.
 
-    No point crosses a cell face, and a body breaks only if its law says so. Solids do not interact
-    on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration). Use it for
-    bodies that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A Total-Lagrangian
-    material point method for solid mechanics problems involving large deformations").
+    No point crosses a cell face, and a body breaks only by damage of its material. Solids do not
+    interact on the grid: define contact with fixes (contact/hertz, contact/minimize_penetration).
+    Use it for bodies that retain their topology (de Vaucorbeil, Nguyen & Hutchinson 2020, "A
+    Total-Lagrangian material point method for solid mechanics problems involving large
+    deformations").
 
     Example
     -------

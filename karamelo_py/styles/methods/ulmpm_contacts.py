@@ -41,10 +41,10 @@ def flows(law: NamedTuple) -> bool:
 
 
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
-    """Fraction (F, F) of frictional heat for the first of two solids.
+    """Return the fraction (F, F) of frictional heat that goes into the first of two solids.
 
-    With conduction, by effusivity sqrt(kappa rho cp), as between half-spaces (Carslaw & Jaeger
-    1959, section 2.15); otherwise half each, none without a temperature.
+    With conduction it follows from the effusivities sqrt(kappa rho cp), as between half-spaces
+    (Carslaw & Jaeger 1959, section 2.15). Otherwise it is 1/2, or 0 without a temperature.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
     root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
@@ -58,7 +58,8 @@ class ULMPMContacts(Method):
     """Updated Lagrangian MPM with contact: a velocity field on the grid for each solid.
 
     Solids push each other along their common normal once the gap is closed, and separate freely.
-    Contact is frictionless without fix contact/friction. Rigid solids do not yield to contact.
+    Contact is frictionless without fix contact/friction. Contact does not move rigid solids, unless
+    they have a fix rigid_body.
 
     Example
     -------
@@ -70,35 +71,35 @@ class ULMPMContacts(Method):
     ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and its torque about the origin as
     ContactTorque_ID_x and so on. Glued solids have one field and one force.
 
-    The gap follows from the mean position of the points around a node, with the outermost layer
-    half its size below the surface (Nairn 2013, "Modeling imperfect interfaces in the material
-    point method using multimaterial methods"): exact for plane surfaces along the grid. Solids with
-    curved or inclined faces use cut points (points=cut) by default: whole squares make such a face
-    stair-stepped, and a block on a slope of 20 degrees sticks. With bernstein-quadratic, contact
-    begins as soon as two solids have mass at one node.
+    The gap at a node is computed from the mean position of the points around it, assuming that the
+    outermost points are half their size below the surface (Nairn 2013, "Modeling imperfect
+    interfaces in the material point method using multimaterial methods"). This is exact for plane
+    surfaces along the grid. Solids with curved or inclined faces have cut points (points=cut) by
+    default, since whole squares make it stair-stepped, and a block on a slope of 20 degrees sticks.
+    With bernstein-quadratic, contact begins as soon as two solids have mass at one node.
 
-    A node at a surface loses its velocity of approach. Colliding bars of 4, 8 and 16 cells lose 15,
-    11 and 4 % of the kinetic energy.
+    Contact is inelastic at the nodes of a surface: colliding bars of 4, 8 and 16 cells lose 15, 11
+    and 4 % of the kinetic energy.
 
-    For a fixed base, use a rigid solid or fix velocity_nodes with all components, on all corners of
-    its cells. With splines it should be three cells thick: a thinner base appears higher by up to a
-    quarter of a cell.
+    For a fixed base, use a rigid solid, or a solid with fix velocity_nodes for all components at
+    all corners of its cells. With splines the base should be three cells thick: the surface of a
+    thinner one appears higher by up to a quarter of a cell.
 
-    Walls one cell thick contain liquids and granular materials, even with corners, inclined or
-    moving: in 1e5 steps points of water and sand penetrated walls at rest by at most 10 % of a
-    cell, gel by 15 %, and moving walls by 26 %. For 100 steps after contact at a node, points may
-    leave the wall there but not approach it.
+    Walls one cell thick contain liquids and granular materials, even if they have corners, are
+    inclined or move: in 1e5 steps, points of water and sand penetrated fixed walls by at most 10 %
+    of a cell, gel by 15 %, and moving walls by 26 %. For 100 steps after contact at a node, points
+    there can move away from the wall but not towards it.
 
-    Both solids at a node have one normal, so momentum is conserved. It comes from the sums of m
-    grad N of both, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4 along each axis;
-    the solid whose sums scatter less has more weight, so a face outweighs a corner. If the velocity
-    of a solid is prescribed, its normal alone is used, except at the end of its face. Solids
-    separated along a grid axis are not in contact.
+    The two solids at a node have a common normal, so momentum is conserved. It is computed from the
+    sums of m grad N of both solids, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4
+    along each axis. The solid whose sums vary less has more weight, so a face outweighs a corner.
+    If the velocity of a solid is prescribed, only the normal of this solid is used, except at the
+    end of its face. Solids that a gap along a grid axis separates are not in contact.
 
-    At a node of more than two solids, the impulses of all approaching pairs follow from the same
-    velocities, reduced for solids in several pairs; the rest is removed in up to 16 passes. The
-    order of the solids has no effect. Contact does not move nodes held by fix velocity_nodes, whose
-    reaction includes the impulse.
+    At a node of more than two solids, the impulses of all approaching pairs are computed from the
+    same velocities, with reduced impulses for solids in several pairs; up to 16 such passes remove
+    the remaining approach. The order of the solids has no effect. Contact does not move nodes held
+    by fix velocity_nodes, whose reaction includes the impulse.
 
     Bardenhagen, Guilkey, Roessig, Brackbill, Witzel & Foster 2001, "An improved contact algorithm
     for the material point method and application to stress propagation in granular material".
@@ -129,9 +130,9 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """`nodes`, and nodes around points in cells with all corners in `nodes`.
+        """Return `nodes`, and all nodes of points in cells with all corners in `nodes`.
 
-        Otherwise the contact normal would rotate, as splines and domains reach further nodes.
+        Splines and domains reach more nodes; if these were free, the normal would rotate.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes
@@ -168,7 +169,7 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            # Memory pages cost nothing until written.
+            # Pages of memory cost nothing until they are written.
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, unknown), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
@@ -216,11 +217,11 @@ class ULMPMContacts(Method):
                     prescribed[nodes, k] = 1 + slot
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Views of `touched`, which usf and usavg read at the start of a step."""
+        """Return views of `touched`, which usf and usavg read at the start of a step."""
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Continue from the contact `before`; new fields come after the old ones."""
+        """Continue from the contact `before`; fields of new solids come last."""
         if contact.stride == before.stride:
             fields = before.touched.shape[1]
             touched = np.flatnonzero(before.touched.any(axis=1))

@@ -19,10 +19,10 @@ from karamelo_py.styles.fixes.forces import PointForces
 
 
 class ToolFix(PointForces):
-    """Base of fixes that push points, taken as small cubes (in 2D squares)."""
+    """Base of fixes that push points, which are small cubes (in 2D squares)."""
 
     follows_points = presses = True
-    needs_stiffness = False  # the force scales with the point's shear modulus
+    needs_stiffness = False  # the force is proportional to the shear modulus of the point
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -57,12 +57,12 @@ class ToolFix(PointForces):
         return (points.column("volume") / domain.depth(points.position)) ** (1 / domain.dimension)
 
     def face(self, points: PointsView) -> np.ndarray:
-        """Areas (n,), per radian in axisymmetry."""
+        """Return areas (n,) of a face of each point, per radian in axisymmetry."""
         domain = self.hub.domain
         return self.side(points) ** (domain.dimension - 1) * domain.depth(points.position)
 
     def stiffness(self, points: PointsView) -> np.ndarray:
-        """Shear moduli (n,), reduced by damage."""
+        """Return shear moduli (n,), reduced by damage."""
         moduli = np.array([_shear_modulus(solid) for solid in self.hub.solids.values()])
         return moduli[points.column("type").astype(int) - 1] * (1 - points.column("damage"))
 
@@ -89,12 +89,12 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """Base of planes that may move, with points on the side of the normal."""
+    """Base of planes, which may move; points are on the side of the normal."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)
         self.towards = self.of_time("n", normal)
-        if not self.hub.rehearsing:  # a rehearsal lacks some values
+        if not self.hub.rehearsing:  # some values are unknown in a rehearsal
             unit(self.now(*self.towards))
 
     def is_endless(self, axis: int) -> bool:
@@ -102,7 +102,7 @@ class PlaneTool(ToolFix):
         return normal.is_constant and normal.constant == 0
 
     def depth(self, points: PointsView | PointTable) -> tuple[np.ndarray, np.ndarray]:
-        """Depth (n,) of points, and the normal (d,)."""
+        """Return the depth (n,) of points past the plane, and the normal (d,)."""
         normal = unit(self.now(*self.towards))
         return -(self.from_origin(points, self.origin) @ normal), normal
 
@@ -130,7 +130,7 @@ class BallTool(ToolFix):
     R
         Radius, as a function of time.
     x, y, z
-        Centre, as a function of time; z is 0 in 2D.
+        Position of the centre, as functions of time; z is 0 in 2D.
     """
 
     published = ("x", "y", "z", "s")

@@ -15,16 +15,16 @@ from karamelo_py.styles.fixes.tools.stiff import CLOSE, StiffTool
 
 
 class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
-    """Contact of a solid with a plane, as stiff as the step allows, with friction.
+    """Apply contact of a solid with a plane, as stiff as the step allows, with friction.
 
     Parameters
     ----------
     solid
         ID of the solid.
     x, y, z
-        A point of the plane, as a function of time; z is 0 in 2D.
+        A position on the plane, as functions of time; z is 0 in 2D.
     nx, ny, nz
-        Its normal, of any length, towards the solid.
+        Normal of the plane, of any length, towards the solid.
     mu
         Coefficient of friction (Coulomb).
 
@@ -35,11 +35,12 @@ class ContactMinimizePenetrationPlane(StiffTool, PlaneTool):
     Notes
     -----
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
-    volume. A point with the penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2, which
-    moves a free point out within one step. Friction and dt are as in contact/minimize_penetration
-    (de Vaucorbeil & Nguyen 2021). A moving plane does not drag. The force acts at the centres of
-    points: the lowest row of a body at rest has 33 % too little stress, and disks that hit at 25 %
-    of their wave speed gain 2 to 4 % of energy. contact/surface has neither error.
+    volume. A point at x with the penetration p = rp - n.(x - xq) > 0 gets the force m p / dt^2,
+    which moves a free point out within one step; n is the unit normal, xq the position on the
+    plane. Friction and dt are as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021). The
+    motion of the plane causes no friction. The force acts at the centres of points: the stress in
+    the lowest row of a body at rest is 33 % too small, and disks that hit at 25 % of their wave
+    speed gain 2 to 4 % of energy. contact/surface has neither error.
 
     Publishes the force on the solid as ID_x, ID_y, ID_z.
 

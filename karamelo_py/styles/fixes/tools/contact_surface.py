@@ -38,18 +38,17 @@ OF_FACES, OF_SHAPE = 1.5e-6, 5e-8
 
 
 class ContactSurface(StiffTool):
-    """Contact of points with a region that is a fixed or moving wall or tool, with friction.
+    """Apply contact of points with a region, as a fixed or moving wall or tool, with friction.
 
     Parameters
     ----------
     region
-        It needs an inside: a mesh of solid elements (in 2D of area elements), a closed STL surface,
-        or a plane. With the word ``exterior`` it is a mould.
+        ID of the region. It must have an inside: a mesh of solid elements (in 2D of area elements),
+        a closed STL surface, or a plane. With the word ``exterior`` the region is a mould.
     mu
         Coefficient of friction (Coulomb).
     way
-        ux, uy, uz, one per dimension: displacement of the region as a function of time. A region
-        does not rotate.
+        ux, uy, uz, one per dimension: displacement of the region as a function of time.
 
     Example
     -------
@@ -60,31 +59,31 @@ class ContactSurface(StiffTool):
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z.
 
-    Points are spheres (in 2D disks) with a radius of half the side of a cube of their volume,
-    stretched along the normal while they touch, and cut at the surface if they overlap it from the
-    start. The force acts at their surface. At the depth p it is k p + 0.02 m p'/dt out of the
-    region, and never a pull. k is 0.5 m/dt^2 at the first touch, with dt as in
-    contact/minimize_penetration. Friction, at most mu times this force, stops and reverses the slip
-    on the moving region with the same stiffness: a point at rest is displaced by at most mu p.
+    Points are spheres (in 2D disks) with a radius of half the side of a cube of their volume. The
+    radius follows the stretch along the normal, and is smaller if a point overlaps the region at
+    the start. The force acts at the surface of the sphere. At the depth p it is k p + 0.02 m p'/dt,
+    directed out of the region and never a pull, where k = 0.5 m/dt^2 at the first contact and dt is
+    as in contact/minimize_penetration. Friction, at most mu times this force, stops and reverses
+    the slip on the region with the same stiffness: it displaces a point at rest by at most mu p.
 
     The spring conserves energy. Damping and friction dissipate it (``lost by contact`` in the
-    summary of the run), which the balance counts as work of the fix. A disk that hits at 5 to 25 %
-    of its wave speed loses 0.6, 0.3 and 0.1 % with 4, 8 and 16 cells in the radius. A rod of 8 x 2
-    cells returns with 0.94 of its speed, 0.98 at dt_factor(0.9).
+    summary of the run), which the balance counts as work of the fix. A disk that hits a wall at 5
+    to 25 % of its wave speed loses 0.6, 0.3 and 0.1 % of its energy with 4, 8 and 16 cells in the
+    radius. A rod of 8 x 2 cells rebounds with 94 % of its speed, 98 % with dt_factor(0.9).
 
-    Under its weight, a block has the right stress in its lowest row within 6 % with a linear basis,
-    and 22 % too little (29 % too much in the next row) with quadratic-spline.
+    In the lowest row of a block under its weight, the stress is correct within 6 % with a linear
+    basis, and 22 % too small with quadratic-spline (29 % too large in the next row).
 
     The force acts in the direction in which the depth decreases fastest. A point deeper than a
-    cell, or in the middle of a thin region, ends the run; past the middle it is pushed out on the
-    other side. A wall of one cell stops bodies up to 1/3 of their wave speed.
+    cell, or in the middle of a thin region, ends the run; a point past the middle would be pushed
+    out on the other side. A wall one cell thick stops bodies with up to 1/3 of their wave speed.
 
-    A block whose weight acts at once bounces on a slope; friction takes mu times the change of its
-    velocity across the slope, within 0.1 % at 20 to 45 degrees with mu = 0.2. Near the angle of
-    friction (20 degrees, mu = 0.34 to 0.4) its speed is off by up to 0.12 m/s in the first bounces,
-    by 0.04 m/s after a second. Energy is balanced within 0.3 %. The block sinks in by twice the
-    force on a point divided by m / dt^2, here 1 % of a cell. A belt over half a bollard with mu =
-    0.3 is drawn slowly with 2.50 times its load (exact 2.57 for a thin belt, 2.45 for this one).
+    A block on a slope bounces if its weight is applied suddenly. The frictional impulse is mu times
+    the normal impulse within 0.1 % on slopes of 20 to 45 degrees with mu = 0.2. Near the angle of
+    friction (20 degrees, mu = 0.34 to 0.4), the error of the speed is up to 0.12 m/s in the first
+    bounces and 0.04 m/s after a second. Energy is balanced within 0.3 %. The block sinks in by
+    twice the force on a point divided by m / dt^2, here 1 % of a cell. A belt drawn slowly over
+    half a bollard with mu = 0.3 needs 2.50 times its load (exact: 2.57 if thin, 2.45 for this one).
 
     See Also
     --------
@@ -119,7 +118,7 @@ class ContactSurface(StiffTool):
             self.initial_integrate = touch_hook(self._touch)
 
     def moved(self, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Displacement (d,) so far, and mean velocity (d,) in the next step."""
+        """Return the displacement (d,) so far, and the mean velocity (d,) in the next step."""
         values, times = self.hub.values, {"time": self.hub.update.time + np.array([0.0, dt])}
         ways = np.zeros((self.hub.domain.dimension, 2))
         for k, formula in enumerate(self.way):
@@ -165,7 +164,7 @@ class ContactSurface(StiffTool):
         )
 
     def forces(self, points: PointsView) -> np.ndarray:
-        """Forces for a region without a kernel."""
+        """Return the forces of a region without a kernel."""
         way, velocity = self.moved(points.dt)
         x, d = points.position.astype(float) - way, len(velocity)
         within, aside = self.depth(x), ASIDE * self.hub.domain.h

@@ -22,11 +22,11 @@ class CuttingTool(ToolFix):
     K
         Stiffness relative to the shear modulus of the point, as a function of time.
     x_tip, y_tip, z_tip
-        The tip, as a function of time; z is 0.
+        Position of the tip, as functions of time; z is 0.
     vx, vy, vz
         Unused; for compatibility with Karamelo.
     xA, yA, xB, yB
-        A point on each of the two faces that meet at the tip, as a function of time.
+        A position A and B on each of the two faces that meet at the tip, as functions of time.
 
     Example
     -------
@@ -61,7 +61,7 @@ class CuttingTool(ToolFix):
             self._faces()
 
     def _faces(self) -> tuple[np.ndarray, np.ndarray]:
-        """Outward normals (2, 2) of the faces, and the tip."""
+        """Return the outward normals (2, 2) of the faces, and the tip."""
         tip = self.now(*self.tip)
         a, b = (self.now(*end) - tip for end in self.ends)
         turn = a[0] * b[1] - a[1] * b[0]

@@ -13,16 +13,16 @@ from karamelo_py.styles.fixes.tools.base import PlaneTool
 
 
 class ImpenetrableSurface(PlaneTool):
-    """Push points behind a plane back, with a force that grows with the depth.
+    """Push points behind a plane back, with a force proportional to the depth.
 
     Parameters
     ----------
     K
         Stiffness relative to the shear modulus of the point, as a function of time.
     xs, ys, zs
-        A point of the plane, as a function of time; z is 0 in 2D.
+        A position on the plane, as functions of time; z is 0 in 2D.
     nx, ny, nz
-        Its normal, of any length, towards the side where points may be.
+        Normal of the plane, of any length, towards the side where points may be.
 
     Example
     -------
@@ -30,9 +30,9 @@ class ImpenetrableSurface(PlaneTool):
 
     Notes
     -----
-    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the normal,
-    with the shear modulus G, damage D, present volume V and number of dimensions d. Publishes the
-    force on the points as ID_x, ID_y, ID_z.
+    A point at the depth p = n.(xs - x) > 0 gets the force K G (1 - D) p V^(1/d) along the unit
+    normal n, where G is its shear modulus, D its damage, V its present volume and d the number of
+    dimensions. Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------

@@ -15,7 +15,7 @@ from karamelo_py.styles.fixes.tools.base import BallTool
 
 
 class Radius(Expression):
-    """Script argument: a radius, in 2020 after the centre."""
+    """Script argument: the radius; scripts of 2020 have it after the centre."""
 
     script_kind = "a number or a formula above 0"
 
@@ -37,7 +37,7 @@ class Indent(BallTool):
     Parameters
     ----------
     K
-        Acceleration per depth squared, as a function of time.
+        Acceleration of a point per squared depth, as a function of time.
 
     Example
     -------
@@ -45,9 +45,9 @@ class Indent(BallTool):
 
     Notes
     -----
-    A point at the distance r < R from the centre gets the force m K (R - r)^2 away from it (in
-    LAMMPS' ``fix indent`` not per mass). Publishes the force on the points as ID_x, ID_y, ID_z and
-    the number of pushed points as ID_s.
+    A point at a distance r < R from the centre is pushed away from it with the force m K (R - r)^2
+    (K (R - r)^2 in LAMMPS). Publishes the force on the points as ID_x, ID_y, ID_z and the number of
+    pushed points as ID_s.
 
     See Also
     --------

@@ -31,11 +31,11 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     -----
     Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
     volume. A point at the distance r from the centre, with the overlap p = R + rp - r > 0, gets the
-    force m p / dt^2, which moves a free point out within one step. Friction and dt are as in
-    contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
+    force m p / dt^2, which moves a free point out of the ball within one step. Friction and dt are
+    as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
 
-    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s, one face of
-    its cube for each touching point.
+    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s: the sum over
+    touching points of one face of the cube of each.
 
     See Also
     --------

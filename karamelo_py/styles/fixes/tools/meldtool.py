@@ -20,16 +20,15 @@ class MeldTool(ToolFix):
     Parameters
     ----------
     K
-        Stiffness relative to the shear modulus of the point, a length. All numbers may be formulas
-        of time.
+        Force over depth and shear modulus of the point, a length. Numbers may be formulas of time.
     axis
         Direction of the axis.
     half_width
         Half the width of the square channel along the axis.
     c1, c2
-        Position of the axis in the other two directions, in the order x, y, z.
+        Position of the axis in the two directions normal to it, in the order x, y, z.
     theta
-        Rotation angle of the tool, from the first of these directions to the second.
+        Rotation angle of the tool in radians, from the first of these directions to the second.
     lo, hi
         Ends of the tool along the axis; points are pushed out at the lower end.
     Rmax
@@ -41,9 +40,10 @@ class MeldTool(ToolFix):
 
     Notes
     -----
-    The tool is a cylinder without its channel. A point inside gets the force K G (1 - D) times the
-    shortest way out (into the channel, out of the cylinder, or below its end), with the shear
-    modulus G and the damage D. Publishes the force on the points as ID_x, ID_y, ID_z.
+    The tool is a cylinder with a square channel along its axis. A point inside the tool gets the
+    force K G (1 - D) times the shortest way out (into the channel, out of the cylinder, or below
+    the lower end), with the shear modulus G and the damage D. Publishes the force on the points as
+    ID_x, ID_y, ID_z.
 
     See Also
     --------
@@ -62,12 +62,12 @@ class MeldTool(ToolFix):
         if hub.domain.dimension != 3:
             raise ScriptError("this tool is for 3D", expected="a domain in 3D")
         self.numbers = (K, half_width, c1, c2, theta, lo, hi, Rmax)
-        self.now(*self.numbers)  # refuses formulas of position
+        self.now(*self.numbers)  # raises an error for formulas of position
         self.along = "xyz".index(axis)
         self.across = [k for k in range(3) if k != self.along]
 
     def _seen(self, points: Any, *at: float) -> tuple[np.ndarray, ...]:
-        """Heights (n,) above the end, positions (n, 2) along fixed and rotating axes, rotation."""
+        """Return heights (n,) above the end, positions (n, 2) in fixed and tool axes, rotation."""
         c1, c2, theta, lo = at
         x = points.position.astype(float)
         q = x[:, self.across] - np.array([c1, c2])

@@ -17,7 +17,7 @@ class NeumannBcMech(ToolFix):
     Parameters
     ----------
     group
-        A single layer along the surface.
+        A single layer of points along the surface.
     traction
         tx, ty, tz, one per dimension: functions of x, y, z, x0, y0, z0, time and published values.
         NULL leaves a component unchanged.
@@ -28,9 +28,10 @@ class NeumannBcMech(ToolFix):
 
     Notes
     -----
-    A point has one outer face, the side of a cube of its present volume: V^(2/3) in 3D, V^(1/2) in
-    2D, the whole section in 1D; in axisymmetry at the radius of the point. Points lie half a side
-    inside the surface. Publishes the total force as ID_x, ID_y, ID_z.
+    The force on a point is the traction times the area of one outer face, a side of a cube of the
+    present volume V: V^(2/3) in 3D, V^(1/2) in 2D, the whole section in 1D; in axisymmetry at the
+    radius of the point. It acts at the point, half a side inside the surface. Publishes the total
+    force as ID_x, ID_y, ID_z.
 
     See Also
     --------

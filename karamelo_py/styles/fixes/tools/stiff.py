@@ -11,7 +11,7 @@ from karamelo_py.scene.views import PointsView
 from karamelo_py.styles.fixes.grip import GripOfTool, Gripping
 from karamelo_py.styles.fixes.tools.base import ToolFix
 
-CLOSE = 0.5  # distance from the surface, in radii, within which bouncing points retain their grip
+CLOSE = 0.5  # distance in radii within which a bouncing point retains its friction spring
 
 
 class StiffTool(Gripping, ToolFix):
@@ -31,10 +31,10 @@ class StiffTool(Gripping, ToolFix):
         seen: np.ndarray,
         led: Any = 0.0,
     ) -> np.ndarray:
-        """Forces m push / dt^2 (n, d) that move points by `push` (n,) along `normal` in a step.
+        """Return forces m push / dt^2 (n, d), which move points by `push` (n,) along `normal`.
 
         Friction, at most mu times this force (de Vaucorbeil & Nguyen 2021), stops and reverses the
-        slip of positions `seen` (n, d) on a tool of this `velocity`, displaced by `led`.
+        slip of positions `seen` (n, d) on a tool with this `velocity` and the displacement `led`.
         """
         stiffness = points.mass.astype(float) / (points.contact_dt * points.contact_kick)
         load = stiffness * np.maximum(push, 0)
@@ -47,7 +47,7 @@ class StiffTool(Gripping, ToolFix):
             touched = before[:, d, None] > 0
             way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
             pull = one * way
-            # Velocities of points contain noise that does not move them.
+            # Take velocities from displacements: velocities of points contain null-space noise.
             slip = way / (2 * points.kick - points.dt)
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
             stop = points.contact_dt * one * slip
