@@ -33,15 +33,15 @@ class BasicFacts:
         self.d, self.corners = hub.domain.dimension, 2**hub.domain.dimension
         self.moves = self.method.frame.moves  # updated frame: points move through the grid
         affine = stores_moment(self.transfer)
-        self.moments = self.moves and affine  # points store moments or gradients of velocity
+        self.moments = self.moves and affine  # of moving points, with velocity moments or gradients
         # D of affine transfers vanishes at some positions in a cell.
         self.vanishing = self.moves and not self.basis.traits.steady_moment
-        self.kept = 0.0 if affine else flip_coefficient(self.transfer)  # 0 if affine
+        self.kept = 0.0 if affine else flip_coefficient(self.transfer)  # FLIP coefficient
         traits = self.basis.traits
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
-        self.hats = self.linear or bool(traits.shape)  # linear on nodes or on domains of points
+        self.hats = self.linear or bool(traits.shape)  # linear, or has domains
         solids = hub.solids.values()
-        # laws that store all work and sustain tension
+        # Solids whose laws store all work and sustain tension.
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
         # Solids with about one point per cell and direction.
         self.single = [s.id for s in solids if stable_step.one_a_cell(s)]
@@ -62,7 +62,7 @@ class BasicFacts:
 
     @cached_property
     def weights(self) -> list[np.ndarray]:
-        """Mean accelerations (d,) of the solids by each fix."""
+        """Mean accelerations (d,) of the solids due to each fix."""
         weights = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:

@@ -1,4 +1,4 @@
-"""Moving bodies: energy gain, lag of rotation, fixes that hold them."""
+"""Moving bodies: energy gain, lag of rotation, and fixes that hold bodies."""
 
 from collections.abc import Iterator
 from math import inf
@@ -16,24 +16,24 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.expressions import POINT_SEEDS
 
-SLOW = 0.01  # fraction of the wave speed: a slower drift never gained energy
-TORN = 9.0, 14.0  # tolerable rotation (radians) with one point per cell: FLIP, affine transfers
-# Mean squared distance of a point from its nodes over h^2, by weight, per direction: linear basis
-# with two points per cell; second-order bases.
+SLOW = 0.01  # fraction of the wave speed; no slower drift was seen to gain energy
+TORN = 9.0, 14.0  # tolerable rotation with one point per cell, radians: FLIP, affine transfers
+# Mean squared distance of a point from its nodes, weighted by N, per direction and over h^2: for
+# the linear basis with two points per cell, and for second-order bases.
 SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 
 class Noise(NamedTuple):
-    share: float  # of the tolerable amount
-    speed: float  # of the body or its rim, over the wave speed
-    cells: float  # path of the body, or of its rim
+    share: float  # noise over the tolerable amount
+    speed: float  # speed of the body or its rim, over the wave speed
+    cells: float  # path of the body or its rim, in cells
     angle: float = 0.0
     noisy: bool = True
-    torn: bool = False  # the rim separates
+    torn: bool = False  # whether the rim separates
 
 
 class Lag(NamedTuple):
-    fraction: float = 0.0  # of the angular velocity
+    fraction: float = 0.0  # lost fraction of the angular velocity
     turns: float = 0.0
 
     @property
@@ -42,7 +42,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """True for bodies that vibrate, unlike fluids."""
+    """Return whether bodies of a law vibrate, unlike fluids."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -113,9 +113,9 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 
 
 def lag_of(facts: BasicFacts) -> Lag:
-    """Lag of a free rotation in the total frame.
+    """Return the lag of a free rotation in the total frame.
 
-    The grid lacks sum m tr D of the moment of inertia sum m r^2.
+    Nodes have the moment of inertia sum m r^2 of the points without sum m tr D.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:
@@ -134,7 +134,7 @@ def lag_of(facts: BasicFacts) -> Lag:
 
 
 def sides(body: Body) -> np.ndarray:
-    """Lengths (d,) of a body; outer points lie half a point inside."""
+    """Return the lengths (d,) of a body, half a point beyond the outer points."""
     return body.motion.high - body.motion.low + 2 * body.solid.half_size.max(axis=0)
 
 
@@ -163,7 +163,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """True if fixes hold all sides of a box except one in normal direction."""
+    """Return whether fixes hold all sides of a box but one in the normal direction."""
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
     if facts.hub.domain.kin.hoops or np.sum(body.solid.volume0) < (1 - 1e-6) * box:

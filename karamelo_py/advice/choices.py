@@ -1,7 +1,7 @@
-"""Rules of ``method(auto)``: the first row whose `when` is true counts.
+"""Rules of ``method(auto)``: the first row whose `when` is true is chosen.
 
 `when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`), whose attributes
-fill braces in `lines`. `evidence` names the scenes that the row follows from.
+fill braces in `lines`. `evidence` names the scenes on which the row is based.
 """
 
 from collections.abc import Callable

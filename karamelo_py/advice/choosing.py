@@ -1,6 +1,6 @@
-"""``method(auto)``: choose a method by facts of a rehearsal.
+"""``method(auto)``: choose a method by facts from a rehearsal of the script.
 
-The first supported row of :data:`karamelo_py.advice.choices.CHOICES` counts.
+The first supported row of :data:`karamelo_py.advice.choices.CHOICES` is chosen.
 """
 
 import copy
@@ -28,7 +28,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
-# To look at a scene with: the first that the program does not refuse.
+# Methods to rehearse a scene with: the first one that is supported is used.
 NEUTRAL = (
     "method(ulmpm, FLIP, linear, 1)",
     "method(ulmpm/contacts, FLIP, linear, 1)",
@@ -37,8 +37,8 @@ NEUTRAL = (
     "method(ulmpm/contacts, FLIP, linear, 1, thermo-mechanical)",
 )
 
-CROSSED = 0.1  # cells that stressed material moves through
-FAST = 0.005  # fraction of the wave speed above which impacts give shocks
+CROSSED = 0.1  # cells through which stressed material may move
+FAST = 0.005  # fraction of the wave speed above which impacts cause shocks
 
 
 class AtFirstRun(Exception):
@@ -90,7 +90,7 @@ class Scouted(SceneFacts):
 
     @property
     def dilates(self) -> bool:
-        """True for soil without friction or with dilation."""
+        """Return whether there is soil without friction or with dilation."""
         return all(
             parameter(part, "dilation", 0.0) > 0 or not parameter(part, "friction", 0.0) > 0
             for part in self.strengths
@@ -110,21 +110,21 @@ class Scouted(SceneFacts):
 
     @property
     def wall_ahead(self) -> bool:
-        """True if fixes hold nodes that no body touches yet."""
+        """Return whether fixes hold nodes that no body touches yet."""
         near = {fix for body in self.bodies for fix, x in fixes_at(self, body) if len(x)}
         fixes = self.hub.fixes.values()
         return any(f.prescribes_velocity and len(f.nodes) and f not in near for f in fixes)
 
     @cached_property
     def apart(self) -> bool:
-        """True if a body starts apart from one that it will meet."""
+        """Return whether a body starts at a distance from one that it will meet."""
         boxes = boxes_of([body.motion for body in self.bodies])
         soft = [body for body in self.bodies if not body.solid.rigid]
         times = (meetings(body.motion, boxes, body.solid.h) for body in soft)
         return any((time < self.duration).any() for time in times)
 
     rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
-    # Plane stress, or a line: plastic flow does not prescribe the volume of cells.
+    # In plane stress and 1D, plastic flow does not constrain the volume of cells.
     narrow = property(lambda s: s.hub.domain.thin or (s.d == 1 and not s.hub.domain.kin.hoops))
     burns = property(lambda s: any(eos_traits(law).burns for law in s.laws))
 
@@ -151,7 +151,7 @@ class Scouted(SceneFacts):
 
 
 def is_round(solid: Solid) -> bool:
-    """True if no point is further out than 1.1 radii of a ball of equal volume."""
+    """Return whether all points are within 1.1 radii of a ball of equal volume."""
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)
@@ -168,7 +168,7 @@ def eos_traits(law: tuple) -> LawTraits:
 
 
 def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
-    """Execute the rest of the script on a copy; None without a run."""
+    """Execute the rest of the script on a copy; return None if it has no run."""
     other, settings = hub.rehearsal(), copy.copy(hub.settings)
     other.scouting, other.settings = True, settings
     settings.comm, settings.ranks = SerialComm(), 1
@@ -187,7 +187,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
 def choose(hub: Hub) -> Chosen:
     """Choose a row for this scene; raises ScriptError for later mistakes."""
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
-        return Chosen(RESUMED, lines)  # a longer run may suit another row
+        return Chosen(RESUMED, lines)  # a longer run may have another row
     if hub.rehearsing:
         return Chosen(PLAIN, PLAIN.lines)
     facts = _facts(hub)
@@ -203,7 +203,7 @@ def choose(hub: Hub) -> Chosen:
 def _written(choice: Choice, facts: Scouted) -> tuple[str, ...]:
     first, *others = (line.format(grid=facts.grid) for line in choice.lines)
     heat = ", thermo-mechanical" * facts.hot
-    if facts.hub.update.scheme_mark is not None:  # the script has a scheme
+    if facts.hub.update.scheme_mark is not None:  # the script chooses a scheme
         others = [line for line in others if not line.startswith("scheme(")]
     return f"{first[:-1]}{heat})", *others
 

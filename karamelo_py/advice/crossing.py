@@ -1,7 +1,7 @@
-"""Stress that a linear basis loses when stressed material moves through the grid.
+"""Stress that is lost with a linear basis when stressed material moves through the grid.
 
-Strain rates change at points that cross cell faces: in the updated frame pressure falls by 10 to 35
-% per cell, at any speed and strain. GIMP and splines lose 0 to 0.3 %.
+The strain rate of a point jumps where it crosses a cell face. In the updated frame, pressure falls
+by 10 to 35 % per cell, at any speed and strain; with GIMP and splines by 0 to 0.3 %.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,9 +19,9 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.run.listening import when
 
-STRESSED = 0.1  # fraction of the initial energy, below which there is no initial stress
-OF_ENERGY = 0.1  # fraction of the energy without drift: a smaller loss gives no warning
-LOADED = 0.5  # fraction of the energy: if loads supply more, they maintain the stress
+STRESSED = 0.1  # stored fraction of the initial energy below which a body counts as unstressed
+OF_ENERGY = 0.1  # lost fraction of the energy without drift below which there is no warning
+LOADED = 0.5  # fraction of the energy: loads that supply more maintain the stress
 
 
 class Crossing(NamedTuple):
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """True if stress is lost; gases and liquids have separate rules."""
+    """Return whether stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -66,10 +66,10 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Speed and duration of the longest path of each solid that meets others.
+    """Yield speed and duration of the longest path of each solid that meets others.
 
-    With impedances z = rho c, stressed material moves at (z1 v1 + z2 v2)/(z1 + z2) until waves have
-    returned through the thinner solid.
+    Stressed material moves at (z1 v1 + z2 v2)/(z1 + z2), with the impedances z = rho c, until waves
+    have returned through the thinner solid.
     """
     bodies = [b for b in facts.bodies if not b.solid.rigid]
     if not bodies:
@@ -103,7 +103,7 @@ def boxes_of(motions: Sequence[BodyMotion]) -> BodyBoxes:
 
 
 def meetings(motion: BodyMotion, boxes: BodyBoxes, h: float) -> np.ndarray:
-    """Time until a body is within a cell of each box ahead, (n, d), or inf."""
+    """Return the times (n, d) until a body is within a cell of each box ahead, or inf."""
     faster, gap = motion.velocity - boxes.velocity, boxes.low - motion.high - h
     ahead = (faster > 0) & (boxes.centre > motion.centre)
     times = np.full(ahead.shape, np.inf)

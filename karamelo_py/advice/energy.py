@@ -13,8 +13,8 @@ from karamelo_py.run.listening import Trouble, when
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 
-LOSS = 0.05  # lost fraction that gives a warning at the end; WITHIN: before
-LEAST = 5e-4  # fraction of the largest energy: smaller losses by contact are not shown
+LOSS = 0.05  # lost fraction for a warning at the end of a run; WITHIN: before the end
+LEAST = 5e-4  # fraction of the largest energy below which losses by contact are not shown
 WHOLE = "more points per cell, a finer grid, cpgimp or ulcpdi, or method tlmpm"
 
 
@@ -40,7 +40,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = stable_step.own_step_of_waves(hub, still=False)
-    # Of undeformed bodies, which may soften later.
+    # Wave speed of undeformed bodies; they may soften later.
     fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.step[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
@@ -65,7 +65,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             f"{fraction:.2g} x the stability limit",
             f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours lose contact
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours are apart
         return "points more than a cell apart (numerical fracture)", WHOLE
     causes = SceneFacts(hub, simulation, simulation.time).advice("gain")
     largest = max(causes, key=lambda advice: advice.share, default=None)
@@ -115,7 +115,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Nodal velocities lack motion within cells.
+    # Motion within cells is lost, as nodal velocities do not contain it.
     if flip_coefficient(transfer) < 1:
         coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{coefficient}")
@@ -191,6 +191,6 @@ def words_of_change(hub: Hub, fraction: float) -> str:
         by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
         by += ", the transfer more with shorter steps" * often
     # The sum of losses may exceed the largest energy.
-    fraction = round(fraction, 2) + 0.0  # no -0.00
+    fraction = round(fraction, 2) + 0.0  # prints no -0.00
     much = f"{fraction:+.2f} % of" if fraction > -100 else f"{fraction / 100:+.2f} times"
     return f"{much} {words}{by}"

@@ -17,15 +17,15 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import moved
 from karamelo_py.scene.solid import named, solid_with
 
-DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings
-ABSURD = 10.0  # cells in one step: a smaller step would not help
-LOOSE = 1.5  # largest spacing of an unstrained solid's points, in cells
-LEFT = 0.02  # stress across a thin body, over the largest stress
+DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings about units
+ABSURD = 10.0  # path in one step, in cells, above which a smaller step would not help
+LOOSE = 1.5  # largest point spacing of an unstrained solid, in cells
+LEFT = 0.02  # tolerated stress across a thin body, over the largest stress
 APART = "no other point of it within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:
-    """Explain a failed step; `smaller` is the step to suggest."""
+    """Explain a failed step; `smaller` is the time step to suggest."""
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
     if status == SHRUNK:
@@ -129,7 +129,7 @@ def _first_wrong(simulation: Simulation) -> tuple | None:
     wrong = []
     for block in simulation.setup.blocks:
         tiling = block.tiling
-        # The last sweep reports at most one point per tile.
+        # The last sweep over points reports at most one point per tile.
         at = tiling.report[: max(int(tiling.count[0]), 1), 2]
         wrong += [(int(block.points.id[p]), block.points, p) for p in (at[at > 0] - 1).astype(int)]
     if not wrong:
@@ -246,7 +246,7 @@ def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
 
 
 def warn_of_stress_left(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of stress across that is no longer small, with solid, law, step and state."""
+    """Warn once of a stress across a thin body that is not small, with law, step and state."""
     left = hub.fields.particle("stress_left")
     if left.max(initial=0) <= LEFT or not hub.update.first_time("stress across"):
         return

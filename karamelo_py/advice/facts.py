@@ -20,7 +20,7 @@ from karamelo_py.points.laws import law_parts
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
-PIC = 0.21  # numerical viscosity of the PIC part over (1 - alpha) h^2/dt
+PIC = 0.21  # numerical viscosity of PIC, over (1 - alpha) h^2/dt
 TURN = 0.3  # radians beyond which a scene counts as rotating
 SEQ = methodcaller("particle", "seq")
 
@@ -32,7 +32,7 @@ class Vibration(NamedTuple):
 
 class SceneFacts(BasicFacts):
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Each part once, with its material."""
+        """Yield each part of laws, bases and so on once, with its material."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [
@@ -61,15 +61,15 @@ class SceneFacts(BasicFacts):
     driven = cached_property(settling.driven)
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
-    # Step over the stable step, and over the limit for neighbours of different density.
+    # The step over the stable step; and over the limit for neighbours of different density.
     fraction = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
     fraction_of_uneven = property(lambda self: self.fraction * self.uneven.of_step)
-    fastest = cached_property(lambda self: self.simulation.fastest())  # velocity component
+    fastest = cached_property(lambda self: self.simulation.fastest())  # largest velocity component
     turns = property(lambda self: self.turn > TURN)
-    # Largest velocity over wave speed; strain by impacts and weight.
+    # Largest velocity over the wave speed; strain due to impacts and weight.
     speed = property(lambda self: self.fastest / self.waves if self.waves > 0 else 0.0)
     strain = property(lambda self: max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag))
-    # All bodies deform evenly: no cell is constrained alone.
+    # All bodies deform evenly, so that no single cell is constrained.
     even = cached_property(lambda self: all(pressed_evenly(self, body) for body in self.bodies))
     shear_stress = cached_property(lambda self: self.simulation.points.largest(SEQ)[0])
 
@@ -85,7 +85,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def locks(self) -> bool:
-        """True if isochoric flow locks linear cells that contain several points."""
+        """True if isochoric flow locks cells of a linear basis that contain several points."""
         free = self.sparse or self.hub.update.anti_locking or self.hub.domain.thin
         return self.hats and (self.d > 1 or self.hub.domain.kin.hoops > 0) and not free
 
@@ -140,17 +140,14 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def sag(self) -> float:
-        """Strain of bodies under their weight, g L/c^2."""
+        """Strain of bodies due to their weight, g L/c^2."""
         sizes = [motion.high - motion.low for motion in self.motions]
         strains = (np.abs(g) * np.max(sizes, axis=0) / self.waves**2 for g in self.weights)
         return max((float(strain.max()) for strain in strains), default=0.0)
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid.
-
-        Cantilever: 3 g L^2/(H c^2). Beam whose kinetic energy becomes strain energy: sqrt(3) v/c.
-        """
+        """Bending strain of the slenderest solid: 3 g L^2/(H c^2) or, by impact, sqrt(3) v/c."""
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
             for motion in self.motions:
@@ -163,14 +160,14 @@ class SceneFacts(BasicFacts):
 
     @property
     def falls(self) -> float:
-        """Duration over sqrt(L/g)."""
+        """Duration of the run over sqrt(L/g)."""
         sizes = [np.maximum(motion.high - motion.low, 1e-300) for motion in self.motions]
         rates = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(rate.max()) for rate in rates), default=0.0)
 
     @property
     def passes(self) -> float:
-        """Distance that points pass each other, over twice the longest side."""
+        """Relative displacement of points, over twice the longest side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

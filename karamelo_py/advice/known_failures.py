@@ -1,6 +1,6 @@
-"""Combinations known to fail, with reason and fix.
+"""Combinations that are known to fail, with reason and fix.
 
-Rules of several parts (`karamelo_py.language.rules`), each reported once.
+These rules (`karamelo_py.language.rules`) concern several parts. Each is reported once.
 """
 
 from collections.abc import Iterable, Iterator
@@ -28,13 +28,13 @@ from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS
 
-PEEK = 100  # steps; shorter runs only inspect a scene
+PEEK = 100  # steps; a shorter run is only an inspection of a scene
 ENDLESS = 1e8
-MIXED = 300  # step over the stable step, above which wrong units are likelier
-DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases excluded
-IMPOSSIBLE = 30.0  # times the wave speed (mm/s instead of m/s is a factor of 1000)
-SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # least density, moduli: m, kg, s and mm, t, s
-SPEEDS = 1.0, 5e4  # m/s, wave speeds from jelly to above diamond
+MIXED = 300  # step over the stable step above which wrong units are likelier
+DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases are not checked
+IMPOSSIBLE = 30.0  # speed over wave speed (mm/s instead of m/s is a factor of 1000)
+SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # density; moduli, in m, kg, s and mm, t, s
+SPEEDS = 1.0, 5e4  # wave speeds in m/s, from jelly to above diamond
 REST = "a scene at rest"
 UNITS = (
     "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
@@ -54,7 +54,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """True if nothing can move; plug-ins count as motion."""
+    """Return whether nothing can move; plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -79,7 +79,7 @@ def _is_zero(fix: Fix) -> bool:
 
 
 def warn_about_weightless_water(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of pore water that nothing drives."""
+    """Warn once of pore water without any load that could make it flow."""
     wet = [solid.material for solid in hub.solids.values() if solid.material.fluid]
     still = all(map(_is_water_at_rest, hub.fixes.values())) and simulation.fastest() == 0
     if wet and still and hub.update.first_time(REST):
@@ -125,9 +125,9 @@ def mixed_units(hub: Hub, simulation: Simulation) -> str:
 
 
 class Step(NamedTuple):
-    """The step of run number `run`, and what its limit depends on.
+    """The step of run number `run`, and quantities on which its limit depends.
 
-    `span` is the run's length in time and in steps.
+    `span` is the length of the run in time and in steps.
     """
 
     run: int
@@ -157,7 +157,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn once (or `again`) of a step above the limit, also in later runs."""
+    """Warn of a step above the limit, also of later runs; once, unless `again`."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -225,7 +225,7 @@ def _odd_in(units: Units | None, law: NamedTuple, speed: float) -> tuple[str, st
     odd, least = [], min(law_traits(kind).least_density for kind in law_kind(law))
     if not least <= density <= DENSITIES[1]:
         odd.append(f"density is {density:.3g} kg/m^3")
-    if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 is rigid
+    if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 for rigid solids
         odd.append(f"speed of waves is {speed:.3g} m/s")
     if not odd:
         return None
@@ -326,10 +326,10 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve a step.
+    """Warn if single precision cannot resolve the motion in a step.
 
-    At 50 000 cells from the origin a falling block errs by 3.5 % of its path, at 200 000 it does
-    not move. Raises ScriptError if positions have a spacing of 1/500 cell or more.
+    At 50 000 cells from the origin, the path of a falling block has an error of 3.5 %; at 200 000
+    cells it does not move. Raises ScriptError if positions are spaced by 1/500 cell or more.
     """
     if s.hub.settings.precision != "single":
         return

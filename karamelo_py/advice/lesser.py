@@ -42,7 +42,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
 NO_LAYERS = 0, (0.0, 0.0)
-SAMPLES = 1000  # positions that show whether a solid is a prism
+SAMPLES = 1000  # positions that are tested for whether a solid is a prism
 THIN = 0.2  # thickness over the smallest width of a plate in plane stress
 
 
@@ -63,11 +63,11 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
         return
     round_ = domain.kin.hoops > 0
     whole = "thickness" if d == 3 else "length" if round_ else "cross-section"
-    counts: dict[int, int] = {}  # layers by direction
+    counts: dict[int, int] = {}  # number of layers by direction
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
-        # A radial scene costs as much per point: two layers waste nothing.
+        # Points of a radial scene cost as much, so one or two layers are no waste.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
             several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):
@@ -109,7 +109,7 @@ def _bar(hub: Hub, held: dict[int, Roller]) -> Words:
     size = hi - lo
     for k in range(3):
         rest = [axis for axis in range(3) if axis != k]
-        # symmetry planes: the whole bar is twice as wide
+        # With a symmetry plane, the whole bar is twice as wide.
         widths = [size[axis] * (1 + (axis in held)) for axis in rest]
         if max(widths) > THIN * size[k] or not _moves_nothing(hub, rest):
             continue
@@ -163,20 +163,20 @@ def _thin(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 class Fewer(NamedTuple):
-    """A scene in fewer dimensions, as warnings of leaning directions see it."""
+    """Replaces a scene in fewer dimensions, for warnings of inclined material directions."""
 
     hub: Hub
     d: int
 
 
 def _leans(hub: Hub, rest: list[int]) -> bool:
-    """Return True if a law has directions that do not fit a scene of the axes `rest` alone."""
+    """Return whether a law has directions that do not fit a scene with only the axes `rest`."""
     d = len(rest)
     for solid in hub.solids.values():
         law = solid.material.whole
         place = place_of(law)
         lost = {axis + "0" for axis in AXES[d:]} & (names_in(place.formulas) if place else set())
-        # Directions would need other numbers if other axes became x and y.
+        # If other axes became x and y, directions would have other numbers.
         if can(law, is_round) and (lost or rest != [*range(d)] or leans(law, Fewer(hub, d))):
             return True
     return False
@@ -199,7 +199,7 @@ def _longer(hub: Hub, d: int) -> float:
 
 
 def _is_led(hub: Hub, across: list[int], held: dict[int, Roller]) -> bool:
-    """Return True if a fix that is no symmetry plane prescribes velocities across a thin body."""
+    """Return whether a fix, except a symmetry plane, prescribes velocities across a thin body."""
     planes = [roller.fix for roller in held.values()]
     led = [f for f in hub.fixes.values() if f.prescribes_velocity and f not in planes]
     formulas = [fix.formulas for fix in led]
@@ -207,7 +207,7 @@ def _is_led(hub: Hub, across: list[int], held: dict[int, Roller]) -> bool:
 
 
 def _moves_nothing(hub: Hub, across: list[int]) -> bool:
-    """Return True if no fix acts across, or by formulas of positions across."""
+    """Return whether no fix acts in the directions `across`, or depends on positions in them."""
     named = "".join(AXES[k] for k in across)
     for fix in acting(hub):
         formulas = given(fix)
@@ -220,7 +220,7 @@ def _moves_nothing(hub: Hub, across: list[int]) -> bool:
 
 
 def _is_prism(solid: Solid, k: int, rest: list[int]) -> bool:
-    """Return True if a solid has the same section everywhere along k."""
+    """Return whether a solid has the same section everywhere along k."""
     if solid.region is None:
         places = cells(solid.x0, solid.h)
         across, counts = np.unique(places[:, k], return_counts=True)
@@ -268,9 +268,9 @@ def _mirrored(hub: Hub) -> Words:
     if len(hub.lattices) > 1 or not acting(hub):
         return
     if not all(solid.region for solid in solids):
-        return  # they may have velocities
+        return  # such solids may have velocities
     if any(can(solid.material.whole, is_round) for solid in solids):
-        return  # directions may differ from their mirror image
+        return  # directions of a law may differ from their mirror image
     for k in range(free_from(domain.kin), domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2

@@ -15,12 +15,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.solid import Solid
 
-Words = Iterator[tuple[str, str]]  # reason, what to write instead
+Words = Iterator[tuple[str, str]]  # reason, and what to write instead
 AXES = "xyz"
 
 
 class Roller(NamedTuple):
-    """A symmetry plane at an end of all bodies, whose nodes a fix holds along the normal alone."""
+    """A symmetry plane at an end of all bodies, where a fix holds nodes only along the normal."""
 
     at: float
     side: int  # 1: bodies lie above the plane, -1: below it
@@ -40,7 +40,7 @@ def extent(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rollers(hub: Hub) -> dict[int, Roller]:
-    """Return the symmetry planes by direction; not planes at both ends."""
+    """Return symmetry planes by direction; not for directions with planes at both ends."""
     found: dict[int, Roller] = {}
     solids = [solid for solid in hub.solids.values() if solid.count]
     if not solids:
@@ -69,7 +69,7 @@ def acting(hub: Hub) -> list[Fix]:
 
 
 def given(fix: Fix) -> tuple:
-    """Return the formulas; NaN if there are none, because the effect of the fix is unknown."""
+    """Return the formulas of a fix; NaN if it has none, as its effect is then unknown."""
     return tuple(fix.formulas) or fix.components or (np.nan,) * 3
 
 
@@ -82,7 +82,7 @@ def depends(formula: Any, axes: str) -> bool:
 
 
 def alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if a group has all or no points (nodes) of equal `key`."""
+    """Return whether the group of a fix has all or none of the points (nodes) of equal `key`."""
     group, within = fix.group, fix.points_within()
     if group is None or (group.all and within is None):
         return group is not None
@@ -109,9 +109,9 @@ def acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
-    """Return words of the cost of a scene over its cost in `d` dimensions.
+    """Return words for the cost of a scene over its cost in `d` dimensions.
 
-    A point costs as much as it has nodes; a step may be `longer` there.
+    The cost of a point is proportional to its number of nodes; a step may be `longer` there.
     """
     basis, kin = hub.update.method.basis, hub.domain.kin
     nodes = support(basis, kin) / support(basis, KINEMATICS[d]())
@@ -119,7 +119,7 @@ def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
 
 
 def to_change(hub: Hub, restrictions: Restrictions) -> str:
-    """Return words of the choices of a scene that another model does not support."""
+    """Return words for the choices of a scene that another model does not support."""
     refused = [feature for feature in features(hub) if restrictions.exclude(feature)]
     return "".join(
         f"; not with {one.words} (instead: {restrictions.instead_of(one)})" for one in refused

@@ -37,7 +37,7 @@ class Narrator(Listener):
         if resumed:
             if run.ruined:
                 self.smaller = "a smaller time step"  # the state in the file may be bad
-            # Otherwise the script has not chosen the step.
+            # With halved or load steps, the step is not chosen by the script.
             if not (run.rollback.point.halvings or simulation.implicit):
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
             self._tell_of_end(run, simulation)
@@ -186,7 +186,7 @@ class Narrator(Listener):
 
 def _counted(simulation: Simulation) -> dict[str, int]:
     hub, deleted = simulation.hub, int((~simulation.present).sum())
-    if len(hub.waiting) or len(hub.inactive):  # some points come later, or come back
+    if len(hub.waiting) or len(hub.inactive):  # some points enter later, or may be activated
         return {"points present": simulation.count - deleted}
     if deleted or hub.update.boundary == "delete":
         return {"deleted points": deleted}

@@ -13,17 +13,17 @@ from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
 SLENDER = 4.0  # length over thickness above which a body bends
-# c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two vibrating blocks, usl, linear
-# basis, 1 to 3 points per cell: 3.2 and 5.9 fail within 3000 steps, 1.9 does not.
+# Limits of c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Of two vibrating blocks
+# (usl, linear basis, 1 to 3 points per cell), 3.2 and 5.9 fail within 3000 steps, 1.9 does not.
 BREAKS, HOLDS = 2.5, 1.9
-STEPS = 500  # the first failed after 800
+STEPS = 500  # fewer steps give no warning; the earliest failure was after 800
 
 
 class Uneven(NamedTuple):
     heavy: str = ""
     light: str = ""
     ratio: float = 1.0  # of densities
-    courant: float = 0.0  # at the light nodes
+    courant: float = 0.0  # Courant number at the nodes of mostly light mass
 
     @property
     def of_step(self) -> float:
@@ -37,7 +37,7 @@ def _one_row(solid: Solid, axis: int) -> bool:
 
 
 def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
-    """A slender elastic row of points that bends by its weight, or None."""
+    """Return facts of a slender elastic row of points that bends under its weight, or None."""
     if facts.d == 1 or facts.simulation.implicit or facts.hub.domain.kin.hoops:
         return None
     for body in facts.bodies:
@@ -53,7 +53,7 @@ def bent_row(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def parting(facts: BasicFacts) -> dict[str, Any] | None:
-    """Bodies that start within a cell of each other and separate, or None."""
+    """Return bodies that start within a cell of each other and then separate, or None."""
     method, h = facts.method, facts.hub.domain.h
     if not facts.moves or method.own_grids or method.fields_per_solid:
         return None
@@ -79,10 +79,10 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """The touching pair of elastic bodies with the worst step.
+    """Return the touching pair of elastic bodies with the worst step.
 
-    A heavy point at a node of mostly light mass makes the step too long by sqrt(rho_heavy /
-    rho_light).
+    Because of a heavy point at a node of mostly light mass, the stable step is shorter by the
+    factor sqrt(rho_light / rho_heavy).
     """
     most, dt = Uneven(), facts.simulation.dt
     if not (facts.moves and facts.linear and facts.waves > 0 and dt * STEPS < facts.duration):
@@ -109,9 +109,9 @@ def uneven(facts: BasicFacts) -> Uneven:
 
 
 def _touch(motion: BodyMotion, boxes: BodyBoxes, h: float, duration: float) -> np.ndarray:
-    """Mask (n,) of bodies that touch a given one within `duration`."""
+    """Return the mask (n,) of bodies that touch a given one within `duration`."""
     touching = (np.maximum(motion.low - boxes.high, boxes.low - motion.high) < h).all(axis=1)
-    # Mirrored: bodies at the back are ahead.
+    # In the mirrored scene, bodies at the back are ahead.
     mirrored = motion._replace(
         centre=-motion.centre, velocity=-motion.velocity, low=-motion.high, high=-motion.low
     )

@@ -31,7 +31,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
 
-LOADED = 24 << 20  # bytes: compiled loops, imported modules
+LOADED = 24 << 20  # bytes of compiled loops and imported modules
 
 
 def report(hub: Hub, end_time: float = inf) -> None:
@@ -150,7 +150,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print unknowns and memory; nodes in the stencil of one point are coupled."""
+    """Print unknowns and memory of the equations, which couple nodes of the same point."""
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
     size = nodes * (2 * reach + 1) ** d * d * d * 8

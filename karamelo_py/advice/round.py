@@ -1,4 +1,4 @@
-"""Suggestions for bodies about an axis or a centre: whole, or cut by symmetry planes."""
+"""Suggestions for bodies around an axis or centre, whole or cut by symmetry planes."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -28,7 +28,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.values import TIME
 
-SAMPLES = 4000  # positions that show whether a shape is round
+SAMPLES = 4000  # positions that are tested for whether a shape is round
 SAME = 1e-9  # relative difference of loads that are equal around an axis
 WIDE = 1.5  # radius of a square plate over the radius of the body on it
 ROTATING = "velocity_nodes", "initial_velocity_particles"
@@ -39,7 +39,7 @@ class Middle(NamedTuple):
 
     across: list[int]
     centre: np.ndarray  # (3,)
-    sides: np.ndarray  # (3,): 1 or -1 where a symmetry plane ends the bodies, 0
+    sides: np.ndarray  # (3,): 1 or -1 in directions with a symmetry plane, otherwise 0
     lo: np.ndarray
     hi: np.ndarray
 
@@ -48,7 +48,7 @@ class Middle(NamedTuple):
         return [axis for axis in range(3) if axis not in self.across]
 
     def apart(self, solid: Solid) -> np.ndarray:
-        """Return the distances (2, k) of the ends of a solid from the centre, across the axis."""
+        """Return distances (2, k) of the ends of a solid from the centre, normal to the axis."""
         return np.abs(np.stack([solid.lo, solid.hi]) - self.centre)[:, self.across]
 
     def radius(self, x: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
     if domain.dimension != 3 or not solids:
         return
     if any(can(solid.material.whole, is_round) for solid in solids):
-        return  # laws with directions
+        return  # a law has directions
     lo, hi = extent(solids)
     centre, sides = (lo + hi) / 2, np.zeros(3)
     for k, roller in held.items():
@@ -112,7 +112,7 @@ def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] |
 
 
 def _is_round(region: Region | None, here: Callable, middle: Middle, reach: float) -> bool:
-    """Return True if positions of equal radius are all within a region, or all outside."""
+    """Return whether positions of equal radius are all within a region, or all outside."""
     if region is None:
         return False
     rng = np.random.default_rng(1)
@@ -138,7 +138,7 @@ def _places_of(hub: Hub, fix: Fix) -> np.ndarray:
 
 
 def _values(hub: Hub, fix: Fix, axes: list[int], x: np.ndarray) -> np.ndarray:
-    """Return the values (n, k) of a fix along `axes` at time 1: it may begin from rest."""
+    """Return the values (n, k) of a fix along `axes`, at time 1, as they may be 0 at the start."""
     time, hub.values.array[TIME] = hub.values.array[TIME], 1.0
     columns = [given(fix)[axis].evaluate_points(hub.values, x, x) for axis in axes]
     hub.values.array[TIME] = time
@@ -146,7 +146,7 @@ def _values(hub: Hub, fix: Fix, axes: list[int], x: np.ndarray) -> np.ndarray:
 
 
 def _radial(hub: Hub, fix: Fix, middle: Middle) -> bool:
-    """Return True if the values of a fix point from the middle, and depend on `key` alone."""
+    """Return whether the values of a fix are radial, and depend on `key` only."""
     formulas = [given(fix)[axis] for axis in middle.across]
     if all(formula is None for formula in formulas):
         return True
@@ -163,7 +163,7 @@ def _radial(hub: Hub, fix: Fix, middle: Middle) -> bool:
 
 
 def _is_even(hub: Hub, middle: Middle, x: np.ndarray, values: np.ndarray, small: float) -> bool:
-    """Return True if `values` (n,) are equal at all positions of the same radius and height."""
+    """Return whether `values` (n,) are equal at all positions of the same radius and height."""
     _, same = np.unique(cells(middle.key(x), hub.domain.h), axis=0, return_inverse=True)
     most = np.full(same.max(initial=-1) + 1, -np.inf)
     np.maximum.at(most, same, values)
@@ -171,14 +171,14 @@ def _is_even(hub: Hub, middle: Middle, x: np.ndarray, values: np.ndarray, small:
 
 
 def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
-    """Return True if a fix acts alike around the middle, by a pressure or radially."""
+    """Return whether a fix acts symmetrically around the middle, by a pressure or radially."""
     if fix.pressure is not None:
         return not depends(fix.pressure, AXES)
     return len(given(fix)) > 2 and _radial(hub, fix, middle) and alike(hub, fix, middle.key)
 
 
 def _points_by_radius(solids: list[Solid], middle: Middle) -> float:
-    """Return how many times more points the bodies have than their section."""
+    """Return the number of points of the bodies over the number in their section."""
     many = 0.0
     for solid in solids:
         size = solid.h / (solid.ppc or 1)
@@ -210,7 +210,7 @@ def _cylinder(
     named = "".join(AXES[axis] for axis in middle.across)
     for fix in others:
         if fix.friction is not None:
-            continue  # contact forces are the same around the axis
+            continue  # contact forces are symmetric around the axis
         if fix.pressure is not None:
             if depends(fix.pressure, named):
                 return

@@ -1,9 +1,9 @@
-"""Displacement of soft elastic bodies by a weight that acts from the first step.
+"""Displacement of soft elastic bodies due to weight that acts from the first step.
 
-Points of a vibrating body cross cells repeatedly. With a linear basis it sinks further: by 19, 28,
-67 and 165 % for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells (FLIP 0.9). With a load
-that grows over 7 periods it is 1 and 3 % at 0.26 and 0.32 cells, with cpgimp and splines at most 7
-%. Reactions are correct.
+Points of a vibrating body cross cell faces repeatedly. With a linear basis the body then sinks too
+far: for a displacement at rest of 0.26, 0.32, 0.64 and 1.24 cells by 19, 28, 67 and 165 % (FLIP
+0.9). If the load grows over 7 periods, the error is 1 and 3 % at 0.26 and 0.32 cells; with cpgimp
+and splines it is at most 7 %. Reactions are correct.
 """
 
 from typing import NamedTuple
@@ -17,20 +17,20 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.script.expressions import Expression
 
-CELLS = 0.25  # displacement in cells, below which hardly any point crosses a cell
+CELLS = 0.25  # displacement in cells below which few points cross a cell face
 
 
 class Settling(NamedTuple):
     name: str = ""
-    strain: float = 0.0  # mean, at rest
-    cells: float = 0.0  # of the free end at rest, over the cell size
+    strain: float = 0.0  # mean strain at rest
+    cells: float = 0.0  # displacement of the free end at rest, over the cell size
 
 
 def expected(facts: BasicFacts) -> Settling:
-    """Predict how far bodies settle by their weight.
+    """Predict how far bodies settle under their weight.
 
-    The free end of a clamped column moves by g L^2/c^2 (1/2 + m_1/m), with its length L, mass m,
-    load m_1 and the speed c of longitudinal waves.
+    The free end of a clamped column moves by g L^2/c^2 (1/2 + m_1/m), where L is its length, m its
+    mass, m_1 the mass on top of it and c the speed of longitudinal waves.
     """
     most = Settling()
     if facts.simulation.step or not (facts.waves > 0 and loses(facts)):

@@ -1,4 +1,4 @@
-"""The default, the stable and the script's step."""
+"""The default step, the stable step, and the step that the script sets."""
 
 from math import inf
 
@@ -7,12 +7,12 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-LOST = 2.05  # times the stable step, above which every run failed
+LOST = 2.05  # step over the stable step above which every run failed
 EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """The default step now: at rest (`still`), or as if points had moved."""
+    """Return the present default step, at rest (`still`) or as if points had moved."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
     courant, fraction = own_step_of_waves(simulation.hub, still=still)

@@ -49,9 +49,9 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """A word, bare, quoted, or in a text variable; None for arithmetic.
+        """The argument as a word (bare, quoted, or the text of a variable); None for arithmetic.
 
-        ``neo-hookean`` or ``dump.*.gz`` are words without the name of a value.
+        ``neo-hookean`` or ``dump.*.gz`` are words if no part of them is the name of a value.
         """
         quoted = _QUOTED.fullmatch(self.text)
         if quoted:
@@ -97,12 +97,12 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def take(self, numbers: dict[str, Argument]) -> list[str]:
-        """Take `numbers` of the same call for a formula; return names that it does not contain."""
+        """Store `numbers` of the call for the formula; return names that it does not contain."""
         self._numbers = numbers
         return [name for name in numbers if name not in _NAME.findall(self.text)]
 
     def value_with(self, seeds: Sequence[str]) -> Value:
-        """Return the value of a formula of `seeds`, in quotes or not, with numbers of its call."""
+        """Return the value of a formula of `seeds`, quoted or not, with the numbers of its call."""
         if _QUOTED.fullmatch(self.text):
             inside = self._from(self._raw.start + 1, self._raw.end - 1)
             inside.take(self._numbers)
@@ -173,7 +173,7 @@ def with_gap(arguments: Sequence[Argument]) -> Argument | None:
 
 
 class Named:
-    """Parts of a scene that scripts name by an ID."""
+    """Base of parts of a scene to which scripts refer by an ID."""
 
     id: str = ""
     mark: Mark | None = None

@@ -11,14 +11,14 @@ from karamelo_py.language.unknown import size_of_cells, words_of
 from karamelo_py.script.errors import ScriptError, meant, plural
 from karamelo_py.script.expressions import Expression
 
-_HUGE = 1e20  # Karamelo's infinity, for INF
+_HUGE = 1e20  # Karamelo's value of INF
 
 
 class Forms:
     """The forms of an argument list, by dimension.
 
     `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are by dimension. Some
-    arguments take `words`; INF and EDGE mean the `open_ends` (-inf, inf).
+    arguments may be `words`. INF and EDGE are words for the `open_ends` (-inf, inf).
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """A finite constant; in a rehearsal, NaN is the result of a run."""
+    """Return a finite constant, or NaN in a rehearsal if it is the result of a run."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

@@ -130,7 +130,7 @@ def misfit(
     family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):
         text, hint = f"one of {', '.join(registry.names(family))}", None
-    if re.fullmatch(r"0\d\d", argument.text):  # the 000 of 1,000
+    if re.fullmatch(r"0\d\d", argument.text):  # probably the 000 of 1,000
         hint = "commas separate arguments: a million is 1e6 or 1000000"
     message, mark = f"{which} must be {text}, not {unfit.got}", unfit.mark or argument.mark
     return ScriptError(message, mark=mark, expected=text, hint=hint, code="argument")

@@ -20,9 +20,9 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 
 @contextmanager
 def as_script_error(name: str, where: str, code: Any, mark: Mark | None) -> Iterator[None]:
-    """Convert an exception of a style (``fix drag``).
+    """Convert an exception in a style of this `name` (``fix drag``) to a ScriptError.
 
-    `where` is the active part, such as a hook; the last line in the file of `code` is named.
+    `where` is what was called, such as a hook. The message has the last line in the file of `code`.
     """
     try:
         yield
@@ -53,7 +53,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an error in one line, with the user's line if it does not compile."""
+    """Describe an error in one line; if code does not compile, with the user's line."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):
@@ -84,7 +84,7 @@ def place_of(function: Callable) -> str:
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Last line of `code` in the traceback: `` (spring.py:28)``."""
+    """Return the last line of `code` in the traceback: `` (spring.py:28)``."""
     try:
         source = inspect.getsourcefile(inspect.unwrap(code))
     except TypeError:

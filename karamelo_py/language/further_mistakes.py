@@ -1,6 +1,6 @@
-"""Further, independent mistakes of a script.
+"""Further mistakes of a script, independent of the first.
 
-Of statements that depend on a wrong one, only command and style names are checked.
+In statements that depend on a wrong one, only names of commands and styles are checked.
 """
 
 import re
@@ -15,10 +15,10 @@ from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
-MOST_OF_TEXT = 200  # every line of another program's script is wrong
+MOST_OF_TEXT = 200  # errors in the text: if it is another program's script, every line is wrong
 _ROUND = {"axisymmetric", "cylindrical", "spherical"}
 _BASIS = frozenset({"method", "dimension", "create_domain", "include", "quit"} | _ROUND)
-# Runs depend on these; other definitions matter only where named.
+# All runs depend on these commands. Other definitions matter only where they are named.
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
@@ -34,13 +34,13 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 class Dependents:
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Kinds that an unknown name may have, and that were not deleted.
+        # Kinds of parts that an unknown name may have, and kinds of which none was deleted.
         self.kinds: set[str] = set()
         self.undeleted: set[str] = set()
         self.lacks_columns = False
 
     def note(self, statement: Statement) -> bool:
-        """Record what a statement defines; False if nothing else can be checked."""
+        """Record what a statement defines; return False if nothing else can be checked."""
         if isinstance(statement, Assignment):
             self.names.add(statement.name)
         if not isinstance(statement, CommandCall):
@@ -76,7 +76,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """True if a statement uses a missing name: F, F_x, ContactForce_F_x."""
+        """Return whether a statement uses a missing name F, as F, F_x or ContactForce_F_x."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -85,7 +85,7 @@ class Dependents:
 
 
 def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
-    """Mistakes after the `first`; uses up the interpreter's hub."""
+    """Return mistakes after the `first`; the interpreter's hub cannot be used afterwards."""
     errors = first.others
     seen = {error.message: error for error in (first, *errors)}
     passed_over: list[Statement] = []
@@ -93,7 +93,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     def follows(error: ScriptError) -> bool:
         if error.code == "unknown-ID":
-            # A repeated ID was a slip; other programs use other names.
+            # If an ID was repeated by mistake, unknown names of this kind follow from it.
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
             return error.kind in twice | dependents.kinds
         if error.code == "already-used":
@@ -127,7 +127,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
                 wrong = statement
             except Quit:
                 break
-            except Exception:  # the scene is incomplete
+            except Exception:  # of any kind, as the scene is incomplete
                 passed_over += _rest_of(interpreter)
     for statement in passed_over:
         dependents.note(statement)
@@ -146,7 +146,7 @@ def errors_of_text(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 def misnamed(
     interpreter: Any, statements: Iterable[Statement], wanting: Iterable[str] = ()
 ) -> list[ScriptError]:
-    """Errors about wrong names of commands and styles.
+    """Return errors about wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
     are valid even if a `wanting` name has no definition.

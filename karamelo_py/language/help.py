@@ -31,7 +31,7 @@ def describe(target: Callable, name: str) -> Help:
         "arguments": "See the page of the style.",
         "active": "``true`` or ``false`` (the default).",
     }
-    # Derived styles inherit descriptions.
+    # Derived styles inherit descriptions of parameters.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
         init = owner.__init__.__doc__ if "__init__" in vars(owner) else None
         for doc in (init, owner.__doc__):

@@ -1,4 +1,4 @@
-"""Executes statements."""
+"""Execution of statements."""
 
 import inspect
 import re
@@ -39,7 +39,7 @@ def _code_of(error: ScriptError, statement: syntax.Statement) -> str:
 
 
 class Interpreter:
-    """Sets ``interpreter`` and ``mark`` of the hub."""
+    """Executes scripts on a hub, whose ``interpreter`` and ``mark`` it sets."""
 
     def __init__(self, hub: Any, presets: Mapping[str, str] | None = None):
         self.hub = hub
@@ -47,11 +47,11 @@ class Interpreter:
         hub.interpreter = self
         self.files: list[Path] = []
         self.frames: list[_Frame] = []
-        self.by_statement = False  # `next_statement` enters included scripts
+        self.by_statement = False  # whether `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None
         self.record = Record()  # executed statements, for restart files
         self.replay: Replay | None = None
-        # They override assignments.
+        # Presets override assignments.
         self.presets = Presets(self, presets or {})
 
     def run_file(self, path: str | Path) -> None:
@@ -155,7 +155,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # At a run, the rest has already been rehearsed.
+            # At a run, the rest of the script has already been rehearsed.
             if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -177,7 +177,7 @@ class Interpreter:
             try:
                 self.execute(frame.statements[frame.next - 1])
             except Pause:
-                # The script of the run repeats its line; those that include it do not.
+                # Only the innermost script repeats its line, not the scripts that include it.
                 if frame is self.frames[-1]:
                     frame.next -= 1
                 raise
@@ -273,7 +273,7 @@ class Interpreter:
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
-            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # excludes L/20
+            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # no numbers, as in L/20
             if error.code == "unknown-name" and re.fullmatch(
                 rf"{letters}([-/.]\w+)*[-/.]{letters}", word
             ):
@@ -289,7 +289,7 @@ class Interpreter:
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
         else:
-            # A function alone on a line has no effect, but its mistakes count.
+            # A function alone on a line has no effect, but its mistakes are errors.
             self.evaluate(parse_expression(raw), raw)
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
@@ -332,7 +332,7 @@ class Interpreter:
         if not registry.knows("command", name) or self.hides(name):
             raise unknown.unknown_call(self, name, mark, statement=False)
         target = registry.find("command", name)
-        # A command without a value must not run here.
+        # A command without a value must not be executed within an expression.
         if inspect.get_annotations(target).get("return", "") in (None, "None"):
             raise unknown.no_value(name, mark)
         arguments = [

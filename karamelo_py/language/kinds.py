@@ -19,17 +19,17 @@ from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
-_LARGEST_INTEGER = 2**53  # above, floats skip integers
+_LARGEST_INTEGER = 2**53  # above it, floats skip integers
 
 
 def _rounding(value: float) -> float:
-    """Tolerance for results such as 0.3/0.1 to be integers."""
+    """Return the tolerance within which a result such as 0.3/0.1 is an integer."""
     return min(1e-9 * max(abs(value), 1), 1e-3)
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """A field given as ``name=value``, by default under its own name."""
+    """Marks a field that is given as ``name=value``, by default with the name of the field."""
 
     name: str = ""
 
@@ -53,7 +53,7 @@ def AtLeast(least: float) -> Constraint:
 
 
 def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -> Constraint:
-    """Constrain a number; `open` names the excluded ends (True: both)."""
+    """Constrain a number to an interval; `open` names the excluded ends (True: both)."""
     above = open in (True, "lo", "both")
     below = open in (True, "hi", "both")
 
@@ -69,10 +69,10 @@ def In(lo: float, hi: float, open: bool | Literal["lo", "hi", "both"] = False) -
 
 
 class InputFile:
-    """Script argument: a file in the current or the script's folder."""
+    """Script argument: a file in the current folder or the folder of the script."""
 
     script_kind = "the name of a file"
-    # Lower-case endings; None: any.
+    # Lower-case endings that are accepted; None: any.
     endings: Container[str] | None = None
 
     @classmethod
@@ -115,7 +115,7 @@ class OutputFile:
             message = f"{name} cannot be the name of a file here, where these are in {encoding}"
             hint = "the environment variable PYTHONUTF8=1, or another name"
             raise ScriptError(message, mark=argument.mark, hint=hint) from None
-        # A run makes the folder of -out; `check` may not find it.
+        # The folder of -out is made by a run, so it may be missing in `check`.
         made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
@@ -147,8 +147,8 @@ class Unfit(Exception):
 class Kind:
     """Description and conversion of an argument.
 
-    With `words`, only these fit; `family` is the family of the styles it names. Other arguments
-    ``name=value`` of the call are numbers of an argument `with_numbers`.
+    With `words`, only these fit; `family` is the family of styles that it names. If `with_numbers`,
+    other arguments ``name=value`` of the call are numbers in the formula.
     """
 
     text: str
@@ -160,7 +160,7 @@ class Kind:
 
 
 class WithNumbers:
-    """Base of kinds of formulas that may contain numbers from the same call."""
+    """Base of formulas that may contain numbers named in the same call."""
 
 
 def _shown(value: Value) -> str:
@@ -204,7 +204,7 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
 def _to_integer(hub: Scene, argument: Argument) -> int:
     value = _to_number(hub, argument)
     if math.isnan(value):
-        return 1  # unknown in a rehearsal; 1 passes every check
+        return 1  # unknown in a rehearsal; 1 passes all checks
     if math.isinf(value) or abs(value - round(value)) > _rounding(value):
         raise Unfit(number_text(value))
     if abs(value) > _LARGEST_INTEGER:
@@ -226,7 +226,7 @@ def _to_text(hub: Scene, argument: Argument) -> str:
 
 @dataclass(frozen=True)
 class StyleOf:
-    """Script argument: a style, which hides a variable of that name."""
+    """Script argument: a style, whose name takes precedence over a variable."""
 
     family: str
     script_kind = "a word"
@@ -290,7 +290,7 @@ _SIMPLE = {
 
 
 def kind_of(annotation: Any) -> Kind:
-    """Kind of an annotation; raises TypeError if it is not supported."""
+    """Return the kind of an annotation; raises TypeError if it is not supported."""
     if annotation in (None, NoneType):
         return Kind(NULL, lambda hub, argument: None, nullable=True)
     if get_origin(annotation) is Annotated:
@@ -339,7 +339,7 @@ def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
 def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
-    # Words first: they hide variables.
+    # Words come first, as they take precedence over variables.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Scene, argument: Argument) -> Any:

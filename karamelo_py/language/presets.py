@@ -20,9 +20,9 @@ _NAMED = re.compile(rf"({_WORD})\s*=(?!=)\s*(.*)", re.DOTALL)
 
 
 def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None], dict[str, str]]:
-    """Return names that statements read, assign, and hints for names of arguments.
+    """Return names that statements use, names that they assign, and hints on argument names.
 
-    A formula reads its own numbers (``mu=4e5``) before variables, also in quotes.
+    In a formula, quoted or not, numbers of the call (``mu=4e5``) take precedence over variables.
     """
     read: set[str] = set()
     assigned: dict[str, None] = {}
@@ -36,7 +36,7 @@ def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None]
         codes = [re.sub(r'("[^"\n]*")|#[^\n]*', r"\1", raw.code).strip() for raw in raws]
         named = [m.groups() if (m := _NAMED.match(code)) else ("", code) for code in codes]
         expected = []
-        with suppress(StopIteration, TypeError):  # no style, a broken style
+        with suppress(StopIteration, TypeError):  # no style, or a broken one
             style = next(code for code in codes[:2] if registry.knows(name, code))
             expected = signature.parameters(registry.find(name, style))
         formula = any(p.kind.with_numbers for p in expected)
@@ -50,17 +50,17 @@ def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None]
 
 
 class Presets(dict[str, str]):
-    """Command-line variables, texts by name."""
+    """Command-line variables: texts by name."""
 
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
         self._script = script
-        # Texts that may have to be numbers, and the mistakes that they cause.
+        # Texts where numbers may be needed, and variables that have caused mistakes.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
         # Presets on which each variable depends.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
-        if isinstance(texts, Presets):  # of the script being copied
+        if isinstance(texts, Presets):  # the presets of a script that is copied
             vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -90,11 +90,11 @@ class Presets(dict[str, str]):
 
     def stand_for(self, statement: Assignment) -> None:
         name, variables = statement.name, self._script.variables
-        # A word may now be an expression of variables.
+        # A text may now be an expression of known variables.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
-            # A method may take a text for a number; its user reports the mistake.
+            # If the text should be a number, the command that uses it reports the mistake.
             in_script = None
             with suppress(ScriptError):
                 in_script = self._script.evaluate(statement.node, statement.right)

@@ -5,8 +5,8 @@ A package offers a style in its pyproject.toml::
     [project.entry-points."karamelo_py.fix"]
     gravity = "my_package:Gravity"
 
-Scripts name a class of a module, next to them or installed, as ``module.Class``. Nothing is
-imported before use.
+A script can also name a class as ``module.Class``, of a module next to the script or installed.
+Styles are imported when they are first used.
 """
 
 import re
@@ -94,7 +94,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Forget another folder's module; return True if one exists here."""
+    """Remove an imported module of another folder; return whether this folder has one."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -147,7 +147,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """As `find`; the first argument may wrongly be the style."""
+    """Return a style as `find` does; the error detects a style written before the ID."""
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")
@@ -177,7 +177,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
 
 
 def may_differ(*commands: Callable, keywords: bool | tuple[str, ...] = True) -> None:
-    """Allow other statements, or values of `keywords`, when a run resumes."""
+    """Allow a resumed script to have other statements of `commands`, or other `keywords`."""
     _differences.update(dict.fromkeys(commands, keywords))
 
 

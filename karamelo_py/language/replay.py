@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """Executed statements, except by :func:`registry.may_differ`.
+    """Executed statements, except of commands that may differ (:func:`registry.may_differ`).
 
     `values` has the results of value(...) by statement number.
     """
@@ -28,16 +28,13 @@ class Record:
 
 
 class Replay:
-    """Compares a script with the record in a `file`.
-
-    It ends at the restart state; its last statement may be an unfinished run (`within`).
-    """
+    """Compares a script with the record in a restart `file`; `within`: it ends in a run."""
 
     def __init__(self, record: Record, within: bool, file: str):
         self.record = record
         self.within = within
         self.file = file
-        self.number = -1  # of the present statement
+        self.number = -1  # number of the present statement
         self._values: list[float] = []
 
     @property

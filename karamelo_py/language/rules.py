@@ -14,8 +14,8 @@ of a part, field or law::
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
 returns whether the rule applies, or numbers by name for its text, or a list of these, one per
 message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (the
-material of a law), such as ``{scene.turn:.2g}``. Two names are special: ``mark``, the location in
-the script, and ``share``, noise over the tolerable amount.
+material of a law), such as ``{scene.turn:.2g}``. Two of the names have a meaning: ``mark`` is the
+location in the script, and ``share`` is noise over the tolerable amount.
 """
 
 import re
@@ -34,28 +34,28 @@ HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
 
 
 class Feature(NamedTuple):
-    """A choice of a scene, or an option, whose `name` is empty."""
+    """A choice of a scene by `name`, or an option, with an empty `name`."""
 
     kind: str
     name: str
-    words: str  # in messages
+    words: str  # text in messages
     instead: str = ""  # what to use instead of the option
     mark: Mark | None = None
 
 
 class Restrictions(NamedTuple):
-    """Restrictions of a capability. Anything that they do not mention is supported.
+    """Restrictions of a capability; what is not mentioned is supported.
 
     Parameters
     ----------
     option
-        Kind of the capability in the restrictions of other capabilities.
+        Name of the capability in restrictions of others.
     instead
-        How to do without it.
+        Replacement of the capability, for messages.
     only
         Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
     without, but
-        Unsupported options, and those with another replacement than their ``instead``.
+        Unsupported options, and those with another replacement than their own ``instead``.
     """
 
     option: str
@@ -106,7 +106,7 @@ class Advice(NamedTuple):
 
 
 def code_of(name: str) -> str:
-    """Convert a name: ``shocks of material 'm'`` is shocks-of-material."""
+    """Return the code of a name: shocks-of-material for ``shocks of material 'm'``."""
     words = re.sub(r"'[^']*'( and '[^']*')*", "", name)
     return "-".join(re.findall(r"\w+", words.lower()))
 
@@ -117,9 +117,9 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare a known failure, reported once by its name.
+    """Declare a known failure, which is reported once by its name.
 
-    With a `cause`, it is noise: reported if its ``share`` exceeds 1, and as the cause of a gain.
+    With a `cause` it is noise, reported if its ``share`` exceeds 1, or as the cause of a gain.
     """
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 
 class Scene(Protocol):
-    """The hub as its parts see it (:mod:`karamelo_py.scene.hub`)."""
+    """The hub (:mod:`karamelo_py.scene.hub`), as lower layers know it."""
 
     console: Any
     settings: Any
@@ -41,7 +41,7 @@ class Scene(Protocol):
         """The grids of the scene."""
 
     def require_domain(self) -> Any:
-        """Raises ScriptError without a domain."""
+        """Return the domain; raise ScriptError without one."""
 
     def refresh_values(self) -> None:
         """Let computes and fixes measure the present state."""

@@ -75,8 +75,8 @@ def parameters(target: Any) -> list[Parameter]:
 def is_record(target: Any) -> bool:
     """True for a NamedTuple, which needs no hub.
 
-    Arguments are its fields, or the parameters of its classmethod ``given``. A method ``checked``
-    returns a replacement.
+    Arguments are the fields, or the parameters of a classmethod ``given``. A method ``checked`` may
+    return a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
@@ -214,7 +214,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """Make a style from values, as `call` does; faults are the author's."""
+    """Make a style from values; other errors than ScriptError are faults of the style."""
     is_class = inspect.isclass(target)
     try:
         if not is_record(target):
@@ -244,7 +244,7 @@ def _bind(
     formula = next((p.name for p in expected if p.kind.with_numbers), None)
     numbers: dict[str, Argument] = {}
     positional: list[Argument] = []
-    # Styles know the names of raw arguments.
+    # The style itself checks names of raw arguments.
     passed_on = variadic is not None and is_raw(variadic.kind)
     by_name = {p.name for p in expected if p.keyword or not (p.variadic or passed_on)}
     for argument in arguments:
@@ -316,7 +316,7 @@ def _joined(expected: list[Parameter]) -> str:
     return text + "]" * open_brackets + numbers
 
 
-# Families without a command: the one that names their styles.
+# For families without a command: the command that names their styles.
 _HOMES = {"transfer": "method", "basis": "method"}
 
 
@@ -353,7 +353,7 @@ def documented(target: Callable) -> list[Parameter]:
     variants = variants_of(target)
     if not variants:
         return parameters(target)
-    # For a method, it selects the required shape of domains.
+    # In a method, the word selects the shape of domains, which is required.
     needed = not is_record(target)
     kind = kind_of(Literal[tuple(variants)])
     variant = Parameter("variant", kind, optional=not needed, default=default_variant(target))

@@ -150,7 +150,7 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
     """Yield (statement, command or "" for an assignment, ID or name, line) of later statements.
 
-    The innermost script comes first, from `back` statements before its next one on.
+    The innermost script comes first, beginning `back` statements before its next statement.
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:
@@ -224,13 +224,13 @@ def listed(names: Iterable[str]) -> str:
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
 
 
-# Shapes that scripts of 2020 name where the style ``region`` is expected.
+# Names of shapes in scripts of 2020, which now have the solid style ``region``.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",
 }
 FLIPS = ("FLIP", "AFLIP", "ASFLIP")
-# Reference and melting temperature in Karamelo scripts.
+# Names of reference and melting temperature in Karamelo scripts.
 OWN_NAMES = {"T0": ("T0", "Tr", "Troom"), "Tm": ("Tm", "Tmelt", "Tmelting")}
 
 

@@ -14,8 +14,8 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms. After BURST lines faster than QUICK seconds,
-# further ones are written every LINES seconds.
+# Rich redraws the bar after every line, in 0.25 ms. After BURST lines at intervals below QUICK
+# seconds, lines are written together every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
@@ -112,7 +112,7 @@ class Console:
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
-            # A refresh thread would wait for compiled loops.
+            # No refresh thread, which would have to wait for compiled loops.
             self._progress = Progress(
                 BarColumn(bar_width=30), TextColumn("{task.description}"),
                 console=self._rich, auto_refresh=False, transient=True,
@@ -123,7 +123,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show progress, and the activity `within` a step; fast enough to call in each step.
+        """Show progress, and the activity `within` a step; may be called in every step.
 
         `fraction` is None if the end is unknown (run_until, run_while).
         """
@@ -178,7 +178,7 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader (head, less) has closed the pipe; the run continues.
+            # The reader of a pipe (head, less) has ended; the run continues.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())
@@ -188,7 +188,7 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # The stream's encoding (a Windows pipe) may lack characters.
+        # The encoding of the stream (a pipe of Windows) may lack characters.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()

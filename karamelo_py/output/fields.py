@@ -119,10 +119,11 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Sum terms exactly over the points of a part's group.
+        """Sum terms exactly over the points of the group of `owner`.
 
-        ``owner.name(points, *arguments)``, called with tables of some points, returns rows of terms
-        (k, n), or the number of sums, the sum (n,) of each term, and terms.
+        ``owner.name(points, *arguments)`` is called with tables of some points. It returns terms
+        (k, n) of k sums, or the number of sums, the index (n,) of the sum of each term, and terms
+        (n,).
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(owner.group):
@@ -139,7 +140,7 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        # Most of the thousands of sums of a quantile are 0.
+        # A quantile has thousands of sums, most of which are 0.
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
@@ -157,7 +158,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Numbers of the points within `half` (n, d) of one of `x` (n, d) along all axes."""
+        """Return numbers of points within `half` (n, d) of one of `x` (n, d) along all axes."""
         size, numbers = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -173,7 +174,7 @@ class Fields(PointTable):
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Largest value, and the first point with it."""
+        """Return the largest value, and the first point that has it."""
 
         def of_rank() -> tuple[float, int]:
             best = -inf, 0
@@ -216,7 +217,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names for `particle`, then groups and solids (1 for their points, else 0)."""
+        """Names of columns, then of groups and solids (1 for their points, else 0)."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -224,7 +225,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """True if a dump or compute uses ``epdot``, which points then store."""
+        """Return whether a dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -287,7 +288,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Initial energy of a gas; stored energy is relative to it, to retain digits."""
+    """Return the initial energy of a gas, to which stored energy is relative, for more digits."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
@@ -385,6 +386,6 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
         tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
         error.alike = f"{tensor}{i}{j}"
         error.hint = f"did you mean '{error.alike}'?"
-    if name[:2] in ("v_", "c_"):  # LAMMPS
+    if name[:2] in ("v_", "c_"):  # names of LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error

@@ -64,9 +64,9 @@ def read_json(path: Path) -> dict[str, Any]:
 
 @contextmanager
 def continued(path: Path, start: int, tail: bytes) -> Iterator[BinaryIO]:
-    """Open at byte `start` (0: a new file).
+    """Open a file to write from byte `start` on (0: a new file).
 
-    An error truncates the file to `start`, and appends `tail`.
+    After an error, the file is truncated to `start`, and `tail` is appended.
     """
     with reported(path), path.open("r+b" if start else "wb") as file:
         try:
@@ -96,7 +96,7 @@ def savefig(figure: Any, path: Path) -> None:
     import matplotlib
 
     ending = picture_format(path)
-    # For equal bytes: no date, and a fixed salt of SVG ids.
+    # Reproducible bytes need no date, and a fixed salt for the ids of SVG.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
     with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
@@ -162,7 +162,7 @@ class Frames:
         from PIL import Image
 
         first, *others = (Image.open(BytesIO(frame)) for frame in self._frames)
-        hundredths = max(2, round(100 / self.fps))  # below 2, viewers slow down
+        hundredths = max(2, round(100 / self.fps))  # viewers show frames below 2/100 s more slowly
         first.save(
             file,
             format="GIF",
@@ -175,7 +175,7 @@ class Frames:
     def _save_mp4(self, path: Path, file: BinaryIO) -> None:
         command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "png"]
         command += ["-framerate", f"{self.fps:g}", "-i", "-", "-f", "mp4"]
-        # Players need even sizes and chroma at half resolution.
+        # Players need even sizes, and chroma at half resolution.
         command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", file.name]
         done = subprocess.run(command, input=b"".join(self._frames), capture_output=True)
         if done.returncode != 0:
@@ -184,18 +184,18 @@ class Frames:
 
 
 class Claim:
-    """Lock of a folder or file that one program writes, until `release` or its end."""
+    """Lock of a folder or file that one program writes, until `release` or the program's end."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# By device and inode, since simulations of one process have one claim.
+# By device and inode: all simulations of a process have the same claim.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock a path, if the system can; None if another program has locked it."""
+    """Lock a path, if the system supports it; return None if another program has locked it."""
     try:
         import fcntl
 

@@ -1,7 +1,7 @@
-"""Read HDF5 files that were not closed: being written, left by a killed program, or damaged.
+"""Read HDF5 files that are open or damaged, or were left open by a killed program.
 
-HDF5 opens them only in SWMR mode, which retries damaged data for minutes to years. Here the header
-is read as if the file were closed (HDF5 File Format 3.0, II.A and VII.B).
+The HDF5 library opens them only in SWMR mode, in which it retries damaged data for minutes to
+years. Here the header is changed as if the file were closed (HDF5 File Format 3.0, II.A, VII.B).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _MASK = 0xFFFFFFFF
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open a file at its present content.
+    """Open a file for reading, with its present content.
 
     Raises OSError if it is not HDF5, truncated or damaged.
     """
@@ -64,7 +64,7 @@ class _Closed(io.RawIOBase):
 
 def _closed(head: bytes, size: int) -> bytes:
     if len(head) < _HEAD.size + 4 or head[:8] != _SIGNATURE or head[8] not in _NEW:
-        return head  # HDF5 reports the error
+        return head  # the HDF5 library reports the error
     signature, version, offsets, lengths, flags, base, extension, end, root = _HEAD.unpack_from(
         head
     )
@@ -72,13 +72,13 @@ def _closed(head: bytes, size: int) -> bytes:
         return head
     if not flags:
         return head
-    end = max(end, size)  # HDF5 reports truncated files
+    end = max(end, size)  # the HDF5 library reports a truncated file
     shown = _HEAD.pack(signature, version, offsets, lengths, 0, base, extension, end, root)
     return shown + struct.pack("<I", _checksum(shown))
 
 
 def _checksum(data: bytes) -> int:
-    """HDF5's hashlittle, lookup3 (Jenkins 2006)."""
+    """Return the checksum of HDF5: hashlittle of lookup3 (Jenkins 2006)."""
 
     def turned(x: int, k: int) -> int:
         return (x << k | x >> (32 - k)) & _MASK

@@ -15,14 +15,15 @@ from karamelo_py.script.terms import number_of
 
 FILE = "log.mpm"
 STEP_WIDTH = 10
-NUMBER_WIDTH = 16  # as -1.234567891e-05
+NUMBER_WIDTH = 16  # characters of -1.234567891e-05
 
 
 class Log(Rhythmic):
-    r"""A header, then rows, for ``numpy.loadtxt("log.mpm", skiprows=1)`` or
-    ``pandas.read_csv("log.mpm", sep=r"\\s+")``; with commas in .csv.
+    r"""The log: a header, then rows.
 
-    Later runs append. If the columns change, a comment line (``#``) names the new ones.
+    It can be read by ``numpy.loadtxt("log.mpm", skiprows=1)`` or ``pandas.read_csv("log.mpm",
+    sep=r"\\s+")``. Later runs append rows. If the columns change, a comment line (``#``) lists the
+    new ones. In log.csv there are commas between the columns.
     """
 
     remembers = ("_header", "_end")
@@ -37,7 +38,7 @@ class Log(Rhythmic):
         self._file: TextIO | None = None
         self._claims: list[Claim] = []
         self._is_kept = True
-        # Headings and numbers of each row, for a program that reads them.
+        # Headings and numbers of each row, if a Python program reads them.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
         self._end = 0
@@ -48,7 +49,7 @@ class Log(Rhythmic):
         return self.hub.folder / self.file
 
     def begin(self) -> None:
-        """Write the header to a new file, and always to the terminal."""
+        """Write the header to the terminal, and to the file if it is new."""
         if not self.columns:
             self.columns = [Quantity(self.hub, name) for name in ("step", "dt", "time")]
         headings = [column.heading for column in self.columns]
@@ -71,7 +72,7 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # The blank is for a minus sign; pandas needs the first column at the margin.
+        # The blank is for a minus sign, except in the first column, for pandas.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)
@@ -84,7 +85,7 @@ class Log(Rhythmic):
     def close(self) -> None:
         if self._file is not None:
             file, self._file, self._claims = self._file, None, []
-            with reported(self.path, "the log file "):  # retries a failed line
+            with reported(self.path, "the log file "):  # tries again to write a line that failed
                 file.close()
 
     def _go_on(self) -> None:
@@ -115,7 +116,7 @@ class Log(Rhythmic):
             # Line buffered: rows reach the file even if the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            self._is_kept = path.is_file()  # False for /dev/null
+            self._is_kept = path.is_file()  # not so for /dev/null
             for claimed in [self.hub.folder.resolve(), *[path] * self._is_kept]:
                 if (lock := claim(claimed)) is None:
                     raise ScriptError(
@@ -150,7 +151,7 @@ def _is_log(path: Path) -> bool:
     except UnicodeDecodeError:
         return False
     except OSError:
-        return True  # reported on opening
+        return True  # the error is reported when it is opened
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))

@@ -23,9 +23,9 @@ class NodeTable(NamedTuple):
     hub: Scene
     ids: np.ndarray
     kin: Any
-    arrays: dict[str, np.ndarray]  # by name, as in a restart
-    brought: dict[str, np.ndarray]  # sums over points, see `BROUGHT`
-    loaded: dict[str, int]  # nodes with mass, by ID of force fixes
+    arrays: dict[str, np.ndarray]  # by name, as in restart files
+    brought: dict[str, np.ndarray]  # sums over points, by names in `BROUGHT`
+    loaded: dict[str, int]  # number of nodes with mass, by ID of fixes with a total force
 
     def node(self, name: str) -> np.ndarray:
         if name == "T" and self.hub.update.thermal:
@@ -58,7 +58,7 @@ def places_of(hub: Scene, nodes: np.ndarray) -> np.ndarray:
 
 
 def mask(nodes: NodeTable) -> np.ndarray:
-    """Karamelo's bits: 1 for all nodes, 2 for the first group, 4 for the second, ..."""
+    """Return Karamelo's group bits: 1 for all nodes, 2 for the first group, 4 for the next ..."""
     bits = np.ones(len(nodes.ids))
     for k, group in enumerate(nodes.hub.groups.values(), 1):
         if group.kind == "nodes":
@@ -72,10 +72,10 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 
 
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Kind of each node along one axis.
+    """Return the kind of each node along one axis, as in Karamelo.
 
-    Splines have -2 and -1 at the lower edge and next to it, 2 and 1 at the upper edge, 0 between.
-    Bernstein nodes are 1 in the middle of a cell. All others are 0.
+    With splines it is -2 at the lower edge and -1 next to it, 2 and 1 likewise at the upper edge.
+    With Bernstein functions it is 1 in the middle of a cell. Otherwise it is 0.
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
@@ -92,7 +92,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Loads of fixes on nodes, and of fixes on points, transferred by the basis."""
+    """Return loads of fixes on nodes, and of fixes on points as mapped by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -128,7 +128,7 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
     }
 
 
-# None: 0 in scenes without it.
+# None: only certain scenes have the column; otherwise it is 0.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
@@ -172,9 +172,9 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """Sums of N times a value over local points, (nodes, 2).
+    """Return sums of N times a value over points of this process, (nodes, 2).
 
-    The columns have whole units, and the remainder.
+    The sum of both columns, multiples of a unit and a remainder, has more digits than a double.
     """
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))

@@ -45,11 +45,11 @@ MOST_CELLS = 1 << 23
 HIDDEN = (0.0, 0.0, 0.0, 0.25)
 # Diameter of the circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
-STEPS = (1, 2, 2.5, 5, 10)  # between ticks
-# Direction of the light: right, up, towards the eye.
+STEPS = (1, 2, 2.5, 5, 10)  # intervals of ticks, over a power of ten
+# Direction to the light: right, up, towards the viewer.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5
-LIT = 8  # points that make a surface
+LIT = 8  # number of points above which a body has a surface
 
 
 Window = Sequence[tuple[float | None, float | None]]
@@ -59,19 +59,19 @@ class Options(NamedTuple):
     column: str
     label: str
     solids: tuple[str, ...] = ()
-    limits: tuple[float | None, float | None] = (None, None)  # None: grow
-    symmetric: bool = False  # about 0
+    limits: tuple[float | None, float | None] = (None, None)  # None: widened by the values
+    symmetric: bool = False  # limits symmetric about 0
     cmap: str = "viridis"
     azimuth: float = -60.0
     elevation: float = 30.0
     axes: bool = True
     lengths: str = ""  # unit
     mirror: bool = False
-    window: Window = ()  # x, y, z; None: the domain
-    log: bool = False  # values <= 0 get the lowest colour
+    window: Window = ()  # limits of x, y, z; None: the domain
+    log: bool = False  # logarithmic colours; values <= 0 get the lowest colour
     quantile: float = 0.0  # fraction of values at each end beyond the limits
     fontsize: float = 9.0
-    pointsize: float = 1.0  # diameter over the size of a point
+    pointsize: float = 1.0  # diameter over the size of a material point
     outlines: bool = False
 
 
@@ -93,7 +93,7 @@ class DrawnPoints(Artist):
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # rasterised in .pdf and .svg, too: viewers cannot show as many circles
+        if many:  # an image also in .pdf and .svg, as viewers cannot show so numerous circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.draw(self.rows[:, first : first + MARKS])
@@ -109,7 +109,7 @@ class DrawnPoints(Artist):
 class Picture:
     """Axes, labels and colour bar, with the points of a state on top.
 
-    Matplotlib spends most time on axes: their pixels are stored until the limits change.
+    Drawing the axes takes most of the time, so their pixels are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -136,19 +136,16 @@ class Picture:
 
     cuts = False
     _prepare: Callable[[], Any]  # returns the artist of the points
-    # Visible rows of points x (n, 3), in drawing order.
+    # Rows of visible points among x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
     draw: Callable[[np.ndarray], None]
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Mark the ends of the colour bar that values exceed."""
+        """Draw arrows at the ends of the colour bar that values exceed."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label lengths in a unit that suits the numbers.
-
-        Without a unit, a power of 1000 is used.
-        """
+        """Label an axis in a unit that suits the numbers; without a unit, in a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -213,7 +210,7 @@ class Picture:
             self._outline([x[kinds == kind] for kind in np.unique(kinds)], tools, side)
 
     def _outline(self, bodies: list[np.ndarray], tools: Sequence[Tool], side: float) -> None:
-        """Lines around points (n, 3) of bodies, and around tools."""
+        """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
         self.title.set_text(text)
@@ -221,7 +218,7 @@ class Picture:
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(float(self.title.get_fontsize()) * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # shorter titles stay in place
+        self._widest = max(self._widest, min(wide, whole))  # shorter titles begin there, too
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
@@ -255,22 +252,22 @@ class Picture:
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
         self.axes.draw_artist(self.marks)
-        # Opaque: three channels suffice.
+        # Pictures are opaque, so three channels suffice.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
         image.save(file, format="PNG", compress_level=compression)
 
     def _lay_out(self) -> None:
-        """Reserve room for the widest labels, so that nothing moves between pictures."""
+        """Reserve space for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
-        for _ in range(2):  # the aspect ratio moves the axes
+        for _ in range(2):  # twice, as the aspect ratio moves the axes
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
-            if axes is not self.axes:  # colour bar, no taller than the axes
+            if axes is not self.axes:  # a colour bar, not taller than the axes
                 bar, box = axes.get_position(), self.axes.get_position()
                 high = min(bar.height, box.height)
                 low = box.y0 + (box.height - high) / 2
@@ -296,9 +293,9 @@ class Picture:
 
 
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
-    """Limits grown to the finite values.
+    """Return limits widened to include the finite values.
 
-    They are rounded outwards to 2^k / 8, so that they change rarely.
+    They are rounded outwards to multiples of 2^k / 8, so that they change rarely.
     """
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -349,7 +346,7 @@ def _number(value: float, _: object = None) -> str:
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         return f"{value:.8g}"
     short = np.format_float_scientific(value, precision=7, trim="-", exp_digits=1)
-    return short.replace("+", "")  # 2.5e6
+    return short.replace("+", "")  # 2.5e6 instead of 2.5e+6
 
 
 def _power(value: float, _: object = None) -> str:
@@ -380,7 +377,7 @@ class PlanePicture(Picture):
             shown = ScalarMappable(self.norm, self.options.cmap)
             bar = self.figure.colorbar(
                 shown, ax=self.axes, shrink=0.8,
-                ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # whole decades
+                ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # for decades
                 format=FuncFormatter(_power if self.options.log else _number),
             )  # fmt: skip
             bar.set_label(self.options.label, fontsize=self.options.fontsize)
@@ -400,7 +397,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # Few points are drawn larger.
+        # A minimum size, larger if there are few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -470,7 +467,7 @@ class SpacePicture(PlanePicture):
         factor, name = self._lengths_as("xyz"[axis])
         large = self.options.fontsize / 9
         ticks = MaxNLocator(max(2, round(4 / large)), steps=STEPS).tick_values(lo, hi)
-        # Ticks of two edges would overlap at their common end.
+        # Near the ends of an edge, ticks of both edges would overlap.
         for tick in ticks[abs(ticks - 0.5 * (lo + hi)) < 0.48 * (hi - lo)]:
             at = seen[0] + along * (tick - lo) / (hi - lo)
             self.axes.plot(*np.array([at, at + 0.02 * reach * outward]).T, color="0.5", lw=0.7)
@@ -488,7 +485,7 @@ class SpacePicture(PlanePicture):
         places = self._project(x)
         shows = np.flatnonzero(self._shows(places, side))
         ids, places, values = ids[shows], places[shows], values[shows]
-        # From far to near, then by id; bits of negative floats are ordered by magnitude.
+        # Sort from far to near, then by id. Bits of negative floats are in the order of magnitude.
         bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
         keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
         rows = super()._rows(keys, places, values, side)
@@ -497,8 +494,8 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Mask of points that are not completely hidden: the surface of a large body."""
-        # An adjacent cell lies within a point's circle, which lies within three cells.
+        """Return a mask of points that are not completely hidden, such as the surface of a body."""
+        # The circle of a point covers the adjacent cells, and lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5
         if not cell > 0 or np.prod((high - low) / cell) > MOST_CELLS:
@@ -511,7 +508,7 @@ class SpacePicture(PlanePicture):
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
             for x in bodies
         ]
-        groups = []  # lines of each tool as projected, heights, and what it hides
+        groups = []  # by tool: projected lines, their heights, the surface that hides others
         for front in fronts:
             if lines := front.outlines():
                 seen = np.concatenate(lines)
@@ -520,7 +517,7 @@ class SpacePicture(PlanePicture):
             if not (lines := list(tool.lines(self.lo, self.hi))):
                 continue
             at = np.concatenate(lines)
-            # The tool is nearer to the eye where it hides its far side.
+            # Lines on the far side are hidden by the tool itself.
             nearer = at + 0.01 * np.linalg.norm(np.ptp(at, axis=0)) * self.view[2]
             *places, height = self._project(at).T
             groups.append((lines, np.transpose(places), height, tool.depth(nearer) > 0))
@@ -541,7 +538,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Light on `some` points; a surface faces the side with fewer points."""
+        """Return the light on `some` points; the normal points to the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

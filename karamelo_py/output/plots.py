@@ -95,7 +95,7 @@ def _over_one_axis(
 
 
 def blank_figure(width: float, height: float) -> Any:
-    # takes 0.3 s
+    # the import takes 0.3 s
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -105,12 +105,12 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """Format lead x 10^exponent; `lead` is omitted if 1."""
+    """Format lead x 10^exponent; a `lead` of 1 is omitted."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Format numbers of an axis alike: 0.02, 500, or 10^-7, 3·10^-7."""
+    """Format all numbers of an axis in one way: as 0.02, 500, or as 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 

@@ -56,7 +56,7 @@ class Rows(NamedTuple):
     parts: list[Part]
     ids: np.ndarray
     present: np.ndarray
-    comm: Any = None  # of the processes with parts of the table
+    comm: Any = None  # communicator of the processes that have parts of the table
 
     def of_all(self, local: list[tuple]) -> Iterator[tuple]:
         if self.comm is None:
@@ -65,7 +65,7 @@ class Rows(NamedTuple):
             yield from (one for of_rank in self.comm.allgather(local) for one in of_rank)
 
     def take(self, of: Callable[[Points], np.ndarray]) -> np.ndarray:
-        """Gather a field; zero for deleted points."""
+        """Return a field, with zeros for deleted points."""
         local = [(piece.places, piece.taken(of(piece.block.points))) for piece in self.parts]
         field = np.zeros((*local[0][1].shape[:-1], len(self.ids)), local[0][1].dtype)
         return self._filled(field, local)
@@ -80,9 +80,9 @@ class Rows(NamedTuple):
             of(block.points)[..., slice(None) if rows is None else rows] = values[places].T
 
     def declared(self, kind: type) -> np.ndarray | None:
-        """A declared field (n, components), with initial values where laws lack it.
+        """Return a declared field (n, components), or None if no block stores it.
 
-        None if no block stores it.
+        Points whose law lacks the field have its initial values.
         """
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
@@ -92,11 +92,11 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Values (n, *columns) of ``of(laws)(matter, rows)``; 0 where it is None."""
+        """Return values (n, *columns) of ``of(laws)(matter, rows)``; 0 if ``of(laws)`` is None."""
         local, s = [], self.s
         for piece in self.parts:
             points = known_to_laws(piece.points)
-            # Empty arrays have another type, which would be compiled again.
+            # Not for empty arrays, whose different type would be compiled again.
             if len(points.id) and (fill := of(piece.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(Matter(s.kin, points, piece.block.laws), rows)
@@ -105,7 +105,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Arrays (copies; 0 for deleted points) and columns of points in order."""
+    """Arrays and columns of points in order of ids: copies, with 0 for deleted points."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -113,19 +113,19 @@ class PointTable:
         self._cache: dict[str, np.ndarray] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], np.ndarray]) -> np.ndarray:
-        rows = self._rows  # clears the cache after a step
+        rows = self._rows  # this access clears the cache after a step
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
 
     @property
     def numbers(self) -> np.ndarray:
-        """Numbers (n,) from 0."""
+        """Numbers (n,) of points, from 0."""
         return self._rows.ids
 
     @property
     def ids(self) -> np.ndarray:
-        """Ids (n,) from 1, as in dumps."""
+        """Ids (n,) of points, from 1, as in dumps."""
         return self.numbers + 1
 
     @property
@@ -134,7 +134,7 @@ class PointTable:
 
     @property
     def present(self) -> np.ndarray:
-        """Mask (n,), False for deleted points."""
+        """Mask (n,) that is False for deleted points."""
         return self._rows.present
 
     @property
@@ -169,9 +169,9 @@ class PointTable:
 
     @property
     def velocity_moment(self) -> np.ndarray | None:
-        """Sums N v (X - x), (n, d d), for transfers that store them, else None.
+        """Sums of N v (X - x), (n, d d), if the transfer stores them; otherwise None.
 
-        In present coordinates: in the total frame, the arms X - x are F times the reference arms.
+        X - x are present vectors: in the total frame, F times the reference vectors.
         """
         rows = self._rows
         have = [
@@ -192,7 +192,7 @@ class PointTable:
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """A column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
+        """Return a column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -212,7 +212,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # In 2D the fourth component is 12, as in 3D.
+        # Component 12 is the fourth in 2D, too.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -244,13 +244,13 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """Columns that are 1 for the points of a group or solid, else 0."""
+    """Return names of groups and solids, as columns that are 1 for their points, else 0."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
-    """1 for points (0-based, (n,)) of a group or solid, else 0."""
+    """Return (n,): 1 for points `numbers` that are in a group or solid, 0 for others."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -266,9 +266,9 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Velocities (d, n) at the time of positions if rates are stored.
+    """Return velocities (d, n), at the time of positions if points store accelerations.
 
-    Otherwise they are half a step earlier.
+    Otherwise velocities are half a step earlier.
     """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
@@ -336,15 +336,12 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 
 
 def _total_stress(k: int, table: PointTable) -> np.ndarray:
-    """Stress of soil and water (n,).
-
-    The fraction of p that acts is the saturation (Bishop 1959).
-    """
+    """Return the stress (n,) of soil and water; p is weighted by saturation (Bishop 1959)."""
     load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
     return table._exported[:, k] - load
 
 
-# None: only with certain materials or fields; else 0, as in Karamelo.
+# None: only with certain materials or fields; otherwise 0, as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,

@@ -15,11 +15,11 @@ PER_POINT = frozenset(POINT_SEEDS)
 
 
 class Quantity:
-    """A word (``dt``), script variable, published value (``v_x``) or `formula` (``Ek + Es``)."""
+    """A quantity by its word (``dt``), script variable, published value (``v_x``) or formula."""
 
     script_kind = "a quantity"
 
-    words = False  # allow ``limit``, which is text
+    words = False  # whether ``limit``, which is text, is allowed
 
     def __init__(self, hub: Scene, name: str, formula: Value | None = None):
         self.hub = hub
@@ -71,7 +71,7 @@ class Quantity:
         return KEYWORDS.get(self.name, "".join(self.name.split()))
 
     def read(self) -> float | int | str:
-        """Return the number or word; the first NaN is reported."""
+        """Return the number or word; warn of the first NaN."""
         if self.is_word:
             return self.hub.simulation.ruling_limit
         source = self._source()
@@ -89,7 +89,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Look up the source again, as a script may redefine a variable between runs."""
+        """Look up the name again, since a script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula
@@ -107,7 +107,7 @@ class Quantity:
 class Caption:
     """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
-    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathtext in dollars
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathematics between dollar signs
 
     def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}

@@ -1,6 +1,7 @@
 """The record of a script's runs: run.json next to the log (fields: docs/run-record.md).
 
-Banner and closing table are printed from it; studies read it. Numbers that are not finite are null.
+The banner and the closing table are printed from the record, and studies read it. Numbers that are
+not finite are null.
 """
 
 import hashlib
@@ -53,7 +54,7 @@ def processor() -> str:
 class RunRecord:
     def __init__(self) -> None:
         self.path: Path | None = None
-        self.is_asked_for = False  # also for a script that ends before its first run
+        self.is_asked_for = False  # even if the script ends before its first run
         self.content: Json = {"schema": SCHEMA, "status": "running"}
         self.runs: list[Json] = []
         self.messages: list[Json] = []
@@ -63,7 +64,7 @@ class RunRecord:
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
         of_content = None
         with suppress(OSError):
-            if Path(file).is_file():  # a pipe can be read only once
+            if Path(file).is_file():  # not a pipe, which can be read only once
                 of_content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.content["script"] = {
             "file": str(file),
@@ -97,7 +98,7 @@ class RunRecord:
             self._note("error", error.sentence, error.mark, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
-        # In Python each command ends here; few change anything.
+        # From Python, this is called after every command, few of which change the record.
         if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
@@ -118,7 +119,7 @@ class RunRecord:
             "messages": self.messages,
             **surroundings(),
         }
-        with suppress(ScriptError):  # other output reports a full disk
+        with suppress(ScriptError):  # errors such as a full disk are reported by other output
             write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
 
 

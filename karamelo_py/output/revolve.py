@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 FRAME = {"11": (0, 0), "22": (1, 1), "33": (2, 2), "12": (0, 1), "13": (0, 2), "23": (1, 2)}
-# Vectors by their names in 3D: components along radius, axis and around it (None: 0).
+# For vectors, by their names in 3D: columns along radius, axis and circumference (None: 0).
 VECTORS = {
     ("x", "y", "z"): ("x", "y", None),
     ("x0", "y0", "z0"): ("x0", "y0", None),
@@ -17,10 +17,10 @@ VECTORS = {
 def revolved(
     names: tuple[str, ...], column: Callable[[str], np.ndarray], angle: float
 ) -> list[np.ndarray]:
-    """Columns (n,) of a copy at an angle from x to z, in 3D.
+    """Return columns (n,) of a copy at an angle from x to z, in 3D.
 
-    `column` gives the columns of the half plane. Positions and tensors also rotate by twist;
-    reference positions do not.
+    `column` returns the columns of the half plane. Positions and tensors are also rotated by the
+    angle of twist, reference positions are not.
     """
     made: dict[str, np.ndarray] = {}
     twist = column("twist")

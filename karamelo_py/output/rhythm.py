@@ -15,17 +15,14 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step from each multiple of `span` on.
-
-    `passed` counts the multiples written.
-    """
+    """Output at the first step at or after each multiple of `span`, of which `passed` are done."""
 
     def __init__(self, span: float):
         self.span = span
         self.passed = -1
 
     def now(self, time: float) -> int:
-        """Number of multiples up to `time`, allowing for round-off."""
+        """Return the number of multiples up to `time`, allowing for round-off."""
         return floor(time / self.span * (1 + 1e-12) + 1e-9)
 
 
@@ -33,14 +30,14 @@ class Rhythmic:
     remembers: tuple[str, ...] = ("last_step", "passed")
     every: int | ByTime
     last_step: int | None = None
-    style = ""  # of a dump
+    style = ""  # style of a dump
     mark: Mark | None = None
 
     def write(self) -> None:
         raise NotImplementedError
 
     def take_part(self) -> None:
-        """Write on a rank other than 0."""
+        """Called instead of `write` on ranks other than 0."""
         self.write()
 
     def finish(self) -> None:
@@ -81,9 +78,10 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """First step that may be due.
+    """Return the first step that may be due.
 
-    Unless `fixed`, it is after half of a longer interval, as steps may grow.
+    For an interval in time, and unless dt is `fixed`, it is only half as far as dt predicts, since
+    steps may become longer.
     """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every

@@ -20,9 +20,8 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    The first and last state of every run are due, and multiples of `every` in absolute steps or
-    time, so that further runs continue the sequence. No state is written twice to a file, and
-    nothing in a rehearsal.
+    The first and last state of every run are due, and states at multiples of `every`, in steps or
+    time since the start of the scene. No state is written twice to a file, or in a rehearsal.
     """
 
     def __init__(self, hub: Scene):
@@ -85,7 +84,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due, or with `last` everything not yet written."""
+        """Write what is due; at the `last` state of a run, all that has not been written yet."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -118,7 +117,7 @@ class Output:
                 item.finish()
 
     def abort(self) -> None:
-        """Complete plots, dumps and log of an aborted run; errors become warnings."""
+        """Complete plots, dumps and log of an aborted run, with warnings instead of errors."""
         if self.hub.rehearsing:
             return
         try:
@@ -167,7 +166,7 @@ def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """True if `path`, whose first ``*`` becomes a number, can name the file `other`."""
+    """Return whether `path`, whose first ``*`` becomes a number, can be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -14,7 +14,7 @@ from karamelo_py.output.hdf5_file import reading
 from karamelo_py.output.units import LENGTHS, Units
 from karamelo_py.script.errors import ScriptError
 
-TEXTS = ("element", "typelabel")  # columns of LAMMPS
+TEXTS = ("element", "typelabel")  # columns of LAMMPS that are texts
 
 
 class Snapshot(NamedTuple):
@@ -39,7 +39,7 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
         yield from reader(path, first)
     except ScriptError:
         raise
-    except Exception as error:  # of many kinds, for damaged files
+    except Exception as error:  # damaged files raise exceptions of many kinds
         reason = error.strerror if isinstance(error, OSError) else None
         raise ScriptError(
             f"{path} cannot be read: {reason}"
@@ -81,13 +81,13 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                 yield Snapshot(step, time, columns, *box.T, named)
             elif item[0] == "UNITS":
                 words = file.readline().split()
-                units = Units(*words) if words[0] in LENGTHS else None  # LAMMPS has other names
+                units = Units(*words) if words[0] in LENGTHS else None  # others are LAMMPS's
             else:
                 file.readline()
 
 
 def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
-    """Add id, type and x, y, z from LAMMPS's unwrapped (xu) or scaled (xs) columns."""
+    """Add id, type and x, y, z, if necessary from unwrapped (xu) or scaled (xs) positions."""
     count = len(next(iter(columns.values()), ()))
     columns.setdefault("id", np.arange(1.0, count + 1))
     columns.setdefault("type", np.ones(count))

@@ -1,9 +1,9 @@
-"""Tables of numbers as text, the bytes of ``"%.9g" % x`` and ``"%d" % n``.
+"""Tables of numbers as text, with the bytes of ``"%.9g" % x`` and ``"%d" % n``.
 
-The nine digits of x are digits of x 10^k, in twice the precision of a double. They are undecided
-within `DOUBT` of a tie unless 10^k is exact (0 <= k <= 22). Python formats undecided and extreme
-numbers, and all without compilation or on big-endian machines. Surplus digits are overwritten,
-since mispredicted branches cost more.
+The nine digits of x are the digits of x 10^k, computed in twice the precision of a double. Within
+`DOUBT` of a tie they are undecided, unless 10^k is exact (0 <= k <= 22). Python formats undecided
+and extreme numbers, and all numbers without compilation or on big-endian machines. Surplus digits
+are written and overwritten, which is faster than branches.
 """
 
 import sys
@@ -22,10 +22,10 @@ NUMBER_BYTES = 32
 
 DIGITS = 9
 DOUBT = 1e-12
-EXACT = 22  # largest power of ten that a double holds
+EXACT = 22  # largest power of ten that is exact in double precision
 SMALLEST, LARGEST = 1e-280, 1e280
 LARGEST_INTEGER = 2**62
-FIRST = -280  # number of powers in POWERS
+FIRST = -280  # exponent of the first power in POWERS
 
 
 def _power(k: int) -> tuple[float, float]:
@@ -42,7 +42,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Yield rows as text in blocks: integers, the rest with nine significant digits."""
+    """Yield rows as text in blocks: integers, and other numbers with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))
@@ -70,10 +70,10 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(table, start, text, at):
     """Write rows up to the first number that Python must format.
 
-    Returns the index of that number, or the count, and the end of the text. `table` has the numbers
-    (rows, columns), the same memory as integers, and a mask of integer columns. `start` is the
-    index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and continues
-    at `at`.
+    Returns the index of this number (or the count), and the end of the text. `table` consists of
+    the numbers (rows, columns), the same memory as integers, and a mask of integer columns. `start`
+    is the index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and is
+    written from `at` on.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -109,7 +109,7 @@ def _put_integer(text, at, n):
 
 
 def _put_number(text, at, x, bits):
-    """Write nine significant digits and return their end, or `at` if undecided."""
+    """Write nine significant digits; return the end of the text, or `at` if they are undecided."""
     begin = at
     text[index(at)] = MINUS
     at += (bits < 0) & (x == x)
@@ -153,9 +153,9 @@ def _put_number(text, at, x, bits):
 
 
 def _decimal(x, binary):
-    """Nine digits of x > 0 as an integer (0 if undecided), and the power of ten of the first.
+    """Return nine digits of x > 0 as an integer (0: undecided), and the exponent of the first.
 
-    `binary` is the power of two of x.
+    `binary` is the exponent of two of x.
     """
     exponent = binary * 315653 >> 20  # log10(2) * 2^20
     exponent += x >= POWERS[index(exponent + 1 - FIRST), 0]
@@ -173,7 +173,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """The eight digits of n < 10^8, by halves, quarters, eighths."""
+    """Return the eight digits of n < 10^8 as bytes, by halving the number three times."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

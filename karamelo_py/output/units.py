@@ -25,7 +25,7 @@ DENSITY, VELOCITY, STRESS = Powers(-3, 1), Powers(1, 0, -1), Powers(-1, 1, -2)
 FORCE, ENERGY = Powers(1, 1, -2), Powers(2, 1, -2)
 NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
 
-# Columns of dumps and words of the log.
+# Dimensions of columns of dumps and words of the log.
 COLUMNS = {
     r"[xyz]0?": LENGTH,
     r"v[xyz](_update)?": VELOCITY,
@@ -89,8 +89,8 @@ def time_text(time: float, unit: str) -> str:
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
     """Return the factor and name of a metric unit that suits `size`, given in `unit`.
 
-    It is the largest metric unit in which `size` is at least 0.1, or else the smallest. `unit`
-    stays, with the factor 1, for a size of 0 or from 0.1 to 10^4, and if it is not metric.
+    It is the largest metric unit in which `size` is at least 0.1, or else the smallest. `unit` is
+    returned with the factor 1 for a size of 0 or from 0.1 to 10^4, and if it is not metric.
     """
     metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
     if unit not in metric or not size or 0.1 <= size < 1e4:

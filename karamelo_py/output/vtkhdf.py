@@ -15,10 +15,10 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write `path` with the ending .vtkhdf: positions, columns and vectors of its points.
+    """Write a file of the name `path` with the ending .vtkhdf, for the points of the dump `path`.
 
-    The file has no data, only views of the dump. VTK does not draw deleted points, whose positions
-    are NaN.
+    It has no data, only views of positions, columns and vectors in the dump. VTK does not draw
+    deleted points, whose positions are NaN.
     """
     import h5py
 
@@ -32,7 +32,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
 
         def virtual(group: h5py.Group, name: str, parts: Sequence[str]) -> None:
             layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
-            layout.dcpl.set_obj_track_times(False)  # equal runs write equal files
+            layout.dcpl.set_obj_track_times(False)  # so that equal runs write equal files
             for k, component in enumerate(parts):
                 if component in columns:
                     source = h5py.VirtualSource(path.name, component, (steps, count), float)
@@ -59,7 +59,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
             cells = top.create_group(kind)
             n = count if kind == CELLS[0] else 0
             cells["NumberOfCells"] = cells["NumberOfConnectivityIds"] = [n]
-            if n:  # 0, 1, ... n: ids of points begin with 1
+            if n:  # the numbers 0, 1, ... n; ids of points begin with 1
                 numbers(cells, "Offsets", "id", 1)
                 numbers(cells, "Connectivity", "id", 1)
             else:

@@ -10,8 +10,8 @@ from karamelo_py.schemes.traits import SchemeTraits
 class MUSL(NamedTuple):
     """Update the stress after the forces, with the new velocity mapped to the nodes again.
 
-    The second mapping makes velocity gradients at nodes with very little mass harmless. The
-    default; conserves energy well.
+    The second mapping makes velocity gradients at nodes with very little mass harmless. This scheme
+    is the default and conserves energy well.
 
     Example
     -------

@@ -1,4 +1,4 @@
-"""Newmark: implicit time steps with inertia, and the backward Euler rule."""
+"""Newmark's implicit time steps with inertia, and the backward Euler rule."""
 
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -26,22 +26,23 @@ def _damping(scheme: "Newmark") -> str:
 class Newmark(NamedTuple):
     """Implicit time steps with inertia, longer than waves allow (Newmark 1959).
 
-    `set_dt` sets the step. Unresolved vibrations are undamped unless `gamma` is above 1/2, `rho`
-    below 1, or the rule euler. The initial acceleration of a step follows from the forces, with
-    `rho` from the rule.
+    The step must be set by `set_dt`. Vibrations faster than the step are damped only if `gamma` is
+    above 1/2, `rho` below 1, or the rule euler. The acceleration at the beginning of a step is
+    computed from the forces; with `rho`, points store a part of it.
 
     Parameters
     ----------
     beta, gamma
-        Coefficients for displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'), v' =
-        v + dt ((1 - gamma) a + gamma a'). The defaults, 1/4 and 1/2, are the trapezoidal rule,
-        which conserves the energy of linear bodies. Gamma above 1/2 damps, high frequencies most.
+        Coefficients of displacement and velocity: u = dt v + dt^2 ((1/2 - beta) a + beta a'), v' =
+        v + dt ((1 - gamma) a + gamma a'), with primes at the end of the step. The defaults, 1/4 and
+        1/2, are the trapezoidal rule, which conserves the energy of linear bodies. Values of gamma
+        above 1/2 damp vibrations, fast ones most.
     rule
         ``newmark``, or ``euler``: backward Euler, which damps all vibrations.
     rho
         High-frequency spectral radius of generalized-alpha (Chung & Hulbert 1993): the fraction of
-        vibrations much faster than the step that remains after it. Slow vibrations are hardly
-        damped. 1: no damping; 0: fast ones vanish in one step.
+        the amplitude of vibrations much faster than the step that remains after a step, from 1 (no
+        damping) to 0. Slow vibrations are hardly damped.
     tolerance, iterations, solver, stabilisation
         As in quasi-static.
 
@@ -75,8 +76,8 @@ class Newmark(NamedTuple):
 
     @property
     def alphas(self) -> tuple[float, float]:
-        """Return the fractions of the old accelerations and forces in a step."""
-        # At radius 1 both are 1/2, and balance at the end follows from balance at the start.
+        """Return the weights of accelerations and forces at the beginning of a step."""
+        # For rho = 1 both would be 1/2, and balance at the start gives balance at the end.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property

@@ -1,4 +1,4 @@
-"""Quasi-static: load steps in equilibrium, each by Newton's method."""
+"""Quasi-static scheme: load steps that end in equilibrium, found by Newton's method."""
 
 from typing import Annotated, Literal, NamedTuple
 
@@ -7,7 +7,7 @@ from karamelo_py.kernels.equations.strain import StrainOfLoadStep
 from karamelo_py.language.signature import ByName, Constraint, Keyword, NonNegative, Positive
 from karamelo_py.schemes.traits import IMPLICIT, SchemeTraits
 
-# stages: nodal loads from the present stress, constraints, motion of the points
+# Stages: nodal loads and forces of the present stress, constraints, motion of the points.
 BEGIN = (
     table.AtPoints(arrays.INITIAL_INTEGRATE, 0),
     table.SUMS,
@@ -22,11 +22,11 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# of the last step: corrections, residual fraction of forces, substeps
+# Of the last step: number of corrections, residual over forces, number of substeps.
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# A larger tolerance accepts the first correction without equilibrium; a smaller one is below
+# A larger tolerance would accept the first correction without equilibrium; a smaller one is below
 # round-off.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
@@ -34,25 +34,25 @@ Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.0
 class QuasiStatic(NamedTuple):
     """Load steps without inertia: each ends in equilibrium, found by Newton's method.
 
-    `time` is only a load parameter: loads are formulas of it. The tangent is exact for every law
+    Loads are formulas of `time`, which is only a load parameter. The tangent is exact for every law
     and basis, so convergence is quadratic. A step that does not converge is subdivided.
 
     Parameters
     ----------
     tolerance
-        Residual over nodal forces at the end of a step: from 1e-14 to 0.01.
+        Residual over nodal forces at which a step has converged, from 1e-14 to 0.01.
     iterations
-        Number of corrections before a step is halved.
+        Number of corrections after which a step that has not converged is halved.
     solver
         Linear solver: ``direct``, ``amg`` (conjugate gradients with algebraic multigrid), or
-        ``auto``: amg from 5000 unknowns in 2D if the matrix is symmetric, and from 2000 in 3D.
+        ``auto``: amg from 2000 unknowns in 3D, and from 5000 in 2D if the matrix is symmetric.
     stabilisation
-        Ghost stabilisation (Coombs 2023): penalises gradient jumps at the border of a body with
-        this fraction of Young's modulus, for nodes that overlap only a sliver of it. 0: none.
+        Ghost stabilisation (Coombs 2023) for nodes that overlap only a sliver of the body: jumps of
+        gradients at the border are penalised with this fraction of Young's modulus. 0: none.
     limit
-        Action without equilibrium even in 1/1024 of a step: raise an ``error``, or end the run
-        (``stop``). After ``stop`` the script continues with `time` of the last equilibrium, which
-        gives the limit load.
+        Action if no equilibrium is found even with 1/1024 of a step: ``error``, or ``stop``, which
+        ends the run. After ``stop``, the script continues with the `time` of the last equilibrium,
+        which gives the limit load.
 
     Example
     -------

@@ -9,7 +9,7 @@ DEFAULT_SHARE = 0.9  # fraction of the stable step
 
 IMPLICIT = Restrictions(
     "implicit", "an explicit scheme, scheme(musl)",
-    only={"transfer": ("FLIP", "PIC")},  # points move by increments
+    only={"transfer": ("FLIP", "PIC")},  # positions are changed by increments
     without=("single", "ranks", "gpu"), but={"reflect": "fix velocity_nodes"},
 )  # fmt: skip
 
@@ -17,24 +17,24 @@ IMPLICIT = Restrictions(
 class SchemeTraits(NamedTuple):
     """Traits of a scheme; a plug-in sets those that differ from the defaults."""
 
-    # Newton's method solves each step
+    # each step is solved by Newton's method
     implicit: bool = False
     restrictions: Restrictions | None = None
     inertia: bool = True
     # stable step in h/c with two points per cell and direction, and with one
     courant: tuple[float, float] = (1.0, 1.0)
-    # Fractions of the stable step that conserve a drifting body's energy with (2, 1) points per
-    # cell: smooth gradients, gradient jumps, nodes within cells. None: drift adds no energy.
+    # Fractions of the stable step up to which a drifting body gains no energy, for 2 and 1 points
+    # per cell, by basis: smooth gradients, gradient jumps, nodes within cells. None: any step.
     keeping: tuple[tuple[float, float], ...] | None = None
-    # fraction of a step's strain before the forces
+    # fraction of the strain increment that precedes the forces
     strained_before: float = 0.0
-    # maps the moved points' velocity to the nodes again
+    # maps velocities to nodes again after the points have moved
     maps_velocity_again: bool = False
-    # scheme for steps in which fixes move deformable points; None: this one
+    # scheme for steps in which fixes prescribe velocities of deformable points; None: this one
     leading: Any = None
-    # drifting bodies gain no energy
+    # a drifting body never gains energy
     bears_drift: bool = False
-    # damps vibrations, with two points per cell and direction
+    # vibrations are damped, with two points per cell and direction
     damps: bool = False
-    # names the parameters that damp vibrations
+    # returns the parameters that damp vibrations, as text
     damping: Callable[[Any], str] = lambda scheme: ""

@@ -10,12 +10,13 @@ from karamelo_py.schemes.traits import SchemeTraits
 class USF(NamedTuple):
     """Update the stress before the forces, with the nodal velocity at the start of the step.
 
-    That velocity has already moved the points, so F grows by (I - dt grad v)^-1 at present
-    positions. The published I + dt grad v gains energy and shrinks rotating bodies.
+    Points have already moved with this velocity, so F is multiplied by (I - dt grad v)^-1, with
+    gradients at present positions. The published I + dt grad v adds energy, and rotation shrinks
+    bodies.
 
-    The log shows stress, volume and strain at the beginning of a step (with usavg, half of the
-    increment). With rate-form laws, a rotation by w dt in a step compresses by (w dt)^2/2, as with
-    musl; usavg halves this error.
+    The log shows stress, volume and strain at the beginning of a step (usavg: with half of the
+    increment). With rate-form laws, a rotation by w dt in a step causes a volume strain of -(w
+    dt)^2/2, as in musl; usavg halves this error.
 
     Example
     -------

@@ -17,17 +17,17 @@ LIMITED = NodeTask(UpdateToVelocity, make=light_node)
 class USL(NamedTuple):
     """Update the stress after the forces, with the gradient of the updated nodal velocity.
 
-    The fastest scheme: one pass over the points per step. Slightly dissipative.
+    This is the fastest scheme, with one pass over the points per step. It is slightly dissipative.
 
-    The stable step is 0.65 h/c, 0.4 h/c with one point per cell, and 0.7 times that with
-    bernstein-quadratic. Some nodal modes do not appear in point velocities. Their strain follows e
-    <- (1 - (w dt)^2) e, which is stable for w dt < sqrt(2) instead of 2.
+    The stable step is 0.65 h/c, or 0.4 h/c with one point per cell; with bernstein-quadratic it is
+    30 % shorter. Points do not retain the velocity of some nodal modes, whose strain is multiplied
+    by 1 - (w dt)^2 in each step: stable for w dt < sqrt(2) instead of 2.
 
-    A node with almost no mass gets a large velocity. If its mass is below the mean mass of the
-    points around it times d (c dt / h)^2 (at most 1), its velocity change enters the gradient
-    scaled by mass / limit. Momentum is conserved.
+    A node with almost no mass may get a large velocity. If its mass is below a limit, the mean mass
+    of the points around it times d (c dt / h)^2 (at most 1), its velocity change is multiplied by
+    mass / limit in the velocity gradient. Momentum is conserved.
 
-    With fix velocity_particles on deformable points, usl runs as musl.
+    With fix velocity_particles on deformable points, musl is used instead of usl.
 
     Example
     -------
@@ -75,11 +75,11 @@ known_failure(
 
 
 class USLUnlimited(NamedTuple):
-    """usl as first published, without usl's limit for nodes of small mass.
+    """Scheme usl as first published, without a limit for nodes of small mass.
 
     A point that has just entered a cell gives the far node almost no mass m but a finite force f.
-    The velocity change f dt / m of that node is then huge, and so is the strain increment that the
-    point gets back. This scheme is meant for comparison with usl.
+    The velocity change f dt / m of that node, and the strain increment that the point gets from it,
+    are then huge. This scheme is meant for comparison with usl.
 
     Example
     -------

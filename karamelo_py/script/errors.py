@@ -24,22 +24,22 @@ class Mark(NamedTuple):
 
 
 class NoItem(KeyError):
-    """A missing item, whose text is the whole message."""
+    """A KeyError for a missing item that is printed without quotes."""
 
     def __str__(self) -> str:
         return self.args[0]
 
 
 class Quit(Exception):
-    """The script ends normally."""
+    """Raised where the script ends normally."""
 
 
-# Also raised by exit(), which would end the program silently.
+# SystemExit is raised by exit(), which would end the program silently.
 FAILURES = (Exception, SystemExit)
 
 
 class Pause(Exception):
-    """The script pauses before a run."""
+    """Raised where the script pauses before a run."""
 
 
 @dataclass(eq=False, repr=False)
@@ -49,14 +49,14 @@ class ScriptError(Exception):
     Parameters
     ----------
     message
-        What is wrong, in one sentence without a full stop.
+        Description of the mistake in one sentence, without a full stop.
     argument
         Name or index of the wrong argument (from 0; negative from the last one without a name);
         `karamelo_py.language.signature.call` converts it to a mark.
     expected
-        What would be correct.
+        A correct argument or form.
     hint
-        What to write instead.
+        Fix, such as a line to write instead.
     """
 
     message: str
@@ -65,13 +65,13 @@ class ScriptError(Exception):
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
-    # Prepended to the message.
+    # A command, and marks of included files, that precede the message.
     command: str | None = None
     included: list[Mark] = field(default_factory=list)
     others: "list[ScriptError]" = field(default_factory=list)
     # The correct statements, for syntax errors.
     statements: list = field(default_factory=list)
-    # Kind of message (codes.toml), wrong word, kind of its target, similar known name.
+    # Kind of message (codes.toml); wrong word, kind of part it names, similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""
@@ -79,7 +79,7 @@ class ScriptError(Exception):
     # Likely cause and the command that resumes, for failed runs.
     cause: str = ""
     resume: str = ""
-    # callers add nothing further
+    # callers do not add to the message
     complete: bool = False
 
     def __str__(self) -> str:
@@ -134,7 +134,7 @@ def _marked(mark: Mark) -> list[str]:
         start += (3 if cut else 0) - cut
         length = min(length, max(end - cut - start, 1))
         text = shown
-    # Tabs are copied to align the carets for any tab width.
+    # Tabs are copied, so that carets are aligned for any tab width.
     before = "".join(c if c == "\t" else " " * _width(c) for c in text[:start].ljust(start))
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
     number = str(mark.line)
@@ -158,7 +158,7 @@ def meant(name: str, names: Iterable[str]) -> str | None:
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """List ``one of a, b, c``; of many, the nearest and where to find all."""
+    """Return ``one of a, b, c``; if they are many, the nearest one and where all are listed."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -201,13 +201,13 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     for candidate in names:
         if candidate.lower() == lowered and candidate != name:
             return candidate
-    # A longer name does not misspell a short one: Ek_s is not Es.
+    # A short name is not suggested for a longer one: Ek_s does not mean Es.
     candidates = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     for word, among in (name, {n: n for n in candidates}), (lowered, by_lower):
         if close := difflib.get_close_matches(word, among, n=1, cutoff=0.6):
             return among[close[0]]
-    # Part of a name: cubic for cubic-spline.
+    # Suggest a name by a part of it: cubic-spline for cubic.
     by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))

@@ -23,8 +23,8 @@ REWRITTEN: dict[str, Callable[..., Expression]] = {
     "inv_norm": lambda a: _inverse_normal(a),
 }
 
-# Numerators and denominators, highest power first, of Wichura's algorithm AS 241 (1988) for the
-# inverse normal distribution: in the middle, and in the tails.
+# Inverse normal distribution in the middle and in the tails (Wichura 1988, algorithm AS 241):
+# coefficients of numerator and denominator, highest power first.
 _MIDDLE = (
     (
         2509.0809287301226727, 33430.575583588128105, 67265.770927008700853, 45921.953931549871457,
@@ -107,7 +107,7 @@ def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> 
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
-        # Short-circuit: a != 0 && 1/a > 2 is fine.
+        # Short-circuit evaluation, so that a != 0 && 1/a > 2 is no error.
         return 1.0 if left != 0 else 0.0
     right = evaluate(node.right, raw, scope)
     if isinstance(left, str) or isinstance(right, str):

@@ -1,6 +1,7 @@
 """Numbers, texts, and formulas.
 
-Operations with a position, time or published value give formulas, with constants folded.
+Operations with a position, time or published value give formulas; operations on constants are
+carried out at once.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
 _MAX_SIZE = 20000
-CHUNK = 1 << 18  # points per evaluation
+CHUNK = 1 << 18  # points that are evaluated at a time
 
 
 class Expression:
@@ -42,7 +43,7 @@ class Expression:
         self.value: Any = float(value) if operation == "number" else value
         seeds = {value} if operation == "name" else ()
         self.names: frozenset[str] = frozenset(seeds).union(*(one.names for one in operands))
-        # Counts common operations repeatedly.
+        # Common operands are counted each time.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:
             self.size = len(terms.in_order(self))
@@ -88,7 +89,7 @@ class Expression:
         return terms.alike(self, other)
 
     def evaluate(self, values: Values) -> float:
-        """Present number; raises ScriptError for a formula of positions."""
+        """Return the present value; raises ScriptError for a formula of positions."""
         needed = self.names.intersection(POINT_SEEDS)
         if needed:
             message = f"'{self.text}' depends on {min(needed)}, which differs from point to point"
@@ -107,14 +108,14 @@ class Expression:
     def evaluate_points(
         self, values: Values, x: np.ndarray, x0: np.ndarray | None = None
     ) -> np.ndarray:
-        """Values (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
+        """Return values (n,) at `x` (n, 1 to 3), with initial positions `x0` (default: `x`)."""
         if not self.names.intersection(POINT_SEEDS):
             return np.full(len(x), self.evaluate(values))
 
         out = np.empty(len(x))
         scratch = np.empty((6 + ROWS, BLOCK))
         program = self.program(values)
-        # In chunks: three-column copies of millions of points take much memory.
+        # In chunks, since three-column copies of millions of points take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])

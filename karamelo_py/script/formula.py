@@ -1,7 +1,8 @@
 """Formulas as stack programs over blocks of points.
 
-The evaluator loops over a block for each operation. Instructions with the flag `UNIFORM` compute a
-value common to the block, which `SPREAD` expands. Common subexpressions are rows after the stack.
+The evaluator loops over a block of points for each operation. Instructions flagged `UNIFORM`
+compute one value for a block, and `SPREAD` expands it. Rows past the stack are common
+subexpressions.
 """
 
 from typing import NamedTuple
@@ -12,14 +13,14 @@ from karamelo_py.compiler import kernel, noinline
 from karamelo_py.compiler.programs import BLOCK, MAX_DEPTH, STACK
 from karamelo_py.script.operations import FIRST_BINARY, SELECT, numbered, of_one, of_two
 
-# Flag: done once for the whole block.
+# Flag of an instruction that is carried out once for the whole block.
 UNIFORM = 1 << 16
 
-# Pushed operands: a constant, a published value, a row of `points` (x y z x0 y0 z0).
+# Push a constant, a published value, or a row of `points` (x y z x0 y0 z0).
 CONSTANT, GLOBAL, POINT = 0, 1, 2
-# Expand the number at `operand` below the top to a row.
+# Expand the number that is `operand` below the top of the stack to a row.
 SPREAD = 3
-# Pop the top into stored row `operand`; push that row.
+# Pop the top into the stored row `operand`; push this row.
 KEEP, KEPT = 150, 151
 
 
@@ -43,7 +44,7 @@ def _select(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# Functions with separate loops; the rest select for each number in one loop.
+# Functions with a loop each; one loop for all others selects the function per number.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")
@@ -75,7 +76,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise `n` numbers of `a` as `_power` does, branch-free if exponents agree."""
+    """Raise `n` numbers of `a` as `_power` does, without branches if exponents are equal."""
     power = b[0]
     same = True
     for i in range(n):
@@ -142,7 +143,7 @@ def evaluate(program, globals_, points, count, out, stack):
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
     """Evaluate code[begin:end] with constants[first:last].
 
-    The first rows of `scratch` are the points, the last the stack; results go to row `result`.
+    The first rows of `scratch` are points, the last rows the stack; row `result` gets results.
     """
     program = Program(code[begin:end], constants[first:last])
     evaluate(program, globals_, scratch[:6], count, scratch[result], scratch[STACK:])

@@ -9,9 +9,9 @@ from karamelo_py.script.operations import BINARY, UNARY, quietly
 
 CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.57721566490153286}
 WORDS = frozenset({"NULL", "INF", "EDGE"})
-# Functions that cannot name variables; other names were free in Karamelo.
+# Functions whose names cannot be variables; Karamelo allows all other names.
 RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})
-# Tails of the normal distribution omitted by inv_norm, per side.
+# Probability of each tail of the normal distribution beyond which inv_norm does not go.
 TAIL = 1e-10
 
 

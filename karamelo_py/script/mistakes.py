@@ -1,6 +1,6 @@
 """Explain syntax errors.
 
-Lark's parser, fed token by token, shows where it stopped and with which stack.
+Lark's parser gets the tokens one by one, so that the stop and the parser's stack are known.
 """
 
 import re
@@ -17,7 +17,7 @@ _PUNCTUATION = re.compile(
 )
 # A C++ comment in the line that ends there.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
-# How files of Abaqus begin: empty lines, comments, a keyword.
+# Beginning of a file of Abaqus: empty lines, comments, a keyword.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
@@ -98,7 +98,7 @@ def _type(symbol: Any) -> str:
 class _Stop(NamedTuple):
     """Tokens before and at the parser's stop.
 
-    `here` is a character, a token, or None at the end.
+    `here` is the character or token at the stop, or None at the end of the text.
     """
 
     code: str
@@ -302,7 +302,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         style = other.removeprefix("the style ")
         if other and (style == other or " " in style):
             return other
-        if words[1] == "all" or other:  # in LAMMPS the group precedes the style
+        if words[1] == "all" or other:  # LAMMPS has the group before the style
             words[1:3] = style or words[2], words[1]
     if name == "dump" and len(words) > 2:
         words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")

@@ -10,7 +10,7 @@ from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 @noinline
 def _whole(a, down, up):
-    """Round by sums, which every processor has."""
+    """Round by sums, as not every processor has an instruction for it."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -19,7 +19,7 @@ def _whole(a, down, up):
         near -= 1.0
     elif near < a and up:
         near += 1.0
-    return math.copysign(near, a)  # preserves -0.0
+    return math.copysign(near, a)  # conserves -0.0
 
 
 def _not(a):
@@ -51,7 +51,7 @@ def _max(a, b):
 
 
 def _power(a, b):
-    """Use products for small exponents: pow costs ten multiplications."""
+    """Return a to the power b, by products if b is small: pow costs ten multiplications."""
     if b == 2.0:
         return a * a
     return a * (a * a) if b == 3.0 else math.pow(a, b)
@@ -88,7 +88,7 @@ BINARY = {
     "*": operator.mul,
     "/": operator.truediv,
     "^": _power,
-    "%": operator.mod,  # sign of the divisor, as in Python
+    "%": operator.mod,  # has the sign of the divisor, as in Python
     **{sign: _truth(compare) for sign, compare in {
         "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
         "==": operator.eq, "!=": operator.ne,
@@ -116,7 +116,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """Apply an operation as hardware does: inf or NaN, no exceptions."""
+    """Apply an operation as hardware does, with results inf or NaN instead of exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))

@@ -13,9 +13,9 @@ _CODES = (
     (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
-# Shell substitutions <(command), and the read end of a pipe.
+# Substitutions <(command) of a shell, and pipes.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
-# Endings of files that programs write next to scripts.
+# Endings of files that runs write next to scripts.
 _WRITTEN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
     *(".LAMMPS", ".log", ".part"),
@@ -40,7 +40,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Read a text; raises OSError, or ValueError for other data."""
+    """Read a text; raises OSError, or ValueError for data that are no text."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):
@@ -50,7 +50,7 @@ def read_text(path: Path, largest: int | None = LARGEST) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # Old editors write Latin-1, in which every byte is valid.
+        # Latin-1 is from old editors; all bytes are valid in it.
         return data.decode("latin-1")
 
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from karamelo_py.script.errors import Mark, ScriptError
 
-# Quoted text comes first: a # in it starts no comment.
+# Quoted text comes first, as a # in it does not begin a comment.
 _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 
@@ -34,7 +34,7 @@ class Source:
         return Mark(self.file, line + 1, start - first + 1, length, self.text[first:last])
 
     def code(self, start: int, end: int) -> str:
-        """Characters, with comments and line ends blanked."""
+        """Return the text of a span, with blanks for comments and line ends."""
         text = self.text[start:end]
         if "#" in text or "\n" in text:
             text = _COMMENT_OR_BREAK.sub(
@@ -45,7 +45,7 @@ class Source:
 
 @dataclass(eq=False)
 class Mistake(Exception):
-    """A syntax error at offsets of a text."""
+    """A syntax error between two offsets in a text."""
 
     message: str
     start: int
@@ -89,7 +89,7 @@ class UnaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """`left` `operator` `right`; operators are always spelled ``^ && ||``."""
+    """`left` `operator` `right`; ``^ && ||`` are the spellings of operators with several."""
 
     operator: str
     left: Node
@@ -125,7 +125,7 @@ class Statement:
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """The statement without blanks, comments, line ends and keywords `without`."""
+        """Return the statement without blanks, comments, line ends and the keywords `without`."""
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

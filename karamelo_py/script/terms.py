@@ -31,7 +31,7 @@ _PRECEDENCE = {
 
 
 class Term(Protocol):
-    """A number, a seed's name, or an operation (:class:`expressions.Expression`)."""
+    """A number, the name of a seed, or an operation (:class:`expressions.Expression`)."""
 
     operation: str
     value: Any
@@ -44,7 +44,7 @@ Tree = TypeVar("Tree", bound=Term)
 
 
 def in_order(root: Tree) -> list[Tree]:
-    """List terms once each, operands first."""
+    """List each term once, operands first."""
     ordered: dict[int, Tree] = {}
     open_terms = [(root, False)]
     while open_terms:
@@ -95,7 +95,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """True if a term can be written with subterms repeated."""
+    """Return whether a term is short enough to be written with common terms repeated."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):
@@ -130,14 +130,14 @@ def _bracketed(term: Term, level: int) -> str:
     return text_of(term) if precedence >= level else f"({text_of(term)})"
 
 
-# Common terms, and operands that would not fit on the stack, are computed once, into rows.
+# Common terms, and operands that would not fit on the stack, are computed once and stored.
 
-# Stack depth without rows; limits Python's recursion, too.
+# Depth of the stack without stored rows; it also limits Python's recursion.
 _MOST_LEVELS = 60
 
 
 def program(root: Term, push: Callable[[str], tuple[int, int]]) -> formula.Program:
-    """Compile a term; `push` returns the instruction and index of a name."""
+    """Compile a term; `push` returns the instruction and operand for a name."""
     return _Writer(root, push).program()
 
 
@@ -150,7 +150,7 @@ class _Writer:
         self.uses: list[int] = []
         self.uniform: list[bool] = []
         self.code: list[tuple[int, int]] = []
-        self.constants: dict[str, int] = {}  # by hexadecimal text, as 0.0 and -0.0 differ
+        self.constants: dict[str, int] = {}  # by hexadecimal text, in which 0.0 and -0.0 differ
         self.rows: dict[int, int] = {}
         self.free = list(range(programs.MAX_KEPT))[::-1]
         self.root = self._number(root)
@@ -183,7 +183,7 @@ class _Writer:
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):
             while True:
-                # Operands wait on the stack while the next is computed.
+                # Operands remain on the stack while the next one is computed.
                 asked = [i + (1 if o in kept else rows[o]) for i, o in enumerate(operands)]
                 deep = [0 if o in kept else levels[o] for o in operands]
                 rows[k], levels[k] = max(asked, default=1), 1 + max(deep, default=0)

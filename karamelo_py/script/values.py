@@ -19,22 +19,22 @@ def in_a_row(suffixes: Sequence[str]) -> bool:
 class Values:
     """Named numbers in an array that kernels read and write.
 
-    It is never reallocated. Slots 0, 1 and 2 are time, timestep (the number of the step) and dt.
+    The array is never reallocated. Slots 0, 1 and 2 are time, timestep (the step number) and dt.
     """
 
     def __init__(self) -> None:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
         self._of: dict[str, dict[str, int]] = {}  # slots of names, by ID
-        self._first: dict[str, int] = {}  # slot of ID_x, named or not
+        self._first: dict[str, int] = {}  # slot of ID_x, even if this name is not published
         self._used = 0
-        # Slot of the torque of the force in slots x, y, z from this one on; or 0.
+        # By slot x of a force: slot of its torque, or 0.
         self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
 
     def publish(self, name: str, value: float = 0.0) -> int:
-        """Publish a number; a known name retains its slot."""
+        """Publish a number and return its slot; a known name retains its slot."""
         if name not in self._slots:
             self._slots[name] = self._reserve(1)
         slot = self._slots[name]
@@ -42,10 +42,10 @@ class Values:
         return slot
 
     def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES, *others: str) -> None:
-        """Publish ``ID_x`` for "x" and so on, ``ID`` for "".
+        """Publish ``ID_x`` for the suffix "x" and so on, ``ID`` for "".
 
-        Slots of x, y, z, s are consecutive, named or not; so are other suffixes. Earlier names that
-        `suffixes` and `others` lack are removed.
+        Slots of x, y, z, s are consecutive, even if not all are published; slots of other suffixes
+        are, too. Earlier names that are not in `suffixes` or `others` are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))
@@ -69,7 +69,7 @@ class Values:
     def publish_torque(self, ID: str) -> None:
         """Publish ``ID_tx``, ``ID_ty``, ``ID_tz``, the torque about the origin.
 
-        ``ID_t2x``, ... act on the second of two solids.
+        ``ID_t2x``, ... are the torque on the second of two solids.
         """
         first = self._first[ID]
         if not self.torques[first]:
@@ -78,7 +78,7 @@ class Values:
             self._slots[f"{ID}_{suffix}"] = int(self.torques[first]) + k
 
     def torque_of(self, ID: str) -> np.ndarray:
-        """Torque (6,) to be read or set, or (0,) if no compute needs it."""
+        """Return a view of the torque (6,), or (0,) if no compute needs it."""
         slot = int(self.torques[self._first[ID]])
         return self.array[slot : slot + 6 * bool(slot)]
 

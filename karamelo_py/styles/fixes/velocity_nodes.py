@@ -102,8 +102,8 @@ class VelocityNodes(Fix):
 
     Notes
     -----
-    Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work heats
-    points with a temperature; the wall takes no heat.
+    Publishes the force that holds the nodes, with friction, as ID_x, ID_y, ID_z. Frictional work
+    heats points with a temperature; the wall takes no heat.
 
     If several such fixes include a node and direction, the last one applies: it publishes the whole
     reaction, and only its friction acts. A bound that is not reached exerts no force.
