@@ -105,6 +105,18 @@ def test_a_projectile_goes_through_a_plate(run_script, refine):
     assert remains[1] == pytest.approx(part * np.sqrt(350**2 - limit), rel=0.05)
 
 
+def test_a_wheel_in_sand(run_script):
+    """Ding et al. 2011, smooth wheel: 15 N, 5.3 N m and 17.5 mm at a slip of 0.6."""
+    words = ("-var", "slip", "0.6", "-var", "T", "0.9")
+    result = run_script(INPUTS / "in.wheel", *words)
+    assert late(result.log, "torque", 0.6) == pytest.approx(5.3, rel=0.1)
+    assert late(result.log, "pull", 0.6) == pytest.approx(15, rel=0.25)
+    assert late(result.log, "sinkage", 0.9) == pytest.approx(17.5e-3, rel=0.3)
+    assert late(result.log, "load", 0.6) == pytest.approx(80, rel=0.02)
+    lost = float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])
+    assert abs(lost) < 0.5 and "warning" not in result.err
+
+
 # --- nothing passes ---------------------------------------------------------------------------
 
 HEAD = """
