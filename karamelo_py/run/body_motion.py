@@ -14,10 +14,10 @@ from karamelo_py.run.state import SceneState
 class BodyMotion(NamedTuple):
     number: int
     mass: float
-    centre: np.ndarray  # (d,) of mass
+    centre: np.ndarray  # (d,) centre of mass
     velocity: np.ndarray  # (d,) of the centre
-    spread: np.ndarray  # (d, d) sum m X X, with X from the centre
-    shear: np.ndarray  # (d, d) sum m X V, relative to the centre
+    spread: np.ndarray  # (d, d) sum m X X, where X is the position relative to the centre
+    shear: np.ndarray  # (d, d) sum m X V, with velocities V relative to the centre
     low: np.ndarray  # (d,) bounding box
     high: np.ndarray
     slow: np.ndarray  # (d,)
@@ -32,7 +32,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocity (3,), I^-1 L; zero about an axis without extent across it."""
+        """Angular velocity (3,), I^-1 L; 0 about an axis along which all points lie."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -46,7 +46,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance from the rotation axis, for an ellipsoid in the bounding box."""
+        """Largest distance from the rotation axis, of an ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
@@ -54,7 +54,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Largest principal stretching of the least-squares velocity gradient."""
+        """Largest principal rate of stretch, by a least-squares fit of the velocity gradient."""
         gradient = np.linalg.lstsq(self.spread, self.shear, rcond=None)[0]
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 

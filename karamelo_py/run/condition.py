@@ -10,7 +10,7 @@ from karamelo_py.script.expressions import Expression
 
 class RunCondition(NamedTuple):
     formula: Expression
-    until: bool  # the run ends when it holds, else when it fails
+    until: bool  # True: the run ends when it holds; False: when it does not
 
     def allows(self, hub: Hub) -> bool:
         values = hub.values

@@ -1,6 +1,6 @@
 """One material point under prescribed strains and stresses (commands load_path, element).
 
-It runs the point functions of the law in plain Python, without compilation.
+The point functions of the law are called in plain Python, without compilation.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Targets at the end of a load path; other strains do not change."""
+    """Strains and stresses at the end of a load path; other strains do not change."""
 
     increments: int
     duration: float
     strain: Mapping[str, float]  # by component
     stress: Mapping[str, float]
-    shear: Sequence[str] = ()  # components in simple instead of pure shear
-    volumetric: float | None = None  # sum of normal strains, divided among those without a target
-    turn: float = 0.0  # angle about z
+    shear: Sequence[str] = ()  # components with simple instead of pure shear
+    volumetric: float | None = None  # sum of normal strains, of which free ones get equal parts
+    turn: float = 0.0  # angle of rotation about z
 
     catalogue = "load_paths"
 
@@ -79,9 +79,9 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
-DIVISIONS = 8  # of an increment that does not converge
-TOLERANCE = 1e-10  # relative to the stress, or to its change if elastic
-UNRESOLVED = 1e-13  # stress over modulus
+DIVISIONS = 8  # halvings of an increment that does not converge
+TOLERANCE = 1e-10  # residual over the stress, or over its change in elastic increments
+UNRESOLVED = 1e-13  # stress over modulus below which it is round-off
 
 
 class Unreachable(Exception):
@@ -89,11 +89,11 @@ class Unreachable(Exception):
 
 
 class Loading(NamedTuple):
-    strain: np.ndarray  # (6,) change; 0 where the stress is prescribed
+    strain: np.ndarray  # (6,) change of strain; 0 where the stress is prescribed
     turn: float
     shear: tuple[int, ...]
-    prescribed: np.ndarray  # components
-    begin: np.ndarray  # their stress
+    prescribed: np.ndarray  # components with a prescribed stress
+    begin: np.ndarray  # their stress at the beginning
     end: np.ndarray
 
 
@@ -109,7 +109,7 @@ class Point:
             self.state = laws.with_temperature(self.law, kin, self.state, T)
         self.strain = np.zeros(6)  # sum of symmetric parts of dt grad v
         self.time = 0.0
-        self.work = 0.0  # per reference volume
+        self.work = 0.0  # work per reference volume
         self.last: tuple = (self.state, np.zeros((3, 3)), 1.0)  # state before, increment, dt
 
     @property
@@ -136,14 +136,14 @@ class Point:
             end=np.array([path.stress[COMPONENTS[k]] for k in prescribed]),
         )
         begun = self.time
-        rate = np.zeros(len(prescribed))  # of the unknown strains, per path
+        rate = np.zeros(len(prescribed))  # change of the unknown strains per path
         marks = np.arange(path.increments + 1) / path.increments
         for number, (a, b) in enumerate(pairwise(marks), 1):
             try:
                 rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
-            # Not summed, so that tables get round numbers.
+            # Not summed over increments, so that tables have round numbers.
             self.time = begun + b * path.duration
             observe()
 
@@ -203,9 +203,9 @@ class Point:
         return unknown
 
     def tangent(self) -> np.ndarray:
-        """Tangent (n, m) of the last increment: d(Cauchy stress) / d(free strains).
+        """Return the tangent (n, m) of the last increment, d(Cauchy stress) / d(free strains).
 
-        Shear strains are engineering strains.
+        Shear strains are engineering strains, twice the tensor components.
         """
         numbers = [COMPONENTS.index(name) for name in self.free]
         ways = [self._strained((0.5 if k > 2 else 1) * np.eye(6)[k], ()) for k in numbers]
@@ -247,7 +247,7 @@ class Point:
             tangent = slopes(unknown)
             if not np.isfinite(tangent).all():
                 break
-            # Components without stiffness do not move.
+            # Least squares leave components without stiffness unchanged.
             step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
             for halving in range(SEARCH_HALVINGS):
                 trial = unknown + step / 2**halving
@@ -268,16 +268,16 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """dt grad v (3, 3) of a rotation about z that the law sees as rigid.
+        """Return dt grad v (3, 3) of a rotation about z which a law takes as rigid.
 
-        To first order it is skew. To second order laws differ: their strain follows from the
-        symmetric part, their volume from det F, or all from F.
+        To first order it is skew. Its second-order part depends on the law, whose strain follows
+        from the symmetric part and whose volume from det F, or all from F.
         """
         if angle == 0:
             return np.zeros((3, 3))
         skew = np.zeros((3, 3))
         skew[1, 0], skew[0, 1] = angle, -angle
-        # (1 + a) ((1 + a)^2 + angle^2) = 1 preserves the volume in the first form
+        # The volume is constant in the first form if (1 + a) ((1 + a)^2 + angle^2) = 1.
         roots = np.roots([1, 0, angle**2, -1])
         same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
         exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])
@@ -305,11 +305,11 @@ class Point:
             self.strain[self.kin.dimension : 3] = np.log(across)
 
 
-WIDTH = 17  # ten digits, sign, exponent, blank
+WIDTH = 17  # for ten digits, sign, exponent and a blank
 
 
 def shown(point: Point) -> dict[str, float]:
-    """Output columns; q is the von Mises stress sqrt(3/2 s:s)."""
+    """Return output columns by name; q is the von Mises stress sqrt(3/2 s:s)."""
     law, kin, state, stress = point.law, point.kin, point.state, point.stress
     names = COMPONENTS[: len(kin.symmetric_names)]
     xx, yy, zz, *shear = stress
@@ -365,7 +365,7 @@ class Response:
         right.set_ylabel("von Mises stress q")
         for axes in (left, right):
             tidy(axes)
-            # Labels such as 0.0025 fit; longer ones get powers of ten.
+            # There is space for labels such as 0.0025; longer ones get a power of ten.
             axes.locator_params(axis="x", nbins=6)
             axes.ticklabel_format(scilimits=(-3, 4))
             if axes.get_legend_handles_labels()[0]:

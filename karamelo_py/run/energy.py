@@ -1,4 +1,4 @@
-"""The energy balance of a run: whether it is tracked, its growth, its losses."""
+"""The energy balance of a run: whether it is tracked, and gains and losses."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ GROWING = 2  # windows of growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
-    """Name the source of work that is not tracked, or "".
+    """Return the source of work that is not tracked, or "".
 
-    Loops sum the work of compiled hooks; Python fixes declare by `Fix.conserves` that they do no
-    other work.
+    Work of compiled hooks is summed. Python fixes declare by `Fix.conserves` that they do no work
+    that is not summed.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -73,11 +73,11 @@ class EnergyWatch:
         update = simulation.hub.update
         watch.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
         anew = not self.followed or set_anew
-        self.followed = simulation.moves  # load steps are not in the balance
+        self.followed = simulation.moves  # the balance does not include load steps
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if watch.watch_energy:
-            # Velocities are half a step old, stresses by the fraction strained before.
+            # Velocities are half a step old, stresses the fraction `strained_before` of a step.
             self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
         counted = simulation.notes_temperatures and not unknown_heat(simulation.hub)
         heat.watch_heat = int(update.thermal and counted)
@@ -96,7 +96,7 @@ class EnergyWatch:
         watch.born_with = points.total("born with")
         if anew:
             watch.to_and_fro = 2 * self._length() / max(float(motion.wave or motion.rate), 1e-300)
-        # Energies are summed by tile.
+        # Energies are summed by tile, so points must be sorted into tiles.
         if not simulation.in_tiles():
             simulation.sort()
             simulation.mapped = False
@@ -114,7 +114,7 @@ class EnergyWatch:
         return float((ends[:d] + ends[d:]).max())
 
     def energy(self) -> float:
-        """Kinetic, stored and dissipated energy minus work; NaN if not tracked."""
+        """Return kinetic + stored + dissipated energy - work; NaN if it is not tracked."""
         simulation, watch = self.simulation, self.watch
         if not simulation.in_tiles() or not watch.watch_energy:
             return np.nan
@@ -133,32 +133,32 @@ class EnergyWatch:
         return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
-        """Fraction of the largest energy lost since the first step; negative: gained."""
+        """Return the energy lost since the first step (gained: negative) over the largest one."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
     def grown_little(self) -> bool:
-        """True if energy and last step show no fault in the present state."""
+        """Return whether energy and last step show no fault in the present state."""
         watch, heat = self.watch, self.heat
         swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
         if swings or self.has_grown():
             return False
         if not watch.watch_energy:
             return True
-        # Include the last window: noise that grows by half in 100 steps is in the state.
+        # With the last window, since noise that grows by 50 % in 100 steps is in the state already.
         before = watch.first_mean if watch.looks >= FEW else watch.first_balance
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
     def growth_since(self, before: float) -> float:
-        """Energy growth relative to `before`; NaN if not tracked."""
+        """Return the energy growth relative to `before`; NaN if it is not tracked."""
         unit = max(abs(before), float(self.watch.energy_floor), 1e-300)
         return growth(before, self.energy(), unit)
 
     def change(self) -> float | None:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
-        # From the first balance, which `forget_growth` does not change.
+        # Relative to the first balance, which `forget_growth` does not change.
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:

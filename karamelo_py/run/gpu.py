@@ -30,7 +30,7 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.script.formula import GLOBAL, UNIFORM, evaluate_in_table
 
 POLL = 64  # steps between reads of `fate`
-FAR = 1.0  # cells that points move before they are reordered
+FAR = 1.0  # path of points in cells after which they are reordered
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # names of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
 NO_HOOKS: Hooks = arrays.NoHooks(), ()
@@ -54,7 +54,7 @@ def there(s: arrays.Setup) -> arrays.Setup:
 
 
 def as_rows(image: np.ndarray) -> np.ndarray:
-    """View point arrays (..., n) as integers (rows, n) of the same size."""
+    """Return a view of point arrays (..., n) as integers (rows, n) of the same size."""
     rows = int(np.prod(image.shape[:-1], dtype=int))
     step = image.strides[-2] if image.ndim > 1 else 0
     whole = {4: np.int32, 8: np.int64}[image.itemsize]
@@ -71,8 +71,8 @@ def _no_hook(m, v, star, force, *_):  # loops contain a call that is never made
 class StepsOnCard:
     """Steps of a lowered scene on a GPU.
 
-    `program` has the classes of the scheme and its passes, `hooks` the compiled hooks and functions
-    in the order of their table.
+    `program` contains the classes of the scheme and its passes, `hooks` the compiled hooks and
+    their functions in the order of the table of hooks.
     """
 
     def __init__(
@@ -136,7 +136,7 @@ class StepsOnCard:
     def launch(
         self, function: Callable, count: int, *arguments: Any, called: dict | None = None
     ) -> KernelLaunch:
-        """Launch ``function(i, fate, *arguments)`` in `count` threads while steps continue."""
+        """Return a launch of ``function(i, fate, *arguments)`` in `count` threads per step."""
         function = gpu.while_steps_go_on(function)
         return KernelLaunch(self.images, function, count, self.fate, *arguments, called=called)
 
@@ -163,7 +163,7 @@ class StepsOnCard:
         if not row.gathers:
             for block, cells in pairs:
                 yield self.of_points(visit.load_point, block, cells)
-        # Reference positions are listed once.
+        # Points are sorted once if cells of reference positions are used.
         if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
                 yield self.of_points(visit.count, block, cells)
@@ -180,7 +180,7 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
-        """Sort a block's points by cell (counting sort, prefix sums by chunks)."""
+        """Sort the points of a block by cell (counting sort, with prefix sums by chunks)."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -195,7 +195,7 @@ class StepsOnCard:
         yield self.launch(gpu.sort_cell(self.corners), cells.cell.size, block.points.id, cells)
 
     def _order(self) -> Iterator[KernelLaunch]:
-        """Reorder points in memory as threads read them; not with several corners."""
+        """Reorder points in memory as threads read them, unless they have corners."""
         if self.corners > 1:
             return
         for block, cells in zip(self.s.blocks, self.cells, strict=True):
@@ -204,7 +204,7 @@ class StepsOnCard:
             yield self.launch(gpu.order_cell, cells.cell.size, cells, come_from)
             tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
             room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
-            if room.nbytes < most:  # cell sums are free meanwhile
+            if room.nbytes < most:  # the memory of cell sums is not used meanwhile
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
                 target = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
@@ -220,7 +220,7 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Count published values copied per thread: for formulas, one step old."""
+        """Return the number of published values (one step old) that threads copy for formulas."""
         if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max(self._slots_read(), default=0)
@@ -292,10 +292,7 @@ class StepsOnCard:
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, rows: list[int]) -> Iterator[KernelLaunch]:
-        """Clear totals of hooks whose stage repeats within a step.
-
-        The last time counts.
-        """
+        """Clear totals of hooks whose stage is repeated in a step, so that the last one counts."""
         if stage in self._acted:
             for h in rows:
                 if self.table[h].slot >= 0:
@@ -352,12 +349,12 @@ class StepsOnCard:
         return [*launches, before], [*launches, behind]
 
     def send(self) -> None:
-        self.use[:] = 2  # nodes may hold values of any step
+        self.use[:] = 2  # nodes may contain values of any step
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy the state back except nodes; clock and values are current."""
+        """Copy the state back except nodes; clock and published values are up to date anyway."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])
@@ -372,11 +369,11 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
-        """Return the lowest number of a failed point."""
+        """Return the lowest number of a point that has failed."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
-        """Take up to `count` steps; return DONE or why they ended."""
+        """Take up to `count` steps; return DONE, or the status that ended them."""
         control = self.s.control
         records = control.step, control.motion, control.energy, control.heat
         exchanged = [self.fate, *records, control.values, control.totals]
@@ -409,7 +406,7 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Median time of each launch of a step, over a few steps after the last."""
+        """Return the median time of each launch in a step, from a few steps after the last one."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

@@ -1,4 +1,4 @@
-"""End of a failed run: its last good state in a file, last rows of log and dumps."""
+"""End of a failed run: write its last good state, and the last rows of log and dumps."""
 
 import os
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 LAST_GOOD = Path("last_good.*.h5")
-MOST_REPEATED = 100  # steps, for the last rows of log and dumps
+MOST_REPEATED = 100  # steps that are repeated for the last rows of log and dumps
 
 
 CHANGES = {"left-domain": "boundary(delete)", "body-left": "another fix rigid_body of the same ID"}
 
 
 class OthersWait(Exception):
-    """This process cannot write a file while others still send data for it."""
+    """This process cannot write a file, for which others still wait to send data."""
 
 
 class LastGood(NamedTuple):
@@ -33,16 +33,13 @@ class LastGood(NamedTuple):
     good: RollbackPoint
 
     def keep_start(self, status: int, *, writes: bool) -> str:
-        """End the outputs of a step that was too large.
-
-        With `writes`, also write the initial state.
-        """
+        """End outputs after a step that was too large; with `writes`, write the initial state."""
         simulation, good = self.simulation, self.good
         step, present, path = simulation.step, PartStates.of(self.hub, OUTPUTS), None
         good.return_to(simulation)
         if writes:
             path = self._write()
-        present.give(self.hub)  # their files are unchanged
+        present.give(self.hub)  # the files of outputs have not changed
         end = step - (status in (GAINED, HEATED))
         if end - simulation.step <= MOST_REPEATED:
             good.again(simulation.advance, end)
@@ -67,13 +64,13 @@ class LastGood(NamedTuple):
         else:
             good.return_to(simulation)
             if status not in (GAINED, HEATED, STOPPED):
-                # Nodal values depend on the number of steps per call: always the same here.
+                # Nodal values depend on the number of steps per call, which must be reproducible.
                 good.again(simulation.advance, step)
         if status not in (GAINED, HEATED) and step > simulation.step:
             before = watch.energy()
             good.again(simulation.advance, step)
             if path is None and watch.growth_since(before) > WITHIN:
-                # The monitor averages over 100 steps and reports late.
+                # The monitor averages over 100 steps, so its reports are late.
                 grown, path = True, self._write_before_growth(step)
                 good.again(simulation.advance, step)
         path = path or self._write()

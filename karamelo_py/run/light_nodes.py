@@ -1,8 +1,8 @@
-"""The stable step of total-frame bodies, limited by nodes with little mass.
+"""The stable step of bodies in the total frame, as limited by nodes with little mass.
 
-Edge nodes may be stiffer per mass than inner ones. FLIP averages their motion away; transfers with
-moments or velocity gradients do not. Stable below 2 / w, with w^2 the largest eigenvalue of M^-1 K
-with lumped masses.
+Edge nodes may have more stiffness per mass than inner ones. FLIP damps their motion by averaging;
+transfers with moments or velocity gradients do not. The step is stable below 2 / w, where w^2 is
+the largest eigenvalue of M^-1 K with lumped masses.
 """
 
 from collections.abc import Callable
@@ -26,9 +26,9 @@ from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
-LIGHT_SHARE = 0.9  # of an inner node's mass
-MOST_PAIRS = 100_000  # target number of point-node pairs
-LANCZOS_STEPS = 24  # within 1 % of the highest frequency
+LIGHT_SHARE = 0.9  # fraction of an inner node's mass
+MOST_PAIRS = 100_000  # number of point-node pairs up to which all nodes are used
+LANCZOS_STEPS = 24  # give the highest frequency within 1 %
 
 
 class _Line(NamedTuple):
@@ -38,7 +38,7 @@ class _Line(NamedTuple):
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Stable step over h/c that the nodes of all solids allow; inf if unknown.
+    """Return the stable step over h/c for the nodes of all solids; inf if it is unknown.
 
     It is rounded down to four digits, so that it does not depend on the order of sums.
     """
@@ -77,7 +77,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     limit = LIGHT_SHARE * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
-        for _ in range(2):  # their points, then the points of those points' nodes
+        for _ in range(2):  # points of the nodes, then points of the nodes of those points
             near = np.any([seen[nodes(k)] for k in pairs], axis=0)
             seen = np.zeros(count, bool)
             for k in pairs:
@@ -101,7 +101,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     root[root == 0] = inf
 
     def stiffness(u: np.ndarray) -> np.ndarray:
-        """M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
+        """Return M^-1/2 K M^-1/2 u (nodes, d), in units of c^2."""
         u_of_points = (u / root[:, None])[at]
         gradient = np.stack([(u_of_points * g[:, :, None]).sum(axis=1) for g in slopes], axis=2)
         trace = np.trace(gradient, axis1=1, axis2=2)
@@ -134,7 +134,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Shear over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
+    """Return shear modulus over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
@@ -142,7 +142,7 @@ def _shear_share(law: Tag, kin: Tag) -> float:
 
 
 def _largest(operator: Callable[[np.ndarray], np.ndarray], shape: tuple[int, int]) -> float:
-    """Largest eigenvalue of a symmetric operator, by Lanczos iteration (1950)."""
+    """Return the largest eigenvalue of a symmetric operator, by Lanczos iteration (1950)."""
     q = np.random.default_rng(0).standard_normal(shape)
     q /= sqrt((q * q).sum())
     basis, diagonal, off_diagonal = [q], [], []

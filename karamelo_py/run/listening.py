@@ -7,7 +7,7 @@ from karamelo_py.script.errors import Mark
 
 
 class Trouble(NamedTuple):
-    """A failure: message, fix, code for programs, likely cause, line of the script."""
+    """A failure: message, fix, code for programs, likely cause, and line of the script."""
 
     message: str
     fix: str
@@ -28,7 +28,7 @@ class Listener:
     """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step is chosen, nothing compiled yet; `resumed` from a file."""
+        """The first step has been chosen, and nothing is compiled; `resumed`: from a file."""
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
         """Compilation is done."""
@@ -37,13 +37,13 @@ class Listener:
         """Some steps succeeded."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain `status` (DONE: energy gain); None if this listener cannot.
+        """Explain `status` (DONE: an energy gain); return None if this listener cannot.
 
         `too_large`: the step was too large from the start of the run.
         """
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """The run is over: steps from `first_step` on took `wall` seconds."""
+        """The run has ended; steps from `first_step` on took `wall` seconds."""
 
     def signalled(self, number: int) -> None:
-        """A signal ends the run after the present steps."""
+        """A signal has arrived; the run ends after the present steps."""

@@ -24,11 +24,11 @@ from karamelo_py.scene.comm import handled_signals
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import attributed
 
-SECONDS_PER_CHUNK = 0.3  # for Ctrl-C and the progress bar
+SECONDS_PER_CHUNK = 0.3  # short enough for Ctrl-C and the progress bar
 
 
 class Interrupted(Exception):
-    """A signal ended the run; outputs are complete."""
+    """A signal has ended the run; outputs are complete."""
 
 
 @dataclass(eq=False)
@@ -45,9 +45,9 @@ class RunLoop:
     halve: InitVar[bool] = False
     advice: Listener = field(default_factory=Listener)
 
-    signalled = 0  # of this process
+    signalled = 0  # number of a signal to this process
     resumed_from: Path | None = None
-    interrupted = 0  # ends all processes
+    interrupted = 0  # number of a signal that ends all processes
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
@@ -94,10 +94,10 @@ class RunLoop:
                 with counted("output"):
                     hub.console.end_run()
                     if self.interrupted:
-                        # Before the final state, which a longer run would not have.
+                        # Restart files come first: a longer run would not have the final output.
                         hub.output.write_last()
                     hub.output.end()
-                self._agree(simulation)  # after a signal, start no further run
+                self._agree(simulation)  # no further run starts after a signal
             except BaseException as error:
                 hub.console.end_run()
                 hub.output.abort()
@@ -131,12 +131,12 @@ class RunLoop:
         while self._goes_on(simulation):
             rollback.before()
             step, begun = simulation.step, timings.on["steps"][0]
-            kept = (step // most + 1) * most  # where a state may be stored
+            kept = (step // most + 1) * most  # next step at which a state may be stored
             end = min(hub.output.next_step(step), self.last_step, step + length, kept)
             end = min([end, *((step // every + 1) * every for every in rhythms)])
             with timings.counted("steps"):
                 status = simulation.advance(int(end) - step, between)
-            self._agree(simulation)  # outputs show steps that succeeded everywhere
+            self._agree(simulation)  # outputs show only steps that succeeded in all processes
             if not rollback.after(status):
                 length = 1
                 continue

@@ -13,9 +13,9 @@ from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 
 def _first_bad(simulation: SceneState) -> tuple | None:
-    """Return the first bad value of this process, None without one.
+    """Return the first bad value of this process, or None.
 
-    It comes as ((fix, formula, point or node), value, position).
+    The result is ((fix, formula, point or node), value, position).
     """
     hub, values = simulation.hub, simulation.hub.values
     for which, fix in enumerate(hub.fixes.values()):

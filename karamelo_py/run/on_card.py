@@ -1,4 +1,4 @@
-"""Simulation on a GPU: arrays are sent when changed, fetched on access."""
+"""Simulation on a GPU: arrays are sent after changes, and fetched when they are used."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ def alike(hooks: Tag, others: Tag) -> bool:
 
 
 class SimulationOnCard(Simulation):
-    """Takes the steps on a GPU; everything else runs on the CPU.
+    """A simulation whose steps run on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays after steps. Changes on the CPU call `changed` or `sort`, so that
-    arrays are sent again. Fetched points are in GPU order and tiles out of date: users of tiles
-    sort first.
+    `setup` fetches the arrays after steps. Code on the CPU that changes arrays calls `changed` or
+    `sort`, so that they are sent again. Fetched points are in the order of the GPU, and tiles are
+    not up to date: code that uses tiles must sort the points first.
     """
 
-    states_every = 1000  # states must be fetched
+    states_every = 1000  # steps between stored states, which must be fetched
     notes_temperatures = False
     _steps: StepsOnCard | None = None
-    _known: Sequence = ()  # of these steps
-    _ahead = False  # arrays here lack steps
-    _nodes_ahead = False  # nodes here lack steps
-    _sent = False  # the GPU has the present arrays
+    _known: Sequence = ()  # key of the compiled steps
+    _ahead = False  # the arrays here are not up to date
+    _nodes_ahead = False  # the nodes here are not up to date
+    _sent = False  # the arrays of the GPU are up to date
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         check_room_there(hub)
@@ -64,7 +64,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """Nodes after the last step; fetched on access only, as they may be many."""
+        """Nodes after the last step; they are fetched only when used, as they may be many."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False
@@ -79,7 +79,7 @@ class SimulationOnCard(Simulation):
         if self._ahead:
             self._ahead = False
             self._steps.fetch()
-            self.tiles.unsort(self.control, limit=0.0)  # tiles lack these steps
+            self.tiles.unsort(self.control, limit=0.0)  # tiles are not up to date
 
     def changed(self) -> None:
         self._sent = False
@@ -110,7 +110,7 @@ class SimulationOnCard(Simulation):
 
     def in_tiles(self) -> bool:
         self.sort_if_due()
-        self._sent = False  # the work of forces is taken from the points
+        self._sent = False  # as work of forces is stored at points
         return super().in_tiles()
 
     def refuse(self) -> None:
@@ -144,7 +144,7 @@ class SimulationOnCard(Simulation):
 
     def _advance_to(self, target: int) -> int:
         if self.begins:
-            # Fixes of the first step act from Python.
+            # Fixes of the first step are called from Python.
             self._sent = False
             status = super()._advance_to(self.step + 1)
             if status != DONE or self.step >= target:

@@ -26,10 +26,7 @@ def seam_of(s: Setup, domain: Domain) -> Seam:
 
 
 def return_points(s: Setup, domain: Domain) -> None:
-    """Move points outside the cell by whole periods.
-
-    This is done only at steps that do not depend on restarts.
-    """
+    """Move points outside the domain by whole periods, at steps independent of restarts."""
     if int(s.control.values[TIMESTEP]) % EVERY:
         return
     for block in s.blocks:

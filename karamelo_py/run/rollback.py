@@ -14,17 +14,17 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-HALVINGS = 5  # per run
+HALVINGS = 5  # largest number of halvings in a run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
-RETURNS = 2  # per state before an energy gain; two halvings without effect are enough
+RETURNS = 2  # returns to a state before an energy gain, as two halvings without effect are enough
 
 
 class Stopped(ScriptError):
-    """A run failed on all processes; its last good state is written."""
+    """A run has failed in all processes; its last good state has been written."""
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Decide what follows `status` or `grown` energy, after `returns` to the last good state."""
+    """Return the action after `status` or `grown` energy, and `returns` to the last good state."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -38,11 +38,11 @@ class RollBack:
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
         """Begin with the present state, or with the state of a file, which may be `ruined`.
 
-        `looks`: a condition may read the values of parts between any two steps.
+        `looks`: a condition may read values of parts after any step.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
-        # Deleted points would not come back.
+        # A return to an earlier state would not restore deleted points.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step
@@ -50,11 +50,11 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
-        """Store the present state if due and good; else note the memory of parts."""
+        """Store the present state if it is due and good; otherwise note the states of parts."""
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
-            return  # only the first state is good
+            return  # only the initial state is good
         step = self.simulation.step
-        # Runs return to these states, so the schedule must not depend on speed.
+        # Results depend on these states after a return, so they must not depend on run time.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
         often |= not self.simulation.repeats_steps
         if often and step != self.point.step and self.simulation.energy_watch.grown_little():
@@ -92,12 +92,12 @@ class RollBack:
     def _halve_step(self, status: int) -> None:
         simulation, point = self.simulation, self.point
         trouble = self._explained(status)
-        # Removes later rows of log and dumps.
+        # This also removes later rows of log and dumps.
         point.return_to(simulation, cut=True)
         while point.halvings < HALVINGS:
             point.halvings += 1
             simulation.steps.halve(point.halvings)
-            if not simulation.steps.above_limit():  # steps below it would fail again
+            if not simulation.steps.above_limit():  # steps below the limit would fail again
                 break
         self.hub.warn(
             f"{trouble.message}. Back to {when(simulation)}, "
@@ -122,7 +122,7 @@ class RollBack:
         present.give(self.hub)
 
     def _points_only_leave(self) -> bool:
-        """True if points leave without an energy gain: smaller steps do not help."""
+        """Return whether points leave without an energy gain, where smaller steps do not help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
         if not (moves and len(simulation.leaving()) and watch.grown_little()):
@@ -132,15 +132,15 @@ class RollBack:
         before = watch.energy()
         self.point.again(simulation.advance, step)
         kept = watch.growth_since(before) <= WITHIN and not simulation.steps.above_limit()
-        simulation.advance(1)  # repeats the failure for output
-        present.give(self.hub)  # their files are unchanged
+        simulation.advance(1)  # repeat the failed step for output
+        present.give(self.hub)  # the files of outputs have not changed
         return kept
 
     def _stop(self, status: int) -> NoReturn:
-        """Return to the last good state, write it, and raise the user's error.
+        """Return to the last good state, write it, and raise the error for the user.
 
-        After an energy gain it is the last state before the gain; log and dumps end with the last
-        faultless state. If the step was too large from the start, only the initial state is good.
+        After an energy gain, this is the last state before the gain; log and dumps end at the last
+        step that succeeded. If the step was too large from the start, it is the initial state.
         """
         simulation = self.simulation
         too_large = self.too_large and simulation.steps.too_large

@@ -82,7 +82,7 @@ class SceneArrays:
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
         check_room(hub, copied=previous is None and bool(hub.in_run))
-        # Sorting later distributes points by tiles.
+        # Points are distributed by tiles in the first sort.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
@@ -103,9 +103,9 @@ class SceneArrays:
         self.tiles.mode = self.mode
         self.domain = Subdomain(self) if comm.size > 1 else WholeDomain(self)
         self.control = self.setup.control
-        self.version = 0  # grows when fields change without a step
-        self.rollback: RollbackPoint | None = None  # of the last run
-        self.mapped = False  # the nodes show the present state
+        self.version = 0  # increases when fields change without a step
+        self.rollback: RollbackPoint | None = None  # last good state of the last run
+        self.mapped = False  # whether nodes have the present state
 
     def keep_present(self) -> None:
         blocks = (
@@ -167,7 +167,7 @@ class SceneArrays:
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
         velocities = (block.points.v for block in self.setup.blocks)
-        # No copy: there may be millions of points.
+        # Without a copy, as there may be millions of points.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([largest], float))[0])
@@ -209,7 +209,7 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort the points by tile, after handing over those in other processes' tiles."""
+        """Sort points by tile, after points in tiles of other processes have been sent there."""
         self.setup = self.domain.migrate(self.setup)
         domain = self.hub.domain
         if domain.periodic:
@@ -224,7 +224,7 @@ class SceneArrays:
             self.sort()
 
     def bring(self) -> None:
-        """Bring the whole state here, with points in the order of their tiles."""
+        """Make the whole state available on the CPU, with points in the order of tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
         if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift
@@ -232,7 +232,7 @@ class SceneArrays:
             self.sort()
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes unless a step has done so."""
+        """Map the present state to the nodes, unless a step has done so."""
         if self.mapped:
             return
         self.sort_if_due()

@@ -1,4 +1,4 @@
-"""Time integration of a lowered scene: chunks of compiled steps, controlled from Python."""
+"""Time integration of a lowered scene by chunks of compiled steps, controlled from Python."""
 
 from __future__ import annotations
 
@@ -35,29 +35,29 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import set_columns
 
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # of deleted points
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # sums over deleted points
 
 
 class Simulation(SceneArrays):
-    """Steps a scene, or one process's subdomain, on the CPU.
+    """A scene, or the subdomain of one process, with its steps on the CPU.
 
-    Subclasses override how: on a GPU (`run.on_card`), or by Newton's method
+    Subclasses take steps on a GPU (`run.on_card`) or by Newton's method
     (`run.implicit.load_steps`).
     """
 
     states_every = 100  # steps between stored states
     remedy = "a smaller time step (set_dt, dt_factor)"
-    repeats_steps = True  # from a stored state; load steps take too long
+    repeats_steps = True  # steps from a stored state can be repeated; load steps take too long
     implicit = False
-    failure = ""  # why a load step found no equilibrium
+    failure = ""  # reason why a load step found no equilibrium
     notes_temperatures = True
     between: Callable[[str], bool] | None = None
-    _called: Tag = None  # Python hooks
+    _called: Tag = None  # Python hooks of the steps
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
         self.steps, self.energy_watch = StepSize(self), EnergyWatch(self)
-        # Fixes of the first step act once, even if the scene is lowered again.
+        # Fixes of the first step must not act again after the scene is lowered again.
         self.begun: set[Fix] = set(previous.begun) if previous else set()
         self.visits: Staged | Fused = Fused()
         self.fixes = FixesOfRun([], [], None, ActingFixes(self, []))
@@ -109,7 +109,7 @@ class Simulation(SceneArrays):
     def remove(self, ids: np.ndarray) -> tuple[float, float]:
         """Delete points (ascending ids), without renumbering; return their mass and energy.
 
-        The energy balance books their energy as work.
+        The energy balance counts this energy as negative work.
         """
         group = ParticleGroup(self.hub)
         group.take([ids])
@@ -121,7 +121,7 @@ class Simulation(SceneArrays):
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)
-        # Balance and rate remain from the last step, whether or not a run begins here.
+        # Balance and rate remain as in the last step, even if a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
@@ -129,10 +129,10 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change their velocities and positions, block by block. The energy balance
-        books their energy as work.
+        `prepare` may change velocities and positions of the points in a block. The energy balance
+        counts the energy as work.
         """
-        if self.comm.leads:  # the next sort hands them over
+        if self.comm.leads:  # the next sort sends them to their processes
             blocks = []
             made = points_at_rest(self.hub, self.setup, ids)
             for block, points in zip(self.setup.blocks, made, strict=True):
@@ -158,19 +158,19 @@ class Simulation(SceneArrays):
 
     @property
     def scheme(self) -> Tag:
-        """The scheme of the steps, another one if fixes lead points that deform."""
+        """The scheme of the steps; some schemes have another if fixes move deformable points."""
         scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
         led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
         leading = scheme.traits.leading
         return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
-        """Take up to `count` steps, to the end time at most; return DONE, or why it stopped.
+        """Take up to `count` steps, at most to the end time; return DONE or another status.
 
         Load steps call `between` with a progress message, and end if it returns True.
         """
         self.between = between
-        self.control.motion[0].wrong = 0  # from earlier steps
+        self.control.motion[0].wrong = 0  # may be set by earlier steps
         with self.comm.joint():
             from_python = bool(self.fixes.lasting.in_python) or self.begins
             self.domain.begin(self.hooks, from_python=from_python)
@@ -180,7 +180,7 @@ class Simulation(SceneArrays):
 
     def _advance_to(self, target: int) -> int:
         while True:
-            self.sort_if_due()  # not after the last step, whose nodes are output
+            self.sort_if_due()  # not after the last step, since its nodes may be output
             try:
                 status = self._advance(target - self.step)
             except PointsMoved:
@@ -201,7 +201,7 @@ class Simulation(SceneArrays):
             return status
         self.begun |= set(first.fixes) & set(self.fixes.new)
         self.fixes = self.fixes._replace(first=None)
-        self.clear_forces()  # later steps may have no hook for it
+        self.clear_forces()  # later steps may have no hook that sets forces
         return SORT
 
     def _take(self, hooks: Tag, count: int) -> int:
@@ -222,7 +222,7 @@ class Simulation(SceneArrays):
         return self.fixes.first is not None
 
     def refuse(self) -> None:
-        """Refuse nothing: the CPU runs all scenes."""
+        """Raise ScriptError for unsupported scenes; the CPU supports all."""
 
     def compile(self) -> None:
         hooks = self._acting
@@ -237,7 +237,7 @@ class Simulation(SceneArrays):
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
-            # No hook precedes it in a step, so output shows its state from the start.
+            # No hook precedes it in a step, so it may act before the first output.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
         rigid = any(solid.rigid for solid in self.hub.solids.values())
@@ -257,6 +257,6 @@ class Simulation(SceneArrays):
         if fix.point_by_point:
             act(self.setup)
         else:
-            self.sort_if_due()  # tiles are read, too
+            self.sort_if_due()  # tiles are used, too
             self.domain.act(act, self.setup)
         self.changed()

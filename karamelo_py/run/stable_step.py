@@ -30,16 +30,16 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-BOX_WEIGHT = 6.0  # of the common drift in steps with boxes
-SLOWED = 1.2  # fraction of the wave speed above which viscosity limits the step
-LONE = 0.9  # of an isolated point's stable step: expanded points are stiffer
-# With corrected accelerations in the total frame, blocks with one point per cell gain energy at
-# 0.73 of the stable step.
+BOX_WEIGHT = 6.0  # weight of the common velocity in steps with domains that are boxes
+SLOWED = 1.2  # viscous over elastic wave speed above which viscosity limits the step
+LONE = 0.9  # fraction of an isolated point's stable step, as expanded points are stiffer
+# With mass=corrected in the total frame, blocks with one point per cell gain energy at 0.73 times
+# the stable step.
 CORRECTED_TOTAL = 0.7
-# Replaces LONE: a dam break with two points per cell gained energy in splashes at 0.43 h/c, none at
-# 0.38.
+# Instead of LONE: in splashes of a dam break with two points per cell, energy grew at 0.43 h/c, but
+# not at 0.38 h/c.
 CORRECTED_LONE = 0.55
-DAMPED = 0.5  # minimum with one point per cell, if a PIC fraction damps
+DAMPED = 0.5  # smallest default fraction with one point per cell, if a part of PIC damps
 
 
 def one_a_cell(solid: Solid) -> bool:
@@ -51,10 +51,11 @@ def sparse(hub: Hub) -> bool:
 
 
 def keeping_share(hub: Hub) -> float:
-    """Largest fraction of the stable step that conserves a drifting body's energy.
+    """Return the largest fraction of the stable step at which a drifting body gains no energy.
 
-    With FLIP and similar transfers, gradient jumps add energy to points that cross cells, about as
-    the third power of the step. The fractions are from docs/energy.md: at most 10 % in 50 periods.
+    With FLIP and similar transfers, jumps of gradients add energy to points that cross cells, about
+    in proportion to the third power of the step. With these fractions (docs/energy.md), the gain is
+    at most 10 % in 50 periods.
     """
     update = hub.update
     alpha = flip_coefficient(update.transfer)
@@ -70,7 +71,7 @@ def keeping_share(hub: Hub) -> float:
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """True if FLIP-like points move through the grid, without moments and usl."""
+    """Return whether points move through the grid with FLIP or alike, without moments and usl."""
     update = hub.update
     return (
         update.method.frame.moves
@@ -91,12 +92,12 @@ def _flows(law: Tag) -> bool:
 
 
 def lone_point(hub: Hub) -> float:
-    """Stable step over h/c of an isolated point that stores a moment.
+    """Return the stable step over h/c of an isolated point that stores a moment.
 
-    Its pressure drives the stored velocity gradient L by dL/dt = -p / (rho D): an oscillator of
-    frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c. If gradients are stored, sums of
-    |grad N|^2 / N replace 1 / D. Flowing material can isolate points; gas points then store no
-    moments (`kernels.equations.loss.in_company`).
+    The pressure accelerates the stored velocity gradient L by dL/dt = -p / (rho D). This is an
+    oscillator of frequency c sqrt(d / D), which is stable up to dt = 2 sqrt(D / d) / c. If points
+    store gradients, sums of |grad N|^2 / N replace 1 / D. Points of flowing material may become
+    isolated; points of gases then store no moments (`kernels.equations.loss.in_company`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
@@ -111,9 +112,9 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """True if a drifting body is as stable and conservative as one at rest.
+    """Return whether a drifting body is as stable and conservative as a body at rest.
 
-    With cubic splines hardly any energy depends on the position in the cells; usavg adds none with
+    With cubic splines, the energy hardly depends on the position in the cells; usavg adds none with
     smooth bases (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks fracture
     sooner with these steps.
     """
@@ -121,7 +122,7 @@ def bears_drift(hub: Hub) -> bool:
     laws = _deforming(hub)
     return (
         _keeps_velocities(hub)
-        and len(laws) == 1  # one elastic or metallic solid
+        and len(laws) == 1  # a single elastic or metallic solid
         and not _flows(laws[0])
         and not basis.gradient_jumps
         and (basis.bears_drift or scheme.traits.bears_drift)
@@ -130,11 +131,11 @@ def bears_drift(hub: Hub) -> bool:
 
 
 def own_weight_of_drift(hub: Hub) -> float:
-    """Weight of the common velocity in the default step.
+    """Return the weight of the common velocity in the default step.
 
-    It is 1 in the standard rule h/(c + |v|). Drifting boxes (ugimp, cpgimp), two or more per cell,
-    gain more energy at higher speed: at edges of shaken bars and blocks, at 0.05 to 0.5 of the wave
-    speed.
+    It is 1 in the standard rule h/(c + |v|), and 0 if drift is harmless. It is larger for two or
+    more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks that drift at 0.05 to
+    0.5 of the wave speed, the energy gain increases with speed.
     """
     if bears_drift(hub):
         return 0.0
@@ -154,9 +155,9 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Stable step over h/c; `longer` for points that stay in their cells.
+    """Return the stable step over h/c; `longer`: of points that remain in their cells.
 
-    In the total frame, nodes of thin and round bodies limit points with moments.
+    In the total frame, it is limited by nodes of thin and round bodies if points have moments.
     """
     update = hub.update
     total = not (update.scheme.traits.implicit or update.method.frame.moves)
@@ -169,7 +170,7 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
 
 
 def corrected_share(hub: Hub) -> float:
-    """Fraction of the stable step that corrected accelerations leave."""
+    """Return the factor of the stable step with mass=corrected."""
     method = hub.update.method
     if not method.corrected:
         return 1.0
@@ -180,7 +181,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
     scheme, method = hub.update.scheme, hub.update.method
     two, one = scheme.traits.courant
     if min(two, one) < 1:
-        # Nodes between cell corners raise the highest frequency.
+        # Nodes between cell corners increase the highest frequency.
         nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1
         return (one if sparse(hub) else two) * nodes
     if not method.frame.moves:
@@ -194,15 +195,15 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Stable step over h/c, and the default fraction of it.
+    """Return the stable step over h/c and the default fraction of it.
 
     `still`: no point has moved as far as `STILL`.
     """
     method, share = hub.update.method, keeping_share(hub)
-    # Moment transfers are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
+    # Transfers with moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
-        # An isolated point with a linear basis is stable up to 0.8 h/c in 3D.
+        # With a linear basis in 3D, an isolated point is stable up to 0.8 h/c.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else DEFAULT_SHARE)
     courant = courant_number(hub, longer=still or bears_drift(hub))
     return min(courant, lone_point(hub)), share
@@ -224,10 +225,10 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 
 
 def stable_conduction(hub: Hub) -> float:
-    """Smallest stable step of conduction in undeformed bodies.
+    """Return the smallest stable step of conduction in undeformed bodies.
 
-    It is h^2 / (4 d) capacity / conductivity: half of the bound of lumped finite elements, since
-    points are anywhere in a cell.
+    It is h^2 / (4 d) capacity / conductivity, half of the bound for lumped finite elements, since
+    points may be anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf

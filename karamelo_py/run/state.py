@@ -1,4 +1,4 @@
-"""A scene in arrays, as measurements, checks and files see it."""
+"""A scene in arrays, as measurements, checks and files use it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class NodeAccess(Protocol):
 
 
 class SceneState(Protocol):
-    """The arrays of a scene or subdomain, and their clock."""
+    """The arrays of a scene or subdomain, and the clock."""
 
     hub: Hub
     comm: SerialComm
@@ -29,16 +29,16 @@ class SceneState(Protocol):
     tiles: Tiles
     domain: WholeDomain
     present: np.ndarray  # (N,) bool by id, False for deleted points
-    begun: set[Fix]  # of the first step
+    begun: set[Fix]  # fixes of the first step that have acted
     mode: Tag
     threads: int
     count: int
     points: Fields
-    mapped: bool  # nodes show the present state
-    moved_in_step: bool  # a step replaces the arrays after its first stage
+    mapped: bool  # whether nodes have the present state
+    moved_in_step: bool  # whether arrays are replaced after the first stage of a step
     implicit: bool
     notes_temperatures: bool
-    flags: tuple[bool, ...]  # besides the arrays, for restart files
+    flags: tuple[bool, ...]  # for restart files, in addition to arrays
 
     @property
     def hooks(self) -> Hooks | NoHooks: ...

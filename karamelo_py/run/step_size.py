@@ -26,15 +26,15 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 from karamelo_py.script.errors import ScriptError
 
-NO_STRIDE = 1e9  # cells, further than points ever move
+NO_STRIDE = 1e9  # path in cells that points never reach
 
 
 class StepPolicy(NamedTuple):
-    still: tuple[float, float]  # stable step over h/c, fraction of it
+    still: tuple[float, float]  # stable step over h/c, and the fraction of it, at rest
     moving: tuple[float, float]
-    weight: float  # of the common velocity
-    fixed_dt: float  # 0: follows the fastest point
-    heat_factor: float  # of the conduction limit
+    weight: float  # weight of the common velocity
+    fixed_dt: float  # 0: the step is adapted to the fastest point
+    heat_factor: float  # fraction of the limit of conduction
 
     @classmethod
     def of(cls, hub: Hub) -> StepPolicy:
@@ -43,12 +43,12 @@ class StepPolicy(NamedTuple):
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
             return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
-        # A script's steps are fractions of h/(c + |v|), also at rest.
+        # Fractions that scripts set refer to h/(c + |v|), also at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
         return cls(asked, asked, 1.0, fixed, heat or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
-        """Clock fields after a `path` of the points, in cells."""
+        """Return clock fields for points that have moved by a `path` in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
@@ -64,7 +64,7 @@ Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Last steps, of motion and of contact, and path: for the next lowering."""
+    """Return the last steps of motion and contact, and the path, for the next lowering."""
     step = control.step[0]
     return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
@@ -81,14 +81,14 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Chooses the steps; the only Python code that writes them to the clock."""
+    """Chooses the steps. No other Python code writes them to the clock."""
 
     policy: StepPolicy
 
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
         self.step, self.motion = self.control.step[0], self.control.motion[0]
-        self.measured = False  # motion.rate belongs to the present state
+        self.measured = False  # whether motion.rate belongs to the present state
 
     def begin(self, end_time: float) -> None:
         self.policy = StepPolicy.of(self.simulation.hub)
@@ -167,7 +167,7 @@ class StepSize:
 
     def _choose(self) -> None:
         if not self.measured:
-            # The last step has measured, so a run in pieces takes the steps of a whole run.
+            # Use the rate of the last step, so that several runs take the same steps as one.
             simulation, motion = self.simulation, self.motion
             self._measure(float(motion.weight))
             motion.wave = motion.speed = 0.0
@@ -197,7 +197,7 @@ class StepSize:
 
     @property
     def limit_moving(self) -> float:
-        """Stable step of points that cross cells, the basis of a script's fractions."""
+        """Stable step of points that cross cells, to which fractions in scripts refer."""
         step, rate = self.step, self.motion.rate
         waves = step.courant_moving * step.spacing / rate if rate > 0 else np.inf
         return float(min(waves, self.control.heat[0].heat_limit))
@@ -208,7 +208,7 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """True if the step exceeded the stability limit from the start."""
+        """True if the step has exceeded the stability limit from the start."""
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:

@@ -1,4 +1,4 @@
-"""Grids cut into tiles: their points, the nodes these reach, the nodes in use."""
+"""Tiles of grids: points in them, nodes that these points reach, and nodes in use."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -34,33 +34,34 @@ from karamelo_py.points.kinematics import planar
 from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
-# Cells per direction of a tile of points, nodes of a tile of nodes. Small boxes fit in caches,
-# large ones have fewer nodes in common.
+# Cells per direction in a tile of points; nodes per direction in a tile of nodes. Small boxes fit
+# into caches, large ones have fewer nodes in common.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
-LONGER = 16  # times as long along rows in 3D with one point per cell, to get more points per tile
-SHARES = 64  # parts of a block with about equal numbers of points, for threads
-# Boxes with fewer rows, in numbers of nodes, are allocated at once (untouched pages take no
-# memory).
+LONGER = 16  # factor of length along rows in 3D with one point per cell, for more points per tile
+SHARES = 64  # parts with about equal numbers of points in a block, for threads
+# Boxes with fewer rows than this number times the nodes are allocated at the start, as pages take
+# no memory until they are used.
 ALLOCATED_UP_TO = 8
-DIRECT_UP_TO = 2000  # points; below, clearing and summing boxes costs more than threads save
-PART = 2000  # points per part in threaded sorting
+DIRECT_UP_TO = 2000  # points up to which clearing and summing boxes costs more than threads save
+PART = 2000  # points per part, for sorting by threads
 MOST_DRIFT = 1.0  # cells that points may move between sorts
-# Smaller boxes, and neighbouring points with the same nodes; not worth more sorting in 2D.
+# A smaller drift gives smaller boxes, and neighbouring points with the same nodes. In 2D this is
+# not worth more sorting.
 LEAST_DRIFT = {1: MOST_DRIFT, 2: MOST_DRIFT, 3: 0.25}
-SORT_STEPS = 32  # desired steps between sorts
-# Points that scatter directly to the nodes only get more nodes into use.
+SORT_STEPS = 32  # intended number of steps between sorts
+# If points scatter directly to nodes, drift only increases the number of nodes in use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
 class Tiles:
-    """Sorts a setup's points by tile, and finds the nodes that each tile may reach."""
+    """Sorts the points of a setup by tile, and finds the nodes that each tile may reach."""
 
     threads = 1
     mode: Serial | Threaded = Serial()
 
     def __init__(self, lattices: Sequence[Lattice], basis: Tag, points: int, sparse: bool):
-        self.direct = points <= DIRECT_UP_TO  # scatter directly to the nodes
+        self.direct = points <= DIRECT_UP_TO  # points scatter directly to nodes
         self.dimension = d = lattices[0].dimension
         self.size, self.node_size = np.full(d, TILES[d]), np.full(d, NODES[d])
         self.long = sparse and d == 3
@@ -69,17 +70,17 @@ class Tiles:
             self.node_size[:] = 1, 1, self.size[-1]
         self.per_cell = basis.traits.nodes_per_cell
         self.least_nodes = basis.traits.least_nodes
-        self.beyond = basis.traits.cells // 2  # nodes of the stencil beyond a cell's
+        self.beyond = basis.traits.cells // 2  # nodes of the stencil beyond the cell
         self.sorts = self.sets = 0
-        self.rows = 0  # of the buffers
-        self.occupied = 0  # tiles with points
+        self.rows = 0  # number of rows of the buffers
+        self.occupied = 0  # number of tiles with points
         self._nodes = np.array([x.shape[:d] for x in lattices], np.int64)
         self._cells = np.array([x.cells[:d] for x in lattices], np.int64)
         self._first_node = np.array([x.first for x in lattices], np.int64)
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # Points in the total frame reach at most two cells beyond their tile; contact adds one.
+        # In the total frame, points reach at most two cells beyond their tile, with contact three.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
@@ -87,7 +88,7 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # Reach is stored per row of a box if tiles are rows: a bar may spread at one end only.
+        # For long tiles, reach is stored per row of a box, as a bar may spread at one end.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0
         self.count = int(self.first[-1])
@@ -132,7 +133,7 @@ class Tiles:
                     array[: self.rows] = 0
 
     def unsort(self, control: Control, *, limit: float | None = None) -> None:
-        """Sort the points before the next step; `limit` replaces the drift limit."""
+        """Let the points be sorted before the next step; `limit` replaces the drift limit."""
         motion = control.motion[0]
         motion.drift = np.inf
         if limit is not None:
@@ -141,13 +142,13 @@ class Tiles:
     def sort(self, s: Setup) -> None:
         """Sort all points by tile, find the nodes in use, and zero the sums at all others.
 
-        The next step zeroes used nodes; boxes are zero between steps.
+        The next step zeroes nodes in use. Boxes are zero between steps.
         """
         before = grid_boxes.used(s.spans)[1:].copy()
         motion = s.control.motion[0]
         most, steps = (DIRECT_DRIFT, DIRECT_STEPS) if self.direct else (MOST_DRIFT, SORT_STEPS)
         limit = min(max(LEAST_DRIFT[self.dimension], steps * motion.pace), most)
-        # Deleted points leave an infinite drift.
+        # After a deletion of points the drift is infinite.
         motion.drift_limit = limit if s.frame.moves else np.finfo(float).max
         motion.drift = motion.pace = 0.0
         occupied = [self._sort_block(s, block) for block in s.blocks]
@@ -157,7 +158,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        """Bound of the distance in cells from present positions to nodes, until the next sort."""
+        """Return a bound, until the next sort, of the distance in cells from `x` to nodes."""
         far = 0.0
         if len(x) > self.dimension:
             at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
@@ -166,7 +167,7 @@ class Tiles:
         rounding = ROUNDING + 4 * np.finfo(x.dtype).eps * cells
         drift = s.control.motion[0].drift_limit + rounding if s.frame.moves else 0.0
         beyond = far + drift + grid_boxes.beyond(s.contact)
-        return beyond if far < cells else cells  # also for NaN
+        return beyond if far < cells else cells  # also if far is NaN
 
     def _where(self, s: Setup, points: Points) -> np.ndarray:
         return points.x[s.control.motion[0].now] if points.home is None else points.home
@@ -182,8 +183,8 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Several parts per thread, since tiles differ in size. With few points, one thread is done
-        # before others start.
+        # Several parts per thread, as tiles differ in size. With few points, one thread would be
+        # ready before others start.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
@@ -237,7 +238,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Divide as `_parts_to_sum`, for few points: one set, one part per span."""
+        """Divide nodes as `_parts_to_sum` does, for few points: one set, with a part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -249,16 +250,16 @@ class Tiles:
         return spans, ranges, np.array([0, len(spans)]), parts
 
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Spans and ranges of the nodes that boxes reach, and the parts to sum.
+        """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
-        Nodes follow the sets of points that reach most of them: a thread finds its contributions in
-        its caches, and fetching them from the caches of another takes longer than the sum.
+        Nodes are in the order of the sets of points that reach most of them, so that a thread has
+        its contributions in its own caches. Fetching them from other caches is slower than the sum.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
-        local = order[reached.box[order] < len(shares)][::-1]  # the largest last
+        local = order[reached.box[order] < len(shares)][::-1]  # the largest comes last and counts
         beside = self._beside(reached.tile, boxes.grid[reached.box])
         owner = np.zeros(self._first_of_nodes[-1], np.int64)
         owner[beside[local]] = shares[reached.box[local]]
@@ -285,10 +286,10 @@ class Tiles:
         return grid_boxes.joined_spans(local), ranges, firsts, parts
 
     def _beside(self, tile: np.ndarray, grid: np.ndarray) -> np.ndarray:
-        """First of the tiles of nodes (n,) in the same set as each.
+        """Return, for each tile of nodes (n,), the first tile that must be in the same set.
 
-        Access with gaps of some thousand bytes takes twice as long, so one thread has one set, and
-        long tiles join tiles in the same rows of nodes.
+        Access with gaps of some thousand bytes takes twice as long. Therefore a single thread has
+        one set, and if tiles are long, tiles in the same rows of nodes are in one set.
         """
         if self.threads == 1:
             return np.zeros_like(tile)
@@ -362,10 +363,10 @@ class Tiles:
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        """Note the tiles of nodes in use, and their nodes from `begin` to `end`."""
+        """Note tiles of nodes that are in use, and the nodes from `begin` to `end` in them."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
-        """`Buffers.parts` of the nodes (k, d) from `begin` to `end` of the grids.
+        """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of grids.
 
         Their rows in boxes are `first` + sum of `steps` (k, d) times indices.
         """
@@ -406,10 +407,10 @@ class WholeDomain:
         function(s)
 
     def begin(self, hooks: Hooks | NoHooks, *, from_python: bool) -> None:
-        """Prepare for steps."""
+        """Prepare for the next steps."""
 
     def end(self) -> None:
-        """Finish the last steps."""
+        """Complete the last steps."""
 
     def state(self) -> dict[str, np.ndarray]:
         return {}
@@ -427,11 +428,10 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
+    """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
 
-    `parts` (n, 10) are the used nodes of each tile (see `Buffers`). A set gets the tiles whose
-    middle, counted in nodes, lies in its equal part. Neighbours with equal `beside` (n,) get the
-    set of the first one.
+    `parts` (n, 10) are the used nodes of each tile (see `Buffers`). All sets have about the same
+    number of nodes. Consecutive tiles with equal `beside` (n,) are in the set of the first one.
     """
     size = np.prod(parts[:, 2:5], axis=1)
     middle = np.cumsum(size) - size / 2
@@ -447,7 +447,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Beginnings (size,) of nearly equal sets of tiles with point ranges (T, 2)."""
+    """Return the first tile (size,) of nearly equal sets of tiles with point ranges (T, 2)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:

@@ -24,7 +24,7 @@ class Timings:
     def __init__(self, hub: Hub):
         self.hub = hub
         self.on = {name: np.zeros(2) for name in ("compilation", "steps", "output")}
-        self._depth = 0  # of nested compilation
+        self._depth = 0  # depth of nested compilation
         self._begun = np.zeros(2)
 
     @contextmanager
@@ -41,7 +41,7 @@ class Timings:
             yield
 
     def on_start(self, _: str) -> None:
-        """Note that a kernel is compiled here, or by another process that this one waits for."""
+        """Note that a kernel is being compiled, by this process or one for which it waits."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

@@ -1,4 +1,4 @@
-"""The state of a simulation as named arrays: to return to, write and read."""
+"""The state of a simulation as named arrays, to be restored, written and read."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -32,7 +32,7 @@ Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
 def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the used part of every array that a step changes and the next one needs."""
+    """Yield the used part of every array that a step changes and that the next step needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
@@ -43,15 +43,15 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
     for name, array in kept_at_nodes(s):
         yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
-        now = s.control.motion[0].now  # valid once the clock is restored
+        now = s.control.motion[0].now  # correct only after the clock has been restored
         for name, array in arrays_of(block.points):
-            # The other positions belong to the last step.
+            # The other half of the positions belongs to the last step.
             yield f"points/{k}/{name}", array[now] if name == "x" else array
 
 
 def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     copies = {}
-    # One by one, so that only one array exists twice.
+    # One by one, so that only one array has two copies at a time.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -63,10 +63,10 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Nodes where contact acted lately, and its memory of them.
+    """Return nodes with recent contact, and what contact remembers of them.
 
-    One process looks at all nodes, since liquids may return to nodes not in use now. Several list
-    the nodes in use.
+    A single process searches all nodes, since liquids may return to nodes that are not in use now.
+    Several processes search the nodes in use.
     """
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
@@ -88,9 +88,9 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 
 
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
-    """Yield the content of a restart file for the present state, or the `kept` one.
+    """Yield the content of a restart file for the present state, or for the `kept` one.
 
-    Collective: rank 0 gets the arrays, in the order and with the bits of a serial run.
+    All ranks call this; rank 0 gets the arrays, in the order and with the bits of a serial run.
     """
     if not kept:
         simulation.bring()
@@ -123,7 +123,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as stored in files, with the digits of exact sums normalised."""
+    """Yield a state as it is stored in files, with the digits of exact sums normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -151,7 +151,7 @@ class InFile:
             return self._data[where]
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
-        # At once, since NumPy would read number by number.
+        # Read all at once, since NumPy would read number by number.
         return np.asarray(self[()], dtype)
 
 
@@ -204,7 +204,7 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        # Tiles are already laid out for other processes.
+        # The tiles are already those for the present number of processes.
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:
@@ -213,10 +213,10 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
         s.control.values[:] = state["values"]
     for memory in remembered_at(simulation, np.array([[0, simulation.hub.fields.node_count]])):
         memory[memory != 0] = 0
-        if "touched/nodes" in state:  # without points, no nodes
+        if "touched/nodes" in state:  # processes without points have no nodes
             memory[state["touched/nodes"][()]] = state["touched/rows"]
     if isinstance(simulation.hooks, Hooks):
-        simulation.hooks.loads[:] = 0  # of an incomplete step
+        simulation.hooks.loads[:] = 0  # an incomplete step may have summed loads
     simulation.changed()
 
 
@@ -231,7 +231,7 @@ def take_snapshot(simulation: SceneState, path: Path) -> dict[str, np.ndarray]:
 
 def take_stored(simulation: SceneState, path: Path) -> None:
     with opened(path) as state, simulation.comm.joint():
-        # Check first, so that a file of another scene changes nothing.
+        # Check all arrays first, so that a file of another scene changes nothing.
         for k, block in enumerate(simulation.setup.blocks):
             check_points(block.points, state, f"points/{k}/")
         check_numbers(simulation, state)
@@ -281,7 +281,7 @@ def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
 def rows_at(
     simulation: SceneState, nodes: np.ndarray, gather: Callable
 ) -> dict[str, np.ndarray] | None:
-    """Gather nodal arrays at ascending `nodes`, 0 if not in use."""
+    """Gather nodal arrays at ascending `nodes`, 0 where a node is not in use."""
     counted, kinds = simulation.domain.counted(), dict(of_nodes(simulation.setup))
     limits = (nodes[0], nodes[-1] + 1) if len(nodes) else (0, 0)
     here = counted[slice(*np.searchsorted(counted, limits))]
@@ -343,7 +343,7 @@ def check_numbers(simulation: SceneState, arrays: ArraysByName) -> None:
         ends[points + "material"] = len(flat(block.laws)[0])
         ends[points + "id"] = simulation.count
         ends[points + "grid"] = ends[tiling + "grid"] = len(s.grids.x0)
-        # Ranges may hold deleted points until the next sort.
+        # Until the next sort, ranges may include deleted points.
         sorted_since = np.isfinite(np.asarray(arrays["clock"][()])["motion"]["drift"]).all()
         number = arrays[points + "id"].size if sorted_since else simulation.count
         ends[tiling + "range"] = number + 1

@@ -1,6 +1,6 @@
 """States of the parts of a scene, for rollback and restart files.
 
-A class names the attributes of its state, in addition to its bases'::
+A class names the attributes of its state, in addition to the names in its bases::
 
     class Dose(Compute):
         remembers = ("total",)
@@ -31,10 +31,10 @@ from karamelo_py.script.errors import ScriptError
 
 WITH_STYLE = (Publisher, Rhythmic)
 OUTPUTS = ("dump", "log", "curve", "restart")
-CLOCK_VALUES = ("time", "timestep", "dt")  # belong to the arrays of a state
+CLOCK_VALUES = ("time", "timestep", "dt")  # stored with the arrays of a state, not here
 
 Key = tuple[str, str, str]  # family, ID and style
-Memory = dict[str, Any]  # of a part, in JSON types
+Memory = dict[str, Any]  # state of a part, in JSON types
 
 
 class PartStates(NamedTuple):
@@ -95,7 +95,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-        # Last, as it shows other parts.
+        # The log comes last, as it shows other parts.
     yield ("log", "", ""), hub.output.log
 
 
@@ -142,7 +142,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of a value that no file can store, with the warning for it."""
+    """A copy of a value that cannot be stored in a file, and the warning about it."""
 
     kept: object
     fault: ScriptError
@@ -173,7 +173,7 @@ def _random_state(state: dict) -> np.random.RandomState:
     return generator
 
 
-# Types unknown to JSON: functions to JSON arguments, and back.
+# For types unknown to JSON: functions that give JSON arguments, and make the value of them.
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
@@ -192,7 +192,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: object, arrays: list[np.ndarray]) -> Any:
-    """Convert to JSON types; arrays go to `arrays` by number."""
+    """Convert a value to JSON types; arrays are appended to `arrays` and replaced by numbers."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve
-        self.halvings = self.returns = 0  # halvings of the step so far; returns to this state
+        self.halvings = self.returns = 0  # numbers of halvings; of returns here
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}
@@ -230,10 +230,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Make the present state the last good one.
-
-        With `forget`, the states of parts at other steps are dropped.
-        """
+        """Make the present state the last good one; `forget` drops other states of parts."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -248,14 +245,14 @@ class RollbackPoint:
             self._parts[step] = PartStates.of(self.hub)
 
     def return_to(self, simulation: SceneState, *, cut: bool = False) -> None:
-        """Return to that state; with `cut`, outputs are cut there and continue."""
+        """Return to the last good state; with `cut`, outputs are cut at it and continue from it."""
         simulation.restore(self.arrays)
         self.parts.give(self.hub, cut=cut)
         if cut:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps up to `end` with the states of parts; return the status."""
+        """Repeat the steps up to `end`, with the states that parts had; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

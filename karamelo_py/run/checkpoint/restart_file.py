@@ -1,7 +1,7 @@
 """Restart files: the state of a scene in HDF5.
 
-They contain arrays, states of parts (:mod:`karamelo_py.run.checkpoint.parts`) and the executed
-statements. The script repeats the set-up.
+A file contains arrays, states of parts (:mod:`karamelo_py.run.checkpoint.parts`) and the executed
+statements. The script itself is executed again to set up the scene.
 """
 
 import json
@@ -39,10 +39,10 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "chosen",
     "scene", "values", "begun", "parts", "run",
 )  # fmt: skip
-# HDF5 stores checksums of all but arrays; arrays get theirs as an attribute.
+# HDF5 has checksums of everything except arrays, which have an attribute for theirs.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
-READ_AT_ONCE = 1 << 22  # bytes
+READ_AT_ONCE = 1 << 22  # bytes read at a time
 
 
 class Restarts(Rhythmic):
@@ -130,9 +130,9 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Raise ScriptError if arrays of a file do not have their checksums.
+    """Raise ScriptError if arrays of a file do not agree with their checksums.
 
-    The arrays of points and nodes (`large`), or the others, are compared; processes divide them.
+    Arrays of points and nodes (`large`), or all others, are compared, each by one process.
     """
     import h5py
 
@@ -233,9 +233,9 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the state of the file; with `outputs`, these continue in their files.
+        """Restore the state of the file; with `outputs`, outputs continue in their files.
 
-        Within a run, `point` becomes the last good state.
+        In an unfinished run, `point` gets the last good state of the file.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content
@@ -314,7 +314,7 @@ def check(hub: Hub, restart: Restart) -> None:
     here, stored = described(hub), restart.content["scene"]
     for name in dict.fromkeys([*stored, *here]):
         mine, theirs = here.get(name), stored.get(name)
-        # boundary(delete) may begin here.
+        # A resumed run may begin to use boundary(delete).
         if mine == theirs or (name == "boundary" and "reflect" not in (mine, theirs)):
             continue
         if mine is None or theirs is None:

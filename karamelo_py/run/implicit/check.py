@@ -16,12 +16,12 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.styles.methods.base import takes_average
 
-# Plug-in hooks may run several times per step.
+# Hooks of plug-ins may be called several times per step.
 _MOMENTS = "initial_integrate", "post_particles_to_grid", "post_update_grid_state"
 _OF_HEAT = "post_heat_to_grid", "supply_heat", "post_update_grid_heat"
 _OF_ROTATION = "post_update_grid_rotation", "post_rotation_to_grid"
 _OF_PLUGINS = _MOMENTS[1:]
-RELAXED = 1e30  # a time over which viscosity sustains no stress
+RELAXED = 1e30  # a duration after which viscosity sustains no stress
 _EXPLICIT = "an explicit scheme, scheme(musl)"
 
 
@@ -44,7 +44,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         law = solid.material.law
         if solid.rigid:
             continue
-        # F-bar lets some laws yield too early in load steps.
+        # With F-bar, some laws yield too early in load steps.
         averaged = update.anti_locking and takes_average(law)
         if averaged and yields_early_with_fbar(law.strength):
             yield (

@@ -15,9 +15,9 @@ from karamelo_py.scene.modify import Fix
 def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> None:
     """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
-    With nodal capacities C and conductances K, C (T' - T) / dt = q - K T'. It is linear, so one
-    solution is exact. The split from an adiabatic step is of first order in the step (Armero & Simo
-    1992); in this order a load step ends in equilibrium.
+    The equation is C (T' - T) / dt = q - K T', with nodal capacities C and conductances K. It is
+    linear, so one solution is exact. The split from an adiabatic step has an error of first order
+    in dt (Armero & Simo 1992). Conduction comes first, so that load steps end in equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)
@@ -40,7 +40,7 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     if np.any(free):
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
-    # Fixes get the temperature without them, and publish the heat they supply.
+    # Fixes get the temperature that nodes would have without them, and publish the heat supplied.
     without = new - np.where(fixed, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - T

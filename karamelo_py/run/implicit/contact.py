@@ -1,9 +1,9 @@
 """Contact between solids with separate fields, within Newton's method.
 
-At a common node, the relative displacement u may close the gap g along the normal N, with penalty
-pressure p = max(0, k (N u - g)). The tangential spring sticks while |k s| <= mu p for the slip s of
-the step, and slides at mu p (Wriggers 2006, "Computational Contact Mechanics", chapter 10). Normals
-and gaps are from the beginning of the step.
+If the relative displacement u at a common node exceeds the gap g along the normal N, the penalty
+pressure is p = max(0, k (N u - g)). The tangential spring sticks while |k s| <= mu p for the slip s
+of the step, and slides at mu p (Wriggers 2006, "Computational Contact Mechanics", chapter 10).
+Normals and gaps are from the beginning of the step.
 """
 
 import numpy as np
@@ -16,18 +16,18 @@ from karamelo_py.kernels.contact import Bodies, ListedPairs, list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.run.implicit.equations import Equations
 
-STIFF = 1e3  # spring over cell stiffness of the softer body
-LIGHT = 0.01  # fraction of an inner node's mass
-SLIPPERY = 0.05  # the same, below which nodes do not stick
-CLOSE = 1e-4  # gap in cells below which contact is first assumed
+STIFF = 1e3  # stiffness of the penalty spring over stiffness of a cell of the softer body
+LIGHT = 0.01  # fraction of an inner node's mass below which there is no contact
+SLIPPERY = 0.05  # the same, below which there is no friction
+CLOSE = 1e-4  # gap in cells below which contact is assumed at first
 
 
 class Contact:
     """Pairs (c) of nodes where bodies meet.
 
-    `first`, `second` (c,) are unknown nodes, `normal` (c, d) points to the second body, `close`
-    (c,) masks pairs in contact before the step, `push` (c,) and `drag` (c, d) act on the second
-    body. `moduli` (g,) are Young's moduli by grid, 0 for rigid bodies.
+    `first`, `second` (c,) are indices of unknown nodes, `normal` (c, d) points to the second body,
+    `close` (c,) masks pairs in contact before the step, `push` (c,) and `drag` (c, d) are normal
+    and tangential forces on the second body. `moduli` (g,) are Young's moduli by grid, 0 if rigid.
     """
 
     def __init__(self, equations: Equations, moduli: np.ndarray):
@@ -39,7 +39,7 @@ class Contact:
         normal = np.zeros((room, self.d))
         listed = ListedPairs(pairs, normal, gap)
         count = list_pairs(Bodies(tag, s.kin, s.nodes), s.grids, s.spans, listed)
-        # Nodes with almost no mass carry no load.
+        # Nodes with almost no mass would carry no load.
         shares = self._shares()[equations.number_of(pairs[:count])].min(1)
         chosen = np.flatnonzero(shares >= LIGHT)
         count = len(chosen)
@@ -47,12 +47,12 @@ class Contact:
         self.gap = np.maximum(gap[chosen], 0.0)
         self.first, self.second = (equations.number_of(one) for one in self.pairs.T)
         self.a, self.b = (equations.grid[one] for one in (self.first, self.second))
-        # Their drag would rotate with each correction and prevent convergence.
+        # The friction of light nodes would rotate in each correction and prevent convergence.
         mu = tag.friction[self.a, self.b]
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
         h = float(np.min(s.grids.spacing))
-        self.gap[self.touched()] = 0  # no gap has opened, whatever the measured one
+        self.gap[self.touched()] = 0  # pairs in contact have no gap, regardless of the measured one
         self.close = (self.gap <= CLOSE * h) | self.touched()
         ones, at = np.ones(count), np.arange(count)
         m = len(nodes)
@@ -85,13 +85,13 @@ class Contact:
         return stiffness * self._around(self.equations.positions[self.first, 0], h)
 
     def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """Return length or area (m,) per angle at radii `x`, for cells of `h`; or 1."""
+        """Return length or area (m,) per angle at radii `x`, for cells of size `h`; otherwise 1."""
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Mask (c,) of pairs in contact at the end of the last step.
+        """Return the mask (c,) of pairs in contact at the end of the last step.
 
-        With `sign` -1, only the pairs that stuck.
+        With `sign` -1, only the pairs that stuck are included.
         """
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
@@ -99,9 +99,9 @@ class Contact:
         return (last > 0) & (last >= step)
 
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
-        """Compute forces after nodal displacements (m, d), and their derivatives.
+        """Compute forces after nodal displacements (m, d), and derivatives of the forces.
 
-        If `supposed`, contact and sticking come from the last step, as no displacements are known.
+        If `supposed`, contact and sticking are as in the last step, as `u` is not yet known.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -115,7 +115,7 @@ class Contact:
         self._rub(np.eye(self.d) - NN, supposed)
 
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
-        """Compute the drag and its derivatives by return mapping of friction.
+        """Compute the drag and its derivatives by return mapping.
 
         Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
         "An augmented Lagrangian treatment of contact problems involving friction").
@@ -151,7 +151,7 @@ class Contact:
         return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
     def constraints(self, motions: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Constraints (r, k) of closed pairs on rigid `motions` (m, d, k)."""
+        """Return the constraints (r, k) of closed pairs on rigid `motions` (m, d, k)."""
         rows = []
         for nodes in (self.first, self.second):
             chosen = self.close & mask[nodes]
@@ -161,20 +161,20 @@ class Contact:
         return np.concatenate(rows)
 
     def stopped(self, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Remove the relative normal velocities of pressed pairs from `v` (m, d).
+        """Return `v` (m, d) without the relative normal velocities of pairs under pressure.
 
         This conserves momentum; `inverse` (m, d) are inverse masses, 0 at held nodes.
         """
         return v + inverse * self._stopping(v, inverse, self._across()[self.pressed])
 
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
-        """Add the effect of contact at the beginning of the step to accelerations (m, d).
+        """Add the effect of contact at the beginning of the step to accelerations `a` (m, d).
 
-        It stops touching pairs that approach, and all that stuck; others slide with velocities `v`
-        (m, d).
+        Pairs in contact that approach get no relative normal acceleration, pairs that stuck no
+        relative acceleration at all; other pairs slide with the velocities `v` (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
-        touched = touched & (B @ a.ravel() > 0)  # others may separate
+        touched = touched & (B @ a.ravel() > 0)  # other pairs may separate
         every = np.repeat(touched & stuck, self.d)
         rows = sp.vstack([B[touched & ~stuck], self.jumps[every]]).tocsr()
         forces = self._stopping(a, inverse, rows)

@@ -24,8 +24,8 @@ from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.scene.modify import Fix
 
 BATCH = 8192  # points assembled at a time
-MOST_MOVED = 0.5  # cells that nodes may move towards others, per cell of distance
-# The second are reused while the first do not change.
+MOST_MOVED = 0.5  # relative displacement towards other nodes in cells, per cell of distance
+# Arrays of the second list are reused while arrays of the first do not change.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
@@ -45,9 +45,9 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
 
 
 class Moduli(NamedTuple):
-    mean: float  # by volume; 0 if nothing deforms
+    mean: float  # mean by volume; 0 if nothing deforms
     of_grids: np.ndarray  # (g,) by grid, 0 where nothing deforms
-    of_laws: list[np.ndarray]  # (2, k) laws of each block, and their specific volumes
+    of_laws: list[np.ndarray]  # by block, (2, k): moduli of its laws, and specific volumes
 
     def alike(self) -> bool:
         every = (table[0, table[1] > 0] for table in self.of_laws)
@@ -57,9 +57,9 @@ class Moduli(NamedTuple):
 class Equations:
     """Forces at the nodes of a step, and their derivatives.
 
-    `nodes` (m,) are in stencils of points. `mass` (m,) is 0 where there are gradients only,
-    `places` (m, d) are grid indices, `per_node` is the number of unknowns at each (d, and the angle
-    of a rotation around the axis). `deforming` (m,) masks nodes of points that deform (`blocks`,
+    `nodes` (m,) are the nodes in stencils of points. `mass` (m,) is 0 at nodes with gradients only,
+    `places` (m, d) are grid indices, `per_node` is the number of unknowns per node (d, and one for
+    the rotation around the axis). `deforming` (m,) masks nodes of points that deform (`blocks`,
     with their stencils in `parts`), `led` (m,) nodes of rigid points, with `velocity_of_rigid` (m,
     d). `cached` is from the previous step, or empty.
     """
@@ -143,7 +143,7 @@ class Equations:
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
 
-        They include the pairs of the ghost stabilisation, and each node with itself.
+        Pairs of the ghost stabilisation, and of each node with itself, are included.
         """
         d, k, m = self.d, self.per_node, len(self.nodes)
         reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
@@ -183,7 +183,7 @@ class Equations:
         return connected_components(graph, directed=False)[1]
 
     def respond(self, u: np.ndarray, dt: float) -> np.ndarray:
-        """Nodal forces (m, d) after displacements (m, d); not finite if a point fails."""
+        """Return nodal forces (m, d) after displacements (m, d); not finite if a point fails."""
         s = self.s
         for seen, response in self.parts:
             loops.strain(self.mode, loops.PARTS, s.kin, seen, u, response)
@@ -204,10 +204,10 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
-        """Largest move, in cells, of a node towards others that move differently.
+        """Return the largest displacement, in cells, of a node into nodes that move differently.
 
-        Those differ in displacement (m, d) by more than bodies rotate or strain in a step, or are
-        `fixed` (nodes, d) without points.
+        These nodes differ in displacement (m, d) by more than rotation or strain in a step allows,
+        or are `fixed` (nodes, d) and have no points.
         """
         cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -235,7 +235,7 @@ class Equations:
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
         mask, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
-        for fix in fixes:  # the last one decides
+        for fix in fixes:  # the last one applies
             mask_of_fix, value = fix.prescribed(self.nodes, self.positions)
             mask |= mask_of_fix
             values[mask_of_fix] = value[mask_of_fix]
@@ -258,7 +258,7 @@ class Equations:
 
     @cached_property
     def levers(self) -> np.ndarray:
-        """Lengths (m, k) per unit of the unknowns: 1, or the radius for an angle."""
+        """Return lengths (m, k) per unit of the unknowns: 1, or the radius for an angle."""
         levers = np.ones((len(self.nodes), self.per_node))
         levers[:, self.d :] = self.positions[:, :1]
         return levers
@@ -273,7 +273,7 @@ class Equations:
         blocks = self.K.data
         blocks[:] = 0
         alone = ~self.deforming[self.pairs[0]] & (self.pairs[0] == self.pairs[1])
-        blocks[alone] = np.eye(d)  # sums of matrices drop zero blocks
+        blocks[alone] = np.eye(d)  # sums of sparse matrices drop blocks of zeros
         into = loops.Blocks(self.layout, blocks.reshape(-1, d * d))
         for k, (block, (seen, response)) in enumerate(zip(self.blocks, self.parts, strict=True)):
             n, done = block.points.mass.size, np.zeros(len(self.nodes), np.int64)
@@ -330,10 +330,10 @@ class Equations:
         return Moduli(total / volume if volume else 0.0, of_grids[0] / per, of_laws)
 
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
-        """Matrix (m, m) that penalises gradient jumps at the border of bodies.
+        """Return the matrix (m, m) that penalises jumps of gradients at the border of bodies.
 
-        It is in units of the mean modulus: at a node the volume mean over its points, for a
-        difference the smallest of its nodes.
+        It is in units of the mean modulus. The modulus at a node is the mean over its points by
+        volume; a difference has the smallest modulus of its nodes.
         """
         lines, size, D = self.differences
         weights = size**self.d
@@ -353,10 +353,10 @@ class Equations:
 
     @cached_property
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
-        """Second differences (n, m) at the border of bodies: nodes (n, 3), cells (n,), matrix.
+        """Return second differences at borders of bodies: nodes (n, 3), cells (n,), matrix (n, m).
 
-        With a linear basis they are the gradient jumps across faces of border cells (Coombs 2023).
-        Splines have no such jumps, but the differences still hold their border nodes.
+        With a linear basis they are the jumps of gradients across faces of border cells (Coombs
+        2023). Splines have no such jumps, but the differences stabilise their border nodes, too.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)
@@ -384,7 +384,7 @@ class Equations:
         return lines, size, D
 
     def _line(self, g: np.ndarray, corner: np.ndarray, axis: int) -> np.ndarray:
-        """Nodes next to corners along an axis (rows, 3); -1 if not in use."""
+        """Return nodes (rows, 3) next to corners along an axis; -1 for nodes not in use."""
         shifts = np.array([-1, 0, 1])
         steps = self._steps(g)
         first = self.s.grids.first[g] + (corner * steps).sum(1)

@@ -13,7 +13,7 @@ from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
-    diagonal = 0.0  # added to the stiffness, in units of nodal mass
+    diagonal = 0.0  # added to the stiffness, per nodal mass
 
     def __init__(self, equations: Equations):
         self.blocks = equations.blocks
@@ -36,7 +36,7 @@ class Rest:
 
 
 class Motion:
-    """Inertia by the Newmark rules and generalized-alpha.
+    """Inertia by Newmark's rules and generalized-alpha.
 
     Generalized-alpha balances (1 - alpha_m) a' + alpha_m a, times mass, with (1 - alpha_f) f' +
     alpha_f f (primes: end of the step). Points store the difference between a and the acceleration
@@ -89,7 +89,7 @@ class Motion:
 
     def balance(self, u: np.ndarray, forces: np.ndarray) -> np.ndarray:
         a = self.acceleration(u)
-        # Reactions are those at the end of the step.
+        # Reactions at the end of the step use the acceleration there.
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:

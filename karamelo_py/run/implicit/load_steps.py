@@ -41,7 +41,7 @@ from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Mark, ScriptError
 
 SUBSTEP_HALVINGS = 10
-LONG_WAY = 1.0  # cells
+LONG_WAY = 1.0  # path of a point in a step, in cells, for a warning
 
 
 class PointsWrong(Exception):
@@ -58,11 +58,11 @@ class LoadSteps:
         self.scheme = simulation.hub.update.scheme
         self.dynamic = self.scheme.traits.inertia
         self.moduli: Moduli | None = None
-        self.cached: dict[str, np.ndarray] = {}  # from the last equations
+        self.cached: dict[str, np.ndarray] = {}  # arrays of the last equations
         self.parts = 0
-        self.failure = ""  # why a step has no equilibrium
+        self.failure = ""  # reason why a step has no equilibrium
         self.unknowns = self.corrections = 0  # of the last equilibrium; of all steps
-        self.seconds: dict[str, float] = {}  # by stage
+        self.seconds: dict[str, float] = {}  # time by stage
 
     def advance(self, hooks: Tag, count: int) -> int:
         """Take up to `count` load steps; return the status, as `run_steps` does."""
@@ -179,7 +179,7 @@ class LoadSteps:
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
         """Take a substep, with the loads at its end; return corrections and residual.
 
-        Raises `Failed` without equilibrium; the points have not moved then.
+        Raises `Failed` if there is no equilibrium, in which case points have not moved.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
@@ -189,7 +189,7 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         simulation.steps.load_step(dt)
         try:
-            # Heat flows by these masses and changes the stress.
+            # These sums also give the capacities for heat flow, which changes the stress.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             loaded = simulation.hooks if self.dynamic else None
             loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
@@ -198,7 +198,7 @@ class LoadSteps:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
-                # Loads do work with their mean, as in Newmark's rule.
+                # The work of loads is done by their mean in the step, as in Newmark's rule.
                 loaded.loads[:] = 0.5 * (loads + loaded.loads)
             equilibrium = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(equilibrium)
@@ -245,7 +245,7 @@ class LoadSteps:
             torque[:] = 0
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        # Prescribed velocities otherwise start from the last step.
+        # Otherwise prescribed velocities would be differences to the last step.
         with simulation.steps.altered(last_dt=0.0):
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
@@ -259,8 +259,8 @@ class LoadSteps:
     ) -> "Equilibrium":
         """Find the displacements at which forces balance.
 
-        `before` (None without inertia) and `after` are the nodal forces of the present stress and
-        the loads at the beginning and at the end.
+        `before` (None without inertia) and `after` are the nodal forces of the present stress with
+        the loads at the beginning and at the end of the step.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -344,10 +344,9 @@ class LoadSteps:
             raise self._error(trouble.message, trouble.fix, trouble.mark)
 
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
-        """Let fixes publish the reactions at their nodes; set nodal velocities.
+        """Let fixes publish the reactions at their nodes, and set nodal velocities.
 
-        Fixes get the velocity that a node would have without them. Rigid solids take the remaining
-        forces.
+        A fix gets the velocity that nodes would have without it. Other forces act on rigid solids.
         """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
@@ -365,7 +364,7 @@ class LoadSteps:
         if around is not None:
             around[nodes] = np.stack([(v + without)[:, d], without[:, d]], axis=1)
         work = s.control.totals[WORK].copy()
-        with simulation.steps.altered(kept=0.0):  # reactions account for the whole velocity change
+        with simulation.steps.altered(kept=0.0):  # reactions contain the whole velocity change
             take_rows(self.scheme.hold, s, simulation.mode, hooks)
             if around is not None:
                 take_rows((HELD,), s, simulation.mode, hooks)
@@ -440,7 +439,7 @@ class LoadSteps:
         )
 
     def refuse_all_loose(self) -> None:
-        """Refuse, before any step, a scene in which fixes hold no node near points."""
+        """Raise ScriptError before the first step if fixes hold no node near points."""
         s, bound = self.simulation.setup, np.any(self.fixed_nodes(), axis=1)
         rigid = any(can(block.laws, constrained_velocity) for block in s.blocks)
         can_move = free_from(s.kin) < s.kin.dimension
@@ -467,7 +466,7 @@ class Equilibrium(NamedTuple):
     seepage: Seepage | None
     bodies: MovingBodies | None
     u: np.ndarray
-    fixed: np.ndarray  # held components
+    fixed: np.ndarray  # mask of held components
     reaction: np.ndarray
     iterations: int
     residual: float

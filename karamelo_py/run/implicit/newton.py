@@ -16,9 +16,9 @@ from karamelo_py.run.implicit.pore_water import Seepage
 from karamelo_py.run.implicit.rigid_bodies import MovingBodies
 from karamelo_py.run.implicit.tools import PushingTool
 
-ROUNDING = 50 * float(np.finfo(float).eps)  # of sums of some dozens of terms
+ROUNDING = 50 * float(np.finfo(float).eps)  # relative, for sums of some dozens of terms
 SINGULAR = "the equations are singular"
-ASTRAY = 1e4  # times as far as points may go
+ASTRAY = 1e4  # displacement over the largest allowed one above which the solution has diverged
 
 
 @contextmanager
@@ -31,7 +31,7 @@ def counted(seconds: dict[str, float], stage: str) -> Iterator[None]:
 
 
 class Failed(Exception):
-    """No equilibrium; `at` is a node, a point or a distance."""
+    """No equilibrium was found; `at` is a node, a point or a distance."""
 
     def __init__(self, reason: str = "", at: float = 0):
         super().__init__(reason)
@@ -39,11 +39,11 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would move `at` times as far as allowed at once."""
+    """Points would move `at` times as far as is allowed in a step."""
 
 
 class Loose(Failed):
-    """The equations are singular: hardly anything holds node `at`."""
+    """The equations are singular: node `at` is hardly held."""
 
 
 class Wrong(Failed):
@@ -55,11 +55,11 @@ class Broken(Failed):
 
 
 class Newton:
-    """The balance of forces after displacements, and its solution.
+    """The balance of forces as a function of displacements, and its solution.
 
-    `free` (m, d) masks the unknown components, `external` (m, d) are all forces but internal ones,
-    `pushing` are contact and tools. `seconds` collects the time of the stages stress, assembly and
-    solution; `fixed` returns the components (nodes, d) that fixes hold.
+    `free` (m, d) masks the unknown components, `external` (m, d) are all forces except internal
+    ones, `pushing` are contact and tools. `seconds` sums the time of the stages stress, assembly
+    and solution; ``fixed()`` returns the components (nodes, d) that fixes hold.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Newton:
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
-        self.kept: dict = {}  # solver data between corrections
+        self.kept: dict = {}  # data of the solver that are reused in the next correction
         self.seepage: Seepage | None = None
         self.bodies: MovingBodies | None = None
         with counted(seconds, "stress"):
@@ -97,8 +97,8 @@ class Newton:
     ) -> tuple[np.ndarray, int, float]:
         """Return displacements (m, d), the number of corrections and the residual.
 
-        `jump` (m, d) has the prescribed components. Raises `Failed` if the iterations do not
-        suffice, and `Broken` if `interrupted`, called with corrections and residual, returns True.
+        `jump` (m, d) contains the prescribed components. Raises `Failed` if the iterations do not
+        converge, and `Broken` if ``interrupted(corrections, residual)`` returns True.
         """
         scheme, free = self.scheme, self.free
         u = np.zeros_like(jump)
@@ -145,18 +145,18 @@ class Newton:
         return max(*norms, self._rounding(u) / self.scheme.tolerance, 1e-300)
 
     def _norm(self, forces: np.ndarray, free: np.ndarray | slice = slice(None)) -> float:
-        """Norm of the forces; torques count with the largest radius as lever."""
+        """Return the norm of the forces; torques are divided by the largest radius."""
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
-        """Estimate the rounding of forces: of strains relative to 1, and of u."""
+        """Estimate the round-off of forces, due to strains (relative to 1) and to `u`."""
         far = np.abs(u) + self.spacing / self.lever
         return ROUNDING * self._norm(self.stiff * far, self.free)
 
     def _correction(self, balance: np.ndarray, jump: np.ndarray, residual: float) -> np.ndarray:
         """Solve the linear equations for the change of all displacements (m, d).
 
-        The accuracy is what retains quadratic convergence (Eisenstat & Walker 1996).
+        The accuracy is such that convergence remains quadratic (Eisenstat & Walker 1996).
         """
         equations, free = self.equations, self.free
         with counted(self.seconds, "assembly"):
@@ -235,7 +235,7 @@ class Newton:
         far = max(far, np.abs(u[equations.led]).max(initial=0.0) / self.spacing)
         if far <= MOST_MOVED or not equations.s.frame.moves:
             return
-        if not self.pushing:  # contact only uses the present surfaces
+        if not self.pushing:  # contact uses the present surfaces only
             far = min(far, equations.furthest_into(u, self.fixed()))
         if far > MOST_MOVED:
             raise TooFar(f"points would move {far:.3g} cells at once", far / MOST_MOVED)

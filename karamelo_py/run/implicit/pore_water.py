@@ -1,13 +1,13 @@
 """Displacements of soil and nodal pore pressures of a load step (u-p).
 
-Balance of water at node i, with content w, volume V and Darcy's flux q of the points: sum N_i V0
-(w' - w) - dt sum V grad N_i . q = 0, q = -k (grad p - rho g). The pressure loads the soil with sum
-V p grad N_i. Time integration is backward Euler.
+The balance of water at node i is sum N_i V0 (w' - w) - dt sum V grad N_i . q = 0 over points with
+water content w, volume V and Darcy's flux q = -k (grad p - rho g). The pressure loads the soil with
+sum V p grad N_i. Time integration is backward Euler.
 
-Equal bases for displacement and pressure oscillate without drainage. Hence deviations of pressure
-increments from cell means get a compliance per volume, max(0, 3 / M - 12 k dt / h^2) (Bochev &
-Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for coupled
-solid-deformation/fluid-diffusion"; Zhao & Choo 2020), which conserves water.
+Without drainage, pressures oscillate if displacement and pressure have the same basis. Therefore
+deviations of pressure increments from cell means have a compliance per volume, max(0, 3 / M - 12 k
+dt / h^2) (Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for
+coupled solid-deformation/fluid-diffusion"; Zhao & Choo 2020), which conserves water.
 """
 
 from collections.abc import Iterable
@@ -33,7 +33,7 @@ from karamelo_py.run.implicit.equations import Equations, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
-OUTLET = 1e3  # conductance of a seepage face relative to its cells
+OUTLET = 1e3  # conductance of a seepage face over the conductance of its cells
 CAVITATION = -1e5  # Pa
 EPS = 50 * float(np.finfo(float).eps)
 
@@ -45,7 +45,7 @@ def is_wet(equations: Equations) -> bool:
 class Seepage:
     """Nodal pressures `p` (m,) of a step, and their equations.
 
-    Arrays of points have one entry per wet point, in the order of `wet`: blocks and their stencils.
+    Arrays of points have an entry per point with water, in the order of `wet` (blocks, stencils).
     """
 
     def __init__(self, equations: Equations, hooks: Tag, dt: float):
@@ -101,7 +101,7 @@ class Seepage:
         self.drains = self.suction < self.K
         ratio = self.content / self.pores
         self.before = self._scale(ratio - 1) * np.log(ratio)
-        # Weight and mobility follow from the water in full pores.
+        # Weight and mobility are computed for the water in full pores.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)
@@ -141,7 +141,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Volume (m,) given to nodes; stores the mass per time, as `MakeFlux` does."""
+        """Return the volume (m,) given to nodes; store the mass per time, as `MakeFlux` does."""
         flux = field(self.equations.s.nodes.fields, GivenFlux)
         if flux is None:
             return np.zeros(self.m)
@@ -161,7 +161,7 @@ class Seepage:
         at = self.N @ self.p
         self._strain(u)
         self.lift = self.volume * (1 + self.growth)
-        # Bishop (1959): the saturated fraction of the pressure acts on the soil.
+        # Bishop (1959): pressure times saturation acts on the soil.
         dry = self.drains & (at < 0)
         self.filled = np.where(dry, np.exp(np.minimum(at, 0) / self.suction), 1.0)
         self.acting = self.filled * (1 + np.where(dry, at / self.suction, 0.0))
@@ -187,7 +187,7 @@ class Seepage:
         d = self.d
         H = np.stack([np.stack([g @ u[:, i] for g in self.G], 1) for i in range(d)], 1)
         trace = np.trace(H, axis1=1, axis2=2)
-        # det(I + H) - 1 without cancellation
+        # det(I + H) - 1, without cancellation
         growth = trace + 0.5 * (trace * trace - np.einsum("pij,pji->p", H, H))
         self.growth = growth + (np.linalg.det(H) if d == 3 else 0.0)
         back = np.repeat(np.linalg.inv(np.eye(d) + H), np.diff(self.starts), axis=0)
@@ -208,7 +208,7 @@ class Seepage:
     def solve(
         self, A: sp.spmatrix, b: np.ndarray, jump: np.ndarray, free: np.ndarray, kept: dict
     ) -> np.ndarray:
-        """Correct the pressures; return the change of displacements (m d,)."""
+        """Correct the pressures, and return the change of displacements (m d,)."""
         Q = (self.B.T @ sp.diags(self.lift * self.acting) @ self.N).tocsr()
         R = (self.B.T @ sp.diags(self.lift * self.filled) @ self.N).tocsr()
         slow = self.D.T @ sp.diags(self.volume * self.compliance) @ self.D
@@ -235,7 +235,7 @@ class Seepage:
     def _change(self, step: np.ndarray) -> None:
         """Add a change of the pressures.
 
-        Where pores empty, the change is made in the saturation exp(p/a).
+        In unsaturated soil, the change is made linearly in the saturation exp(p/a).
         """
         a, whole = self.softest, self.p + step
         S = np.exp(np.minimum(self.p, 0) / a)
@@ -244,11 +244,11 @@ class Seepage:
         self.p = np.where((a < np.inf) & (left < 1), dried, whole)
 
     def cavitates(self) -> bool:
-        """True if water in full pores is below -1 bar."""
+        """Return whether water in full pores is below -1 bar."""
         return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:
-        """Write the water of the points; let fixes publish what left through their nodes."""
+        """Store the water of the points; let fixes publish what has left through their nodes."""
         first = 0
         for block, seen in self.wet:
             some = slice(first, first := first + len(seen.count))

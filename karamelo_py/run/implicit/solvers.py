@@ -10,21 +10,21 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, SuperLU, splu
 
-AMG_FROM = 5000  # unknowns above which multigrid beats a direct solver
+AMG_FROM = 5000  # unknowns above which multigrid is faster than a direct solver
 AMG_FROM_IN_3D = 2000
-MANY_ITERATIONS = 25  # above which the hierarchy is rebuilt
+MANY_ITERATIONS = 25  # iterations above which the hierarchy is built again
 
 
 class Singular(Exception):
-    """No solution: something is not held, or a limit load is reached."""
+    """There is no solution: a body is not held, or a limit load is reached."""
 
 
 class Unconverged(Exception):
-    """Multigrid leaves more than 1 % of the residual."""
+    """Multigrid has reduced the residual by less than a factor of 100."""
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
-    """Decouple the `fixed` components (m, d) of a matrix; add `more` (m,) to the others."""
+    """Decouple the `fixed` components (m, d) of a matrix; add `more` (m,) to other diagonals."""
     rows = np.repeat(np.arange(len(fixed)), np.diff(A.indptr))
     some = np.any(fixed, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
@@ -50,11 +50,11 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # first, since factors take most of the memory
+    release(kept)  # before the next factors, which take most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
-            # Columns of the transposed matrix are the rows of B.
+            # The transposed matrix by columns has the arrays of B, which is by rows.
             factors = splu(B.T, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         except (RuntimeError, MatrixRankWarning):
             raise Singular from None
@@ -64,7 +64,7 @@ def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarra
 
 def release(kept: dict) -> None:
     for level in kept["multigrid"].levels if "multigrid" in kept else ():
-        vars(level).clear()  # levels contain reference cycles
+        vars(level).clear()  # levels are in reference cycles
     kept.clear()
 
 
@@ -82,10 +82,10 @@ def amg(
 ) -> np.ndarray:
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns, 0 where decoupled: the near null space of
-    smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual over b.
-    The hierarchy takes most of the time, so it is stored in `kept` and reused for similar matrices
-    while few iterations suffice.
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones: the near null space
+    for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual over
+    b. To build the hierarchy takes most of the time, so it is stored in `kept` and reused for
+    similar matrices as long as few iterations are needed.
     """
     import pyamg
 
@@ -93,11 +93,11 @@ def amg(
     if grids is None:
         release(kept)
     else:
-        grids.levels[0].A = None  # free the last matrix first
+        grids.levels[0].A = None  # frees the last matrix first
     B, s = scaled(A, kept.get("scale"))
     symmetric = is_symmetric(B)
     left: list[float] = []
-    # pyamg resets warning filters; residuals show a failure.
+    # pyamg resets warning filters; failures are detected by residuals.
     with from_one_seed(), warnings.catch_warnings(record=True):
         if grids is None:
             symmetry = "symmetric" if symmetric else "nonsymmetric"
@@ -130,7 +130,7 @@ def from_one_seed() -> Iterator[None]:
     np.random.seed(0)
     try:
         yield
-    except ValueError:  # infinite numbers on a level
+    except ValueError:  # a level has infinite numbers
         raise Unconverged from None
     finally:
         np.random.set_state(state)
@@ -144,7 +144,7 @@ def solve(
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)
-        except (Singular, Unconverged):  # multigrid fails for some matrices
+        except (Singular, Unconverged):  # as multigrid fails for some matrices
             release(kept)
     x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b, kept)
     if not np.all(np.isfinite(x)):

@@ -9,11 +9,11 @@ from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.modify import Fix, PointsView
 
-NEAR = 1e-6  # cells, over which forces are compared
+NEAR = 1e-6  # step of finite differences, in cells
 
 
 class Displaced:
-    """Points of a view displaced by (n, d), with old volume and damage."""
+    """A view of points displaced by `way` (n, d), with unchanged volume and damage."""
 
     def __init__(self, view: PointsView, way: np.ndarray):
         self.view, self.position = view, view.position + way
@@ -41,7 +41,7 @@ class PushingTool:
         self.gather = sp.csr_matrix((np.concatenate(weights), at), shape)
         self.gather_all = equations.for_all_components(self.gather)
         self.way = np.zeros((shape[0], self.d))
-        self.included = self.force = self.at(self.way)  # included in the forces of the step
+        self.included = self.force = self.at(self.way)  # part of the forces of the step
 
     def at(self, way: np.ndarray) -> np.ndarray:
         return self.fix.forces(Displaced(self.view, way))
@@ -62,7 +62,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force; apply the mean, which has done the work, to the points."""
+        """Publish the force; apply the mean force in the step, which does work, to the points."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()

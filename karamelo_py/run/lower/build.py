@@ -54,7 +54,7 @@ from karamelo_py.script.errors import Mark, ScriptError, render_message
 from karamelo_py.styles.methods.base import CORRECTED
 
 PRECISIONS = {"double": np.float64, "single": np.float32}
-SERIAL_UP_TO = 20_000  # points; below, threads cost more than they save
+SERIAL_UP_TO = 20_000  # points up to which threads cost more time than they save
 
 
 class State(NamedTuple):
@@ -220,9 +220,9 @@ def lower(
     hub: Hub, previous: State | None = None, *, ids: tuple[int, int] | None = None,
     comm: SerialComm | None = None,
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
-    """Make the arrays of a run from the scene, continuing the state of earlier points.
+    """Make the arrays of a run from the scene, with the `previous` state of existing points.
 
-    With `ids` (first, end), these are only those points, with the tiles of a process of `comm`.
+    With `ids` (first, end), they contain only these points, with tiles of a process of `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -297,9 +297,9 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 
 
 def returns_loss(hub: Hub) -> bool:
-    """True if kinetic energy that the transfer dissipates heats points.
+    """Return whether kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 without moments only dissipates energy that vanishes with the step. For XPIC, see
+    FLIP 1 without moments dissipates only energy that vanishes as the step goes to 0. For XPIC see
     `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer
@@ -353,7 +353,7 @@ def part_of(solid: Solid, first: int, end: int) -> Solid:
 
 
 def points_at_rest(hub: Hub, setup: arrays.Setup, ids: np.ndarray) -> list[arrays.Points]:
-    """Points `ids` (ascending) in their initial state, as in the blocks of `setup`."""
+    """Return points `ids` (ascending) in their initial state, in blocks as in `setup`."""
     span = int(ids[0]), int(ids[-1]) + 1
     real = PRECISIONS[hub.settings.precision]
     kinds = fields.declared(owners_of_fields(hub, setup.contact), "point_fields")
@@ -384,7 +384,7 @@ def lower_points(
     count = int(ends[-1])
 
     def joined(values: Iterable, dtype: type) -> np.ndarray:
-        """Numbers or columns per solid, or values per point, as (n,) or (k, n)."""
+        """Join values of solids (numbers, columns or values per point) to (n,) or (k, n)."""
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
             if not array.size:

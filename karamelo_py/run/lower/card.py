@@ -81,12 +81,12 @@ def memory_there(simulation: SceneState) -> int:
 
 
 def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
-    """Yield an error for everything in a scene that no GPU supports.
+    """Yield an error for everything in a scene that is not supported on GPUs.
 
     Without `setup`, checks that need arrays are skipped.
     """
     scheme = hub.update.scheme
-    from karamelo_py.run.gpu import Card  # registers its rows
+    from karamelo_py.run.gpu import Card  # the import registers rows of steps
 
     rows = scheme.rows if setup is None else table.plain(scheme.rows, setup)
     for kind in untaken(rows, Card):

@@ -27,8 +27,8 @@ from karamelo_py.scene.plugins import PartInUse, attributed, foreign_parts
 from karamelo_py.script.errors import plural
 
 TENSORS = (laws.cauchy_stress, laws.kirchhoff_stress, laws.elastic_strain)
-STRAINS = (0, 1e-3, 0.05)  # the last exceeds the yield strain of metals
-TRIED = 8  # points, if the scene has enough
+STRAINS = (0, 1e-3, 0.05)  # the last one exceeds the yield strain of metals
+TRIED = 8  # number of points that are tried
 NUMBERS = (laws.jacobian, laws.wave_speed_squared, laws.energy_density)
 
 
@@ -78,7 +78,7 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
         ):
             try:
                 result = results(sample.tag, sample, Member(p, law, state, values, 1.0))
-            except ArithmeticError:  # from sample numbers
+            except ArithmeticError:  # sample numbers may cause it
                 continue
         expected = len(hook.writes) + hook.publishes
         if not isinstance(result, tuple) or len(result) != expected:
@@ -105,14 +105,14 @@ def _one(setup: Setup) -> Number:
 
 @contextmanager
 def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
-    """Report faults, but not invalid numbers of sample points."""
+    """Report faults of a plug-in, but not invalid results for sample numbers."""
     with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield
         except ArithmeticError:
             return
         except ValueError as error:
-            if str(error) != "math domain error":  # another shape is a fault
+            if str(error) != "math domain error":  # other ValueErrors, as of shapes, are faults
                 raise
 
 

@@ -55,7 +55,7 @@ def lower_hooks(
         rigid_fields=builder.rigid_fields,
         torques=hub.values.torques,
         mode=mode or Serial(),
-        # Padded, so that threads do not write to the same cache line.
+        # Padded, so that threads do not write to a common cache line.
         apart=arrays.Apart(
             chosen=np.zeros((copies, BLOCK), np.int64),
             scratch=np.zeros((copies, STACK + ROWS + 1, BLOCK)),
@@ -85,18 +85,18 @@ class _Builder:
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
         self.points = points
-        self.uses_first = False  # positions before the first step
+        self.uses_first = False  # whether hooks use initial positions
         self.rows: list[tuple] = []
         self.programs: list[list[tuple]] = []
         self.members: list[np.ndarray] = []
         self.code: list[np.ndarray] = []
         self.constants: list[np.ndarray] = []
         self.holding: list[Fix] = []
-        self.loaded_nodes = 0  # 0 if no hook adds forces
+        self.loaded_nodes = 0  # 0 if hooks add no forces to nodes
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
-        self.whole: list[Tag] = []  # on whole points
+        self.whole: list[Tag] = []  # hooks that get whole points
         self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
@@ -122,7 +122,7 @@ class _Builder:
         after_contact = late and fix.brakes and apart
         stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
         self.rows.append((address, stage, begin, end, slot, *uses))
-        whole = hook.tag is not None  # its functions take all directions
+        whole = hook.tag is not None  # its functions are for all directions
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self._program, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
@@ -213,9 +213,9 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Call a hook; if each process calls it for its points, check that all agree.
+    """Call a hook; if each process calls it for its points, check that processes agree.
 
-    Collective calls must match, else processes deadlock; published values must be equal, else they
+    If their collective calls differed, processes would deadlock; if published values differ, they
     are partial sums.
     """
     try:
@@ -251,7 +251,7 @@ def _on_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
 
 
 def _on_heat_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
-    # Temperature and capacity replace velocity and mass in the view.
+    # In this view, temperature and capacity take the positions of velocity and mass.
     nodes = s.heat.nodes._replace(fields=s.nodes.fields)
     _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
@@ -326,9 +326,9 @@ def _sets_initial_state(fix: Fix) -> bool:
 
 
 class FixesOfRun(NamedTuple):
-    once: list[Fix]  # set the initial state
+    once: list[Fix]  # fixes that set the initial state
     new: list[Fix]
-    first: ActingFixes | None  # of the first step, if some act only in it
+    first: ActingFixes | None  # fixes of the first step, if some act only in this step
     lasting: ActingFixes
 
     @property

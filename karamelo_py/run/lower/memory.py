@@ -1,6 +1,6 @@
-"""Memory of a scene or a process's part of it; scenes that do not fit are refused.
+"""Memory of a scene or of a process's part of it; scenes that do not fit are refused.
 
-Only the minimum that a run needs is compared, so nothing that would run is refused.
+Only the minimum that a run needs is compared, so that no scene is refused that could run.
 """
 
 import gc
@@ -21,13 +21,13 @@ from karamelo_py.scene.machine_memory import in_words, machine_memory
 from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.script.errors import ScriptError, plural
 
-LARGE, PAGE = 1 << 22, 1 << 21  # bytes above which NumPy uses large pages; their size
-THERE = 1  # bytes per point, in `present`
+LARGE, PAGE = 1 << 22, 1 << 21  # bytes above which NumPy uses large pages, and the size of these
+THERE = 1  # bytes per point in `present`
 
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # bytes of the last good state
+    copied: int  # bytes of the copy of the last good state
     common: int  # bytes about the whole scene in each process
 
 
@@ -63,9 +63,9 @@ def _held(item: object, seen: set[int]) -> int:
 
 
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
-    """Bytes of array rows in ascending spans (k, 2).
+    """Return the bytes of array rows in ascending spans (k, 2).
 
-    For large arrays Linux uses pages of 2 MiB, which include gaps between used nodes.
+    For large arrays, Linux uses pages of 2 MiB, which may include gaps between nodes in use.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row
@@ -98,7 +98,7 @@ def bytes_per_point(simulation: SceneState) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-FITS_EVERYWHERE = 100_000  # points
+FITS_EVERYWHERE = 100_000  # points of a scene that fits into any machine
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
@@ -108,7 +108,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         return
     need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > memory.free:
-        # Former scenes contain reference cycles.
+        # Earlier scenes are in reference cycles.
         gc.collect()
         memory = machine_memory(comm.on_machine) or memory
     if need <= memory.free:
@@ -120,7 +120,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
         f"{beside}; this machine has "
     )
-    if need <= memory.whole:  # other programs may release it
+    if need <= memory.whole:  # other programs may release memory
         message += f"{in_words(memory.free)} free: it may not fit"
         hub.warn(message, mark=mark, hint=_ways(hub, need, memory.free, copied))
         return
@@ -154,7 +154,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        ppc = solid.ppc  # else the number of cells is unknown
+        ppc = solid.ppc  # without it the number of cells is unknown
         cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.traits.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (

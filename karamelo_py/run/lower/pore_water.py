@@ -12,7 +12,7 @@ from karamelo_py.points.laws.pore_water import Saturated
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 
-UNDRAINED, DRAINED = 3e-4, 2.0  # c_v t / H^2
+UNDRAINED, DRAINED = 3e-4, 2.0  # time factors c_v t / H^2
 RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
@@ -54,7 +54,7 @@ class PoreWater(NamedTuple):
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
-        """Name the drainage of a solid in a time, across its shortest side."""
+        """Return words for the drainage of a solid in a time, along its shortest side."""
         law, kin = solid.material.whole, Space()
         M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag

@@ -23,10 +23,10 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-# Answers besides step numbers, which are positive.
+# Answers other than step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 RankArray = tuple[int, np.ndarray]
-PAUSE = 0.005  # seconds between checks for other processes
+PAUSE = 0.005  # seconds between checks of other processes
 
 
 def launched() -> tuple[int, int]:
@@ -37,9 +37,9 @@ def launched() -> tuple[int, int]:
 
 
 class MpiComm(SerialComm):
-    """All processes of a run, through mpi4py; the first writes.
+    """Communicator of all processes of a run, by mpi4py; rank 0 writes files.
 
-    `ends` reports an error and ends all of them.
+    `ends` reports an error and ends all processes.
     """
 
     parted = False
@@ -56,11 +56,11 @@ class MpiComm(SerialComm):
                 hint=INSTALL,
             ) from None
         self.mpi = MPI
-        # Its messages may exceed 2 GB.
+        # With pkl5, messages may exceed 2 GB.
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
-        self._aside = world.Dup()  # agreement, independent of other messages
-        self._between = world.Dup()  # messages within steps
+        self._aside = world.Dup()  # for agreement, independent of other messages
+        self._between = world.Dup()  # for messages within steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.allgather(mine).count(mine)
@@ -158,17 +158,14 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """Check that all processes begin the same run.
-
-    If not, one reports the difference and the others quit.
-    """
+    """Check that all processes begin the same run; if not, one reports it and the others quit."""
     comm = hub.settings.comm
     present = [hub.mark and (hub.mark.file, hub.mark.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))
     if (words == words[0]).all():
         return
     comm.parted = True
-    # A failed process reports it.
+    # A process that has failed reports it.
     if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
         raise Quit
     raise ScriptError(

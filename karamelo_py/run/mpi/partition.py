@@ -1,6 +1,6 @@
-"""Tiles divided among processes, and their messages.
+"""Division of tiles among processes, and messages between the processes.
 
-Nodes in reach of several processes are summed by each, in the same order.
+Nodes in reach of several processes are summed by each of these, in the same order.
 """
 
 from collections.abc import Sequence
@@ -34,10 +34,10 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     """Divide tiles by recursive bisection across the longest direction; return the part (T,).
 
     After Berger & Bokhari (1987), "A partitioning strategy for nonuniform problems on
-    multiprocessors", IEEE Transactions on Computers C-36, 570-580. A layer of tiles whose work must
-    be divided is cut across the next longest direction. `places` (T, d) are lower corners, `work`
-    (T,) integers; tiles without work fill the parts. The last direction is cut only if `rows` times
-    as long as the others.
+    multiprocessors", IEEE Transactions on Computers C-36, 570-580. If a layer of tiles must be
+    divided, it is cut across the next longest direction. `places` (T, d) are lower corners, `work`
+    (T,) integers; tiles without work belong to any part. The last direction is cut only if it is
+    `rows` times as long as the others.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)
@@ -50,7 +50,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
             continue
         busy = places[tiles[work[tiles] > 0]]
         lengths = np.ptp(busy, axis=0) if len(busy) else np.ones(d)
-        # Of equally long directions, the one with the largest stride in memory.
+        # Of equally long directions, prefer the one with the largest stride in memory.
         long = np.argsort(-lengths / least, kind="stable")[::-1]
         tiles = tiles[np.lexsort([places[tiles, k] for k in long])]
         ends = np.cumsum(work[tiles])
@@ -60,12 +60,11 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     return share
 
 
-IMBALANCE = 1.1  # factor by which repartitioning must lower the largest work
-# Ratio of lengths above which bodies are cut along long tiles: rows of nodes with gaps take twice
-# as long to pass through.
+IMBALANCE = 1.1  # factor by which a new division must reduce the largest work
+# Ratio of lengths above which bodies are cut along long tiles. Rows with gaps are half as fast.
 ROWS = 4
 OF_TILES = ("number", "range", "grid", "box", "rows")
-FINE = 1000  # integer work per unit of cost
+FINE = 1000  # integers per unit of cost
 
 
 class Needs(NamedTuple):
@@ -74,7 +73,7 @@ class Needs(NamedTuple):
     hi: np.ndarray  # (k, d)
 
     def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Intersect boxes (m, d) in tiles (m,) with these; return indices, first and last nodes."""
+        """Return the overlap with boxes (m, d) in tiles (m,): indices, first and last nodes."""
         at = np.minimum(np.searchsorted(self.tile, tile), len(self.tile) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.tile[at] == tile) & (low <= high).all(axis=1))
@@ -94,7 +93,7 @@ class SharedTiles(Tiles):
     ):
         super().__init__(lattices, basis, points, sparse)
         self.comm = comm
-        self.one_space = one_space  # bodies in contact have nodes at the same positions
+        self.one_space = one_space  # whether bodies in contact have nodes at the same positions
         self._places = np.concatenate(
             [
                 one.lo[: self.dimension] + one.h * self.size * np.argwhere(np.ones(shape, bool))
@@ -102,7 +101,7 @@ class SharedTiles(Tiles):
             ]
         )
         self.owner = np.zeros(self.count, np.int64)
-        # Memory of points by block and field; free memory by shape and type.
+        # Memory of points, by block and field; unused memory, by shape and type.
         self._rooms: dict[tuple[int, str], np.ndarray] = {}
         self._spare: dict[tuple, np.ndarray] = {}
         self.foreign = np.zeros(int(self._first_node[-1] + self._nodes[-1].prod()), np.uint8)
@@ -110,7 +109,7 @@ class SharedTiles(Tiles):
         self.sent: dict[int, np.ndarray] = {}  # rows of the buffers, by rank
         self._taken: dict[int, slice] = {}
         self._links: dict[tuple[int, int], tuple[list, Any]] = {}
-        self._from = np.empty(0, np.int64)  # ranks of other processes' boxes
+        self._from = np.empty(0, np.int64)  # rank of each box of another process
 
     def share_out(self, work: np.ndarray) -> None:
         if not self.direct:
@@ -142,7 +141,7 @@ class SharedTiles(Tiles):
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         tiles = [self.tiles_of(s, block.points) for block in s.blocks]
-        # The last sort knows the nodes in reach.
+        # The nodes in reach are known from the last sort.
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
@@ -151,7 +150,7 @@ class SharedTiles(Tiles):
 
         def parts(rank: int) -> list[list[np.ndarray]]:
             return [
-                # Contiguous, unlike a masked array.
+                # np.compress makes contiguous arrays.
                 [np.compress(to == rank, array, axis=-1) for _, array in arrays_of(block.points)]
                 for block, to in zip(s.blocks, owners, strict=True)
             ]
@@ -166,9 +165,9 @@ class SharedTiles(Tiles):
         return s._replace(blocks=blocks)
 
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
-        """Join the points that stay and those that arrive, in the memory of the last sort."""
+        """Join points that stay and points that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
-        # Fresh memory would take longer than the rest of a sort.
+        # New memory would take longer than the rest of a sort.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]
@@ -185,7 +184,7 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
-            give_up(old)  # only one field exists twice at a time
+            give_up(old)  # so that only one field has two copies at a time
             for parts in come:
                 parts[i] = None
         return made_of(points, arrays)
@@ -309,7 +308,7 @@ class SharedTiles(Tiles):
         self.sent = {
             rank: _rows(low, high, first[which], steps[which])
             for rank, (which, low, high) in self._passed.items()
-            if len(which)  # hulls may overlap without a common node
+            if len(which)  # boxes may overlap without a common node
         }
         ends = np.append(0, np.cumsum(np.prod(boxes.hi - boxes.lo + 1, axis=1)))
         local = len(ends) - 1 - len(self._from)
@@ -322,7 +321,7 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        # The first process that uses a node counts it.
+        # A node is counted by the first process that uses it.
         self.foreign[self._marked] = 0
         nodes, me = [self._marked[:0]], self.comm.rank
         if self._looks_beyond:
@@ -455,7 +454,7 @@ def join_tilings(tiling: Tiling, tilings: list[dict[str, np.ndarray]]) -> None:
     rows = {name: _joint(tilings, name)[order] for name in names}
     ranges = one_after_another(rows["range"])
     if "report" in rows:
-        # Failed points stay in their tile.
+        # Points that failed remain in their tile.
         wrong = rows["report"][:, 2] > 0
         rows["report"][wrong, 2] += (ranges - rows["range"])[wrong, 0]
     for name, array in (rows | {"range": ranges}).items():

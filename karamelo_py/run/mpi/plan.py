@@ -1,4 +1,4 @@
-"""The division of a scene among processes, predicted by one: memory, messages per step."""
+"""The division of a scene among processes, predicted by one process: memory and messages."""
 
 from typing import NamedTuple
 
@@ -22,11 +22,11 @@ MAY_CHANGE = 1.25  # largest number of points over the mean
 
 class ProcessShare(NamedTuple):
     points: int
-    tiles: int  # of points
+    tiles: int  # tiles with points
     nodes: int
     others: int  # processes to which it sends
     sent: int  # bytes per step
-    memory: int  # bytes touched in steps, and of a copy of the last good state
+    memory: int  # bytes used in steps, and of the copy of the last good state
     common: int  # bytes about the whole scene
 
 
@@ -89,7 +89,7 @@ def plan(simulation: Simulation, ranks: int) -> list[ProcessShare]:
 def _share(simulation: Simulation, s: Setup, tiles: SharedTiles, per_node: int) -> ProcessShare:
     none = s.nodes._replace(
         sums=s.nodes.sums[:, :0], velocity=s.nodes.velocity[:, :0], fields=()
-    )  # only positions matter
+    )  # only positions are needed
     tiles.lay_out(s._replace(buffers=tiles.empty_buffers(none, len(s.blocks))))
     tilings = [block.tiling for block in s.blocks]
     memory = memory_of(simulation, s, tiles.box_bytes(simulation.setup))

@@ -1,4 +1,4 @@
-"""A whole scene gathered at the first process, for functions of all points."""
+"""The whole scene, gathered on rank 0, for functions of all points."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A Python fix moved points to other processes: begin the step again."""
+    """A Python fix has moved points to other processes, so the step must begin again."""
 
 
 class Whole:
@@ -121,7 +121,7 @@ class Whole:
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
-            array[nodes] = 0  # including nodes that no box reaches
+            array[nodes] = 0  # also nodes that no box reaches
         memory = self.subdomain.memory()
         for share in parts:
             for (_, array), rows in zip(of_nodes(whole), share["at nodes"], strict=True):
