@@ -61,6 +61,10 @@ def serve(path: str) -> None:
     """Fork for each that asks."""
     import gc
 
+    if os.environ.get("NUMBA_DISABLE_JIT"):
+        from uncompiled import quicken
+
+        quicken()
     import karamelo_py.app.cli
     import karamelo_py.commands
     import karamelo_py.run.loop  # noqa: F401

@@ -330,12 +330,13 @@ def test_variables_that_are_0_in_some_runs_have_a_time_as_well():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="terminals of POSIX")
+@pytest.mark.usefixtures("starts_are_cheap")
 def test_a_terminal_shows_what_runs(folder):
     """A line for each run that has ended, and below a bar with what goes on."""
     import pty
 
     read, write = pty.openpty()
-    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 400"), "utf-8")
+    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 60"), "utf-8")
     words = ["sweep", "in.flight", "-var", "speed=1e-5,2e-5", "-jobs", "1"]
     command = [sys.executable, "-m", "karamelo_py.app.cli", *words]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120"}

@@ -206,14 +206,29 @@ def quick_totals(totals: ModuleType) -> None:
     totals.add_to, totals.add_many, totals.carry = add_to, add_many, carry
 
 
-def main() -> None:
-    """Serve requests until the input ends."""
-    requests, answers = sys.stdin, sys.stdout
-    import karamelo_py
+def quick_slopes(slopes: ModuleType) -> None:
+    """Combine the slopes of floats, of which 0 is a literal, by a loop of Python."""
+
+    def combined(value, a, x, b, y):
+        if not isinstance(y, slopes.Dual):
+            return slopes.Dual(value, tuple([s and a * s for s in x.slopes]))
+        if not isinstance(x, slopes.Dual):
+            return slopes.Dual(value, tuple([t and b * t for t in y.slopes]))
+        pairs = zip(x.slopes, y.slopes, strict=True)
+        both = [(a * s + b * t if t else a * s) if s else t and b * t for s, t in pairs]
+        return slopes.Dual(value, tuple(both))
+
+    slopes.combined = combined
+
+
+def quicken() -> None:
+    """Import the program, and let it interpret scenes faster, with the same numbers."""
+    from karamelo_py.compiler import slopes
     from karamelo_py.compiler.trace.functions import PointFunction
     from karamelo_py.kernels import totals
     from karamelo_py.points.basis import product
 
+    quick_slopes(slopes)
     quick_totals(totals)  # before others import them
     # Before the bases are there, which register them: a tenth of what steps take.
     product._locate_product, product._entry_product = remembered(
@@ -226,6 +241,16 @@ def main() -> None:
     quick_records()
     cli._parser = functools.cache(cli._parser)  # a third of what a tiny scene takes
     gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for
+    gc.set_threshold(50_000, 20, 100)  # and few cycles
+
+
+def main() -> None:
+    """Serve requests until the input ends."""
+    requests, answers = sys.stdin, sys.stdout
+    quicken()
+    import karamelo_py
+    from karamelo_py.app import cli
+
     trouble_emulator()
     # Which package it is: the first line.
     print(karamelo_py.__file__, flush=True)
