@@ -168,6 +168,25 @@ def test_a_chain_of_two_hinges_swings(run_interpreted):
     assert log.elbow_y == pytest.approx(-log.b_fy)
 
 
+def test_action_is_reaction_of_links(run_interpreted):
+    """A chain of two bodies, on which a third one lies: what joints and contact exert is theirs."""
+    solids, lines, fall = "", "", "gravity=(0, -10)"
+    shapes = "block, 10, 12, 9.5, 10.5", "block, 12, 14, 9.5, 10.5", "block, 12.5, 13.5, 10.5, 11.5"
+    for ID, shape in zip("abc", shapes, strict=True):
+        one, move = body(ID, shape, fall)
+        solids, lines = solids + one, lines + move.replace("fix(", "fix(m")
+    lines += "fix(pin, joint, hinge, a, at=(10, 10))\nfix(elbow, joint, hinge, a, b, at=(12, 10))\n"
+    lines += "fix(t, contact/bodies, b, c, mu=0.3)\n"
+    IDs = {"A": "a", "B": "b", "C": "c", "P": "pin", "E": "elbow", "T": "t"}
+    lines += "".join(f"compute({k}, force_on, {IDs[k]})\n" for k in IDs)
+    names = ", ".join(f"{k}_{axis}" for k in IDs for axis in ("x", "y", "tz"))
+    log = run_interpreted(scene([(solids, lines)], "", names, steps=3)).log
+    A, B, C, P, E, T = (np.stack([log[f"{k}_{x}"] for x in ("x", "y", "tz")]) for k in IDs)
+    assert np.abs(C[1:, 1:]).max() > 0.1
+    for found, exact in ((A, P + E), (B, T - E), (C, -T)):
+        assert found == pytest.approx(exact, abs=1e-7)
+
+
 def test_a_spring_on_a_slider(run_interpreted):
     """A leapfrog of period 2 pi, on a line that leans, which no torque or gravity leaves."""
     box = body("a", "block, 5, 7, 5, 6", "gravity=(0.8, -0.6), spin=0")
