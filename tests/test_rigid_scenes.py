@@ -253,3 +253,35 @@ def test_a_ball_does_not_pass_a_wall_of_one_cell(run_script, method, thrown):
     log = run_script(BALL.format(method=method, ball=thrown, wall=wall, lines=lines)).log
     assert (log.m_x - log.c_x).max() < 0.3 and (log.m_x - log.c_x).min() < 0.06
     assert (log.m_x - log.c_x).min() > 0  # the centre does not reach the wall
+
+
+REBOUND = """
+h = 0.1
+method({method}, FLIP, linear, 1)
+dimension(2, 0, 3, 0, 2, h)
+region(ball, cylinder, 1.5, 1.1, 4*h)
+region(base, block, 0.5, 2.5, 0.2, 0.6)
+material(rubber, neo-hookean, 1000, 1e6, 0.3)
+material(steel, rigid, 1000)
+solid(ball, region, ball, 2, rubber, h)
+solid(base, region, base, 2, steel, h)
+group(ball, particles, region, ball, solid, ball)
+fix(v, initial_velocity_particles, ball, 0, -0.3)
+fix(b, rigid_body, base, mass=1e6, gravity=(0, -1e-9))
+{touch}
+compute(p, linear_momentum, ball)
+set_output(1000)
+log_modify(custom, time, p_y, b_vy)
+run_time(0.8)
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "touch"),
+    [("ulmpm/contacts", ""), ("ulmpm", "fix(t, contact/rigid_body, all, base)")],
+)
+def test_an_elastic_ball_rebounds(run_script, method, touch):
+    """At 1 % of the speed of sound hardly any energy stays in vibrations (Hertz 1882)."""
+    log = run_script(REBOUND.format(method=method, touch=touch)).log
+    restitution = -log.p_y[-1] / log.p_y[0]
+    assert 0.93 < restitution < 1 and log.b_vy[-1] < 0
