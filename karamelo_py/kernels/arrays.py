@@ -21,22 +21,22 @@ from karamelo_py.kernels.totals import LIMBS, Alone
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import vector
 
-# NamedTuple, often empty, whose class selects implementations
+# A NamedTuple, often empty, whose class selects implementations.
 Tag: TypeAlias = Any
-# double, single, lanes of these, or a number with derivatives
+# Double or single precision, lanes of these, or a number with derivatives.
 Number: TypeAlias = Any
-# one index, or several in lanes
+# An index, or several indices in lanes.
 Index: TypeAlias = Any
 
 
 class Nodes(NamedTuple):
     sums: np.ndarray  # mass, momentum, force
     update: np.ndarray  # v* after the update, v* - v
-    velocity: np.ndarray  # deforms the points
+    velocity: np.ndarray  # velocity that strains the points
     fields: tuple  # (N, components) each
 
 
-# First components of node records; a 3D vector takes four numbers, one register.
+# First components of node records. A 3D vector has four numbers, which fill a register.
 MASS = 0
 
 
@@ -56,14 +56,14 @@ def vector_at(kin, records, i, first, template):
     return vector(kin, row(records, i, first, (*template,)))
 
 
-# record widths by dimension
+# Widths of node records by dimension.
 SUMS_WIDTH = {1: 4, 2: 8, 3: 8}
 UPDATE_WIDTH = {1: 2, 2: 4, 3: 8}
 VELOCITY_WIDTH = {1: 1, 2: 2, 3: 4}
 
 
 class Points(NamedTuple):
-    """Points of one law, by tile; a location (w numbers) is position and stored domain shape."""
+    """Points of one law, sorted by tile; a location (w numbers) is position and domain shape."""
 
     x: np.ndarray  # (2, w, n) locations; `motion.now` is the present index
     home: np.ndarray | None  # (w, n) reference locations (total frame)
@@ -77,7 +77,7 @@ class Points(NamedTuple):
 
 
 def known_to_laws(points):
-    """Omit optional fields, so that kernels of laws serve all methods."""
+    """Omit optional fields, so that kernels of laws are the same for all methods."""
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
         points.id, (),
@@ -100,23 +100,23 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    # (3,) int64: occupied tiles, parts of the points, parts that other processes wait for
+    # (3,) int64: numbers of occupied tiles, of parts of the points, of parts for other processes
     count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: grid of the k-th occupied tile
-    number: np.ndarray  # (T + 1,) int64: its number
-    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes in reach
+    number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile
+    box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes in reach of its points
     # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i ny + j), from the
     # row's first; last < first if empty; r = 0 if boxes are not refined
     rows: np.ndarray
     # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x and step_y of its
     # nodes there
     buffer: np.ndarray
-    # (T + 1, 14): largest move, largest rate, failed point + 1; at looks also kinetic and stored
-    # energy, number of the solid (-1: several), mass, momentum, elastic energy, and this times
-    # velocity
+    # (T + 1, 14): largest move, largest rate, failed point + 1; in energy checks also kinetic and
+    # stored energy, number of the solid (-1: several), mass, momentum, elastic energy, and elastic
+    # energy times velocity
     report: np.ndarray
 
 
@@ -126,15 +126,15 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 class Buffers(NamedTuple):
     """Sums of point tiles in dense boxes of nodes, one after another.
 
-    A tile of nodes adds the boxes that reach it in a fixed order and zeros them. Its parts are
-    ranges of nodes that overlap a box, after one that clears what the first box leaves uncovered.
-    Columns of a part: first node in the grid and in the box; lengths; strides in the grid and in
-    the box along the first two directions; the action. With few points, the nodes are the only
-    buffer.
+    A tile of nodes adds the boxes that reach it in a fixed order, and then sets them to 0. The
+    parts of a tile are ranges of nodes that overlap a box; an additional first part clears nodes
+    outside the first box. Columns of a part: first node in the grid and in the box; lengths;
+    strides in the grid and in the box along the first two directions; the action. With few points,
+    the nodes are the only buffer.
     """
 
     nodes: Nodes
-    count: np.ndarray  # (2,) int64: parts; 1 if nodes are the only buffer
+    count: np.ndarray  # (2,) int64: number of parts; 1 if nodes are the only buffer
     first: np.ndarray  # (S + 1,) int64: part k has rows first[k]:first[k + 1]
     parts: np.ndarray  # (p, 10) int64
     number: int  # index among the scene's buffers
@@ -155,7 +155,7 @@ class Block(NamedTuple):
 
 
 class OnGrids(NamedTuple):
-    basis: Tag  # () if any basis will do
+    basis: Tag  # () if the basis does not matter
     kin: Tag
     grids: Grid
     of: np.ndarray  # (n,) grid of each point
@@ -194,22 +194,22 @@ class NoHooks(NamedTuple):
 HOOK = np.dtype([
     ("address", np.int64),
     ("stage", np.int64),
-    ("begin", np.int64),  # range of members; begin -1: all
+    ("begin", np.int64),  # range of members; a begin of -1: all
     ("end", np.int64),
-    ("slot", np.int64),  # of the published total; -1: none
-    ("uses_before", np.int64),  # the formulas one step earlier
-    ("uses_share", np.int64),  # 1 / number of members with mass
+    ("slot", np.int64),  # slot of the published total; -1: none
+    ("uses_before", np.int64),  # uses the formulas one step earlier, too
+    ("uses_share", np.int64),  # uses 1 / number of members with mass
     ("holds", np.int64),  # sets or bounds the velocity
     ("uses_place", np.int64),  # formulas depend on position
     ("totals", np.int64),  # numbers published by a hook on whole points
 ])  # fmt: skip
 PROGRAM = np.dtype([
-    ("begin", np.int64),  # range of code; begin -1: NULL
+    ("begin", np.int64),  # range of code; a begin of -1: NULL
     ("end", np.int64),
     ("first", np.int64),  # range of constants
     ("last", np.int64),
 ])  # fmt: skip
-# The hook that holds a node along one axis
+# The hook that holds a node along one axis.
 HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # slot: 1 + slot of the total, or 0
 
 
@@ -237,8 +237,8 @@ class Hooks(NamedTuple):
     chosen: np.ndarray  # (BLOCK,) int64 scratch
     scratch: np.ndarray  # (9 + depth, BLOCK): x y z x0 y0 z0, value, value before, stack, value 3
     holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
-    loads: np.ndarray  # (N, d) in this step if hooks apply forces, else (0, d)
-    rigid_fields: np.ndarray  # (F,) bool: rigid, with N/F nodes each; or (0,)
+    loads: np.ndarray  # (N, d) loads in this step if hooks apply forces, else (0, d)
+    rigid_fields: np.ndarray  # (F,) bool: rigid velocity fields, of N/F nodes each; or (0,)
     torques: np.ndarray  # (values,) slot of the torque of a force's slot, or 0
     mode: Tag  # one or several threads
     apart: Apart
@@ -248,7 +248,7 @@ class Hooks(NamedTuple):
 VALUE, BEFORE = 6, 7  # rows of Hooks.scratch
 WHOLE = -1  # marks one of Hooks.whole instead of an address
 
-# stages of fixes, named as in Karamelo
+# Stages of fixes, named as in Karamelo.
 INITIAL_INTEGRATE = 0
 POST_PARTICLES_TO_GRID = 1
 POST_UPDATE_GRID_STATE = 2
@@ -264,46 +264,46 @@ POST_WATER_TO_GRID = 11  # accelerations of nodes, for pore water
 POST_UPDATE_GRID_ROTATION = 12
 POST_ROTATION_TO_GRID = 13
 
-# node array that a hook changes
+# Node array that a hook changes.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
 # Step size (`kernels.clock`, `run.step_size`)
 STEP = np.dtype([
     ("fixed_dt", np.float64),  # set_dt, or 0
     ("dt_factor", np.float64),  # fraction of the stable step
-    ("dt_factor_moving", np.float64),  # once points have moved
+    ("dt_factor_moving", np.float64),  # the same after points have moved
     ("heat_factor", np.float64),  # fraction of conduction's stable step
     ("end_time", np.float64),
     ("last_dt", np.float64),  # 0 at the start and after load steps
-    ("kick", np.float64),  # time that forces act, between mid-steps
-    ("first_kick", np.float64),  # of the first step, in steps
+    ("kick", np.float64),  # time for which forces act, from mid-step to mid-step
+    ("first_kick", np.float64),  # kick of the first step, in steps
     ("contact_dt", np.float64),  # sets the contact stiffness
-    ("contact_kick", np.float64),  # kick for such steps
+    ("contact_kick", np.float64),  # kick for steps of this length
     ("last_contact_dt", np.float64),
     ("spacing", np.float64),  # smallest cell size
     ("courant", np.float64),  # stable step * rate / cell size
     ("courant_moving", np.float64),  # once points have moved
     ("kept", np.float64),  # FLIP coefficient
-    ("kept_by_time", np.float64),  # per stable step if time-dependent, else 0
+    ("kept_by_time", np.float64),  # its power per stable step, or 0 if constant
     ("first_limit", np.float64),  # initial stable step
     ("limit", np.float64),  # stable step
     ("over_limit", np.int64),  # consecutive steps above the limit
-    ("watch_limit", np.int64),  # 1: these stop the run
+    ("watch_limit", np.int64),  # 1: they stop the run
 ])  # fmt: skip
 # Motion of points (`kernels.clock`, `run.tiles`): lengths in cells
 MOTION = np.dtype([
     ("rate", np.float64),  # max over points of c + max |v_i - common_i|
-    ("new_rate", np.float64),  # of the last sweep
+    ("new_rate", np.float64),  # rate found in the last sweep
     ("common", np.float64, (1, 3)),  # reference velocity for speeds
-    ("weight", np.float64),  # of the common drift; 1: `common` is 0
+    ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
     ("wave", np.float64),  # wave speed when `common` was measured
     ("speed", np.float64),  # of the fastest point
-    ("move", np.float64),  # largest in this step
+    ("move", np.float64),  # largest move of a point in this step
     ("new_move", np.float64),
     ("stride", np.float64),
-    ("drift", np.float64),  # since points were sorted
+    ("drift", np.float64),  # sum of the largest moves since points were sorted
     ("drift_limit", np.float64),
-    ("pace", np.float64),  # largest move per step since then
+    ("pace", np.float64),  # largest move in a step since points were sorted
     ("path", np.float64),  # longest path of a point
     ("now", np.int64),  # index of present locations
     ("wrong", np.int64),  # 1 if a point failed
@@ -317,40 +317,40 @@ ENERGY = np.dtype([
     ("stored", np.float64),  # includes dissipated energy
     ("born_with", np.float64),  # initial internal energy of gases
     ("stored_before", np.float64),  # one step earlier
-    ("moving_before", np.float64),  # kinetic minus work, then
-    ("stored_at", np.int64),  # step of the previous three
+    ("moving_before", np.float64),  # kinetic energy minus work one step earlier
+    ("stored_at", np.int64),  # step number of `stored_before` and `moving_before`
     ("looks", np.int64),  # number of checks
     ("balance", np.float64),  # kinetic + stored + dissipated - work
     ("first_balance", np.float64),
     ("first_work", np.float64),
-    ("sum_of_balance", np.float64),  # over a window
+    ("sum_of_balance", np.float64),  # sum over a window
     ("last_balance", np.float64),  # at the previous check
     ("last_but_one", np.float64),
     ("first_few", np.float64),  # mean of the first checks
-    ("first_mean", np.float64),  # of the first window
+    ("first_mean", np.float64),  # mean of the first window
     ("largest_mean", np.float64),
     ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
-    ("largest_energy", np.float64),  # of kinetic, stored, work, rigid bodies
-    ("largest_own", np.float64),  # without drift
+    ("largest_energy", np.float64),  # largest kinetic, stored, rigid-body energy or work
+    ("largest_own", np.float64),  # the same without drift
     ("of_drift", np.float64),  # kinetic energy of centres of mass
-    ("elastic", np.float64),  # at the last check
+    ("elastic", np.float64),  # elastic energy at the last check
     ("carried", np.float64, (1, 3)),  # elastic energy times cells moved through
     ("to_and_fro", np.float64),  # time for waves through all bodies and back
     ("time_of_look", np.float64),
-    ("lost", np.float64),  # largest loss by crossing, relative
+    ("lost", np.float64),  # largest relative loss by crossing cells
     ("crossed", np.float64),  # cells that stressed material moved through
     ("supplied", np.float64),  # largest work, of either sign
     ("energy_floor", np.float64),  # round-off
     ("windows", np.int64),  # consecutive windows with growth
-    ("growth", np.float64),  # in the last window, relative
-    ("grown", np.float64),  # largest since the first checks
+    ("growth", np.float64),  # relative growth in the last window
+    ("grown", np.float64),  # largest growth since the first checks
 ])  # fmt: skip
 # Conduction (`kernels.heat`, hooks, `kernels.watch`)
 HEAT = np.dtype([
     ("heat_limit", np.float64),  # stable step, or infinite
-    ("heat_reference", np.float64),  # in undeformed bodies
+    ("heat_reference", np.float64),  # stable step in undeformed bodies
     ("watch_heat", np.int64),  # 1: all heat sources are known
-    ("coldest", np.float64),  # bounds by initial state, fixes and sources
+    ("coldest", np.float64),  # bounds of temperatures by initial state, fixes and sources
     ("hottest", np.float64),
     ("T_low", np.float64),  # extremes at the last check
     ("T_high", np.float64),

@@ -19,17 +19,14 @@ def step_size(s: Setup) -> Number:
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step.
-
-    Without one it is tiny, not 0, because laws divide by it.
-    """
+    """Return dt of the previous step; before the first step tiny, not 0, as laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
 
 
 def kick(s: Setup) -> Number:
-    """Return the time that forces act, between the middles of the last and this step.
+    """Return the time for which forces act, between the middles of the last and this step.
 
     In the first step it is dt, as if initial velocities were half a step old, or dt / 2 if they are
     not.
@@ -43,27 +40,27 @@ def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
 
 
 NEXT_TO_NOTHING = 1e-9  # fraction of a step
-ROUNDING = 1e-6  # fraction of a step, for a million additions
+ROUNDING = 1e-6  # fraction of a step that counts as nothing, for a million additions
 
-# If dt drops suddenly (set_dt), the contact stiffness's dt drops by this fraction per step, so that
-# loaded springs stiffen over several periods.
+# If dt drops suddenly (set_dt), the dt of the contact stiffness decreases by this fraction per
+# step, so that loaded springs stiffen over several periods.
 FOLLOWING = 0.01
-STILL = 0.25  # cells to move before the smaller stable step for crossing cells applies
-# cells that a point may move in a step that ignores a common drift
+STILL = 0.25  # path in cells after which the smaller stable step for crossing cells applies
+# Cells that a point may move in a step if the step ignores a common drift.
 STRIDE = 0.65
 
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose the next dt from the fastest point, or fixed; shorter at the end.
+    """Choose the next dt, by the fastest point or fixed, and shorter at the end of a run.
 
-    The last two steps are equal, as prescribed or mapped velocities give impulses that do not
-    vanish with dt: a very short step would have huge forces. Contact with a stiffness of m/dt^2
-    uses an unshortened dt, since suddenly stiffer springs would throw bodies back.
+    The last two steps are equal. A very short last step would have huge forces, since impulses of
+    prescribed or mapped velocities do not vanish with dt. Contact with a stiffness of m/dt^2 uses
+    an unshortened dt, since suddenly stiffer springs would throw bodies back.
     """
     step, motion, heat = control.step[0], control.motion[0], control.heat[0]
     if motion.weight > 1:
-        # The drift may have rotated since it was measured; speeds bound it.
+        # The drift may have rotated since it was measured; `speed` is an upper bound.
         motion.rate = max(motion.rate, motion.wave + motion.speed * step.spacing)
     limit = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
     dt = min(step.dt_factor * limit, step.heat_factor * heat.heat_limit)
@@ -138,14 +135,14 @@ def read_reports(s: Setup) -> None:
 
 def take_reports(control: Control) -> None:
     motion = control.motion[0]
-    # points move in one sweep of a step; domains may grow in another
+    # Points move in one sweep of a step; domains may grow in another.
     motion.move += motion.new_move
     if motion.new_rate > 0:
         motion.rate = motion.new_rate
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Accept the reports of a sweep; return whether no point failed."""
+    """Take the reports of a sweep; return False if a point failed."""
     read_reports(s)
     take(s.control)
     return s.control.motion[0].wrong == 0

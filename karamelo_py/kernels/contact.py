@@ -46,21 +46,21 @@ from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
-# squared sine of the scatter of a body's outward directions about their mean:
+# Squared sine of the scatter of a body's outward directions about their mean:
 SCATTER = 0.003  # for a plane face
-EDGE = 0.03  # above this a face ends or is round
+EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 MEMORY = 100  # steps after a contact in which shapeless bodies may not approach a wall
-REPEATS = 16  # iterations for more than two fields; each at least halves the rest
+REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
 
 class SeparateFields(NamedTuple):
-    """Contact where fields meet: F fields on equal grids, S solids."""
+    """Contact at nodes where several of F fields have mass; S solids."""
 
     node_fields = (Normal, Centre)
-    looks_beyond = 1  # cells beyond the points' nodes whose sums are read
+    looks_beyond = 1  # cells beyond the nodes of points in which sums are used
 
-    stride: int  # offset of the same position in the next field
+    stride: int  # difference in number of nodes at the same position in consecutive fields
     beside: np.ndarray  # (d, 2) stride, and number of nodes, along each axis
     per_mass: np.ndarray  # (F,) specific volume / h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient; infinite: no slip
@@ -73,7 +73,7 @@ class SeparateFields(NamedTuple):
     reactions: np.ndarray  # number of slots, then the slots; negative for a torque
     forces: np.ndarray  # number of slots, then the slots
     rigid: np.ndarray  # (F,) bool: not moved by contact
-    free: np.ndarray  # (F,) bool: moved by fix rigid_body
+    free: np.ndarray  # (F,) bool: rigid and moved by fix rigid_body
     torque: np.ndarray  # (F,) slot of the torque
     torques: np.ndarray  # (values,) slot of the torque of the force in each slot, or 0
     memory: np.ndarray  # (F,) steps that a contact is remembered
@@ -90,31 +90,31 @@ class Bodies(NamedTuple):
     nodes: Nodes
 
 
-# Rotation around an axis adds a sliding speed, and friction a torque.
+# With rotation around an axis there is a further sliding speed, and friction has a torque.
 
 
 @point_function(otherwise=True)
 def around_of(kin, contact, nodes, pair, again):
     """Return sliding speed around the axis, its change per impulse, and speed before the step.
 
-    Uses the angular velocities w*, or the deforming ones if `again`. Returns () without rotation.
+    `again`: by the velocities that strain points, instead of w*. Returns () without rotation.
     """
     return ()
 
 
 @point_function(otherwise=True)
 def take_around(kin, bodies, control, sides, impulse):
-    """Apply the impulse on the second side to the angular velocities, and count the torque."""
+    """Apply an impulse on the second side to the angular velocities, and sum the torque."""
 
 
 @point_function(otherwise=True)
 def stay_around(kin, bodies, pair, sides, share):
-    """Make a pair stick in the deforming angular velocities."""
+    """Make a pair stick in the angular velocities that strain points."""
 
 
 @point_function(otherwise=True)
 def turn(kin, nodes, n, change, again):
-    """Add a field's change to its angular velocity, or to the deforming one if `again`."""
+    """Add a change to a field's angular velocity, or if `again` to the one that strains points."""
 
 
 # --- two bodies at a position -----------------------------------------------------------------
@@ -148,11 +148,11 @@ class NodePair(NamedTuple):
     per_n: float  # 1 / mass
     per_m: float
     outward: tuple  # common normal out of the first body, not normalised
-    scatter: float  # the smaller of the two outward directions' scatters
+    scatter: float  # the smaller scatter of the two outward directions
     yielding: tuple  # (d,) change of relative velocity per impulse
     relative: tuple  # velocity of the first relative to the second
-    wall: bool  # exactly one has a prescribed velocity
-    hollow: bool  # and the other fills a corner of it
+    wall: bool  # exactly one body has a prescribed velocity
+    hollow: bool  # a wall, of which the other body fills a corner
 
 
 @noinline
@@ -209,13 +209,13 @@ def _normal(bodies, n, other):
     """Return the outward normal of a body, and the squared sine of its scatter.
 
     The sums of m grad N of neighbouring nodes are averaged with weights 1/4, 1/2, 1/4 along each
-    axis. This is accurate to 2 degrees on a plane face; a single node errs by tens of degrees as
-    inclined rows of points pass it. Nodes whose sum points along `other`, the other body's normal,
-    are omitted, so that only one face of a thin wall counts.
+    axis. This is accurate to 2 degrees on a plane face. The sum of a single node has errors of tens
+    of degrees while inclined rows of points pass it. Nodes whose sum points along `other`, the
+    other body's normal, are omitted, so that only one face of a thin wall counts.
 
-    The length weights it against the other body's normal: it grows with surface and falls with
-    scatter. (Taking the larger sum, as in Lemiale, Nairn & Hurmane 2010, tilts a block's edge on a
-    base of equal density by 15 degrees.)
+    The length of the normal is its weight relative to the other body's: it increases with surface
+    and decreases with scatter. (With the larger sum, as in Lemiale, Nairn & Hurmane 2010, the
+    normal at the edge of a block on a base of equal density is tilted by 15 degrees.)
     """
     contact, kin, _ = bodies
     total, lengths = zero_vector(kin, 0.0), 0.0
@@ -275,8 +275,8 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The remainder slides along a face or an edge, or is 0; the two are perpendicular, so one impulse
-    suffices.
+    The remainder is along a face or an edge, or 0. Both are perpendicular, so one impulse is
+    enough.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -321,7 +321,7 @@ def _pair_of(bodies, records, n, m, may_be_hollow):
     axes = range(kin.dimension)
     yielding = [_yielding(contact, n, k, per_n) + _yielding(contact, m, k, per_m) for k in axes]
     scatter = min(scatter_n, scatter_m)
-    # The difference cancels the opposite tilts of two faces that end together.
+    # Opposite tilts of two faces with a common end cancel in the difference.
     outward = of_n - of_m
     wall, yields = led_n != led_m, vector(kin, yielding)
     return NodePair(n, m, per_n, per_m, outward, scatter, yields, relative, wall, hollow)
@@ -334,7 +334,10 @@ def _left(pair, push):
 
 @noinline
 def _reach(bodies, outward, n, where, side):
-    """Return the distance from node `n` to its surface along the normal; `side` is 1 or -1."""
+    """Return the distance along the normal from node `n` to the surface of its body.
+
+    `side` is 1 for the first body, -1 for the second.
+    """
     contact, _, nodes = bodies
     centre = field(nodes.fields, Centre)
     mean = 0.0
@@ -357,7 +360,7 @@ def _gap(bodies, outward, pair, where):
 def _is_beyond(bodies, pair, where):
     """Return True for a fluid's node more than half a cell outside of a rigid surface.
 
-    If such nodes stuck, the fluid would come to rest half a cell before the surface.
+    If such nodes stuck to the body, the fluid would come to rest half a cell before the surface.
     """
     contact, led, side = bodies.contact, pair.n, 1
     fluid = contact.fluid[pair.m // contact.stride]
@@ -369,10 +372,10 @@ def _is_beyond(bodies, pair, where):
 
 
 def _directions(bodies, pair):
-    """Return further directions that may show a gap; zeros for none.
+    """Return further directions along which there may be a gap; zeros where there is none.
 
     These are the grid axes and, where the faces of both bodies end, the vector between the mean
-    positions. Next to a plane face that vector does not cross the gap.
+    positions. Next to a plane face, this vector may be parallel to the face.
     """
     _, kin, nodes = bodies
     centre, zero = field(nodes.fields, Centre), zero_vector(kin, 0.0)
@@ -388,7 +391,7 @@ def _directions(bodies, pair):
 def _last_contact(bodies, pair):
     """Return the last step of contact at a pair's nodes, 0 if none.
 
-    Nodes that a moving rigid wall has just left count too.
+    Nodes that a moving rigid wall has just left are included.
     """
     contact, kin, nodes = bodies
     other = pair.m // contact.stride
@@ -405,10 +408,7 @@ def _last_contact(bodies, pair):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity in excess of closing the gap in this step.
-
-    It is 0 if the bodies remain apart.
-    """
+    """Return the approach velocity beyond what closes the gap in this step; 0 without contact."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -518,10 +518,7 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _work_on(bodies, n, k, impulse, per_mass):
-    """Return the work of a rigid body's impulse.
-
-    It is taken with the mean of a node's velocities in the step.
-    """
+    """Return the work of a rigid body's impulse, with the mean velocity of the node in the step."""
     _, kin, nodes = bodies
     if _immovable(bodies.contact, n, k):
         return 0.0
@@ -543,10 +540,10 @@ def _touch_pair(bodies, control, i, j, where):
     normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
-        return  # both prescribed
+        return  # both velocities are prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction leaves the remaining approach, which closes the gap.
+    # Friction has no effect on the remaining approach, which closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     around = around_of(kin, contact, nodes, pair, False)
@@ -556,15 +553,15 @@ def _touch_pair(bodies, control, i, j, where):
     contact.touched[n, b] = -where.step if sticks else where.step
     heat = 0.0
     if rub > 0:
-        # Heat is the impulse times the mean sliding speed over the step, in which internal forces
-        # offset the impulse's change.
+        # Heat is the impulse times the mean sliding speed in the step, which includes the effect of
+        # internal forces.
         before = _before(kin, nodes, n, pair.per_n) - _before(kin, nodes, m, pair.per_m)
         for speed, first, yielding in zip(slides, (*before, *around[2:3]), yields, strict=True):
             heat += rub * speed * 0.5 * (first + speed * (1.0 - rub * yielding))
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    # A free body's work is that on the other body; collisions dissipate outside of it.
+    # For a free body, the work on the other body counts; the balance excludes dissipation.
     free = contact.free[a] != contact.free[b]
     work = 0.0 if free else -heat  # work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
@@ -598,7 +595,7 @@ def _touch_pair(bodies, control, i, j, where):
 def _touch_place(bodies, control, count, where):
     contact, kin, nodes = bodies
     last = len(kin.Unknown._fields) - 1
-    contact.partners[:count] = 1  # a single pair checks its approach itself
+    contact.partners[:count] = 1  # for a single pair, approach is checked later
     for _ in range(REPEATS if count > 2 else 1):
         if count > 2 and not _count_partners(where, bodies, where.node, count):
             return
@@ -713,7 +710,10 @@ def list_pairs(bodies, grids, spans, pairs):
 
 @noinline
 def _stay_pair(bodies, i, j, pair, sticks):
-    """Remove a pair's normal velocity, all of it if they stick, all but along v* in a hollow."""
+    """Remove a pair's normal relative velocity, or all of it if it sticks.
+
+    In a corner, the part along v* remains.
+    """
     contact, kin, nodes = bodies
     share, taken = _share(contact, i, j), pair.relative
     if pair.hollow:
@@ -768,11 +768,11 @@ def stay_node(bodies, step, n):
 
 
 def _stay(steps):
-    """Stop the deforming velocity from opening or closing active contacts.
+    """Remove opening and closing of active contacts from the velocity that strains points.
 
-    Otherwise stress does spurious work on surfaces pressed together: colliding bars quadruple their
-    energy, or double it if only approach is removed. With `steps` 1 this step's contacts count (v*
-    is known), with 0 the last step's.
+    Otherwise stress does spurious work on surfaces pressed together: the energy of colliding bars
+    would grow by a factor of four, or of two if only approach were removed. `steps`: 1 for active
+    contacts of this step (v* is known), 0 for contacts of the last step.
     """
 
     def stay(s, n):

@@ -1,6 +1,6 @@
 """Friction of contact around an axis.
 
-Two nodes rub at their common radius of gyration, so torques are opposite.
+Friction of two nodes acts at their common radius of gyration, so that torques are opposite.
 """
 
 from math import sqrt

@@ -1,4 +1,4 @@
-"""Output quantities from the state of points."""
+"""Output quantities computed from the state of points."""
 
 from collections.abc import Callable
 from typing import Any
@@ -63,7 +63,7 @@ def _with_some_stress(law, kin, state, wanted):
     return law_functions.with_stress(law, kin, state, tuple(new))
 
 
-# values: components of Cauchy stress, then 1 for each to be set, else 0
+# Values: components of Cauchy stress, then for each component 1 to set it, else 0.
 impose_stress = imposing(_with_some_stress)
 impose_temperature = imposing(law_functions.with_temperature)
 impose_lighting = imposing(law_functions.lit)  # values: time since lighting
@@ -73,8 +73,8 @@ impose_lighting = imposing(law_functions.lit)  # values: time since lighting
 def export_to_nodes(at, values, unit, out):
     """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) have at most 2^36 units.
 
-    The first column has whole units, the second remainders in units 2^36 times smaller: both are
-    exact in any order for up to 2^17 points per node.
+    The first column is a multiple of `unit`, the second the remainder as a multiple of a unit 2^36
+    times smaller. Both sums are exact in any order for up to 2^17 points per node.
     """
     basis, kin, grids, grid_of, where = at_hand(at)
     whole, fine = 1.5 * 2.0**52 * unit, 1.5 * 2.0**16 * unit

@@ -22,7 +22,7 @@ from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
 SOFT = 0.1  # fraction of penetration removed per step
-DEEP = 0.125  # penetration in cells above which the spring hardens, for a heavy body on few points
+DEEP = 0.125  # penetration in cells above which the spring hardens, for heavy bodies on few points
 
 _call = caller_of(CALL)
 
@@ -32,7 +32,7 @@ class TouchingSurface(NamedTuple):
 
     shape: arrays.Tag
     members: np.ndarray  # (N,) bool by id
-    clear: np.ndarray  # (N,) by id: no face is closer
+    clear: np.ndarray  # (N,) by id: distance within which there is no face
     mu: float
     slot: int  # of the force on points
     torque: int  # of its torque, or 0
@@ -50,7 +50,7 @@ def _stencil_of(s, points, p):
 
 @point_function(otherwise=True)
 def free_way(shape, kin, x, reach):
-    """Return the distance to the surface, up to `reach`, where it saves later searches; else 0."""
+    """Return the distance to the surface, up to `reach`, if it can save later searches; else 0."""
     return 0.0
 
 
@@ -62,10 +62,7 @@ def _free_way_to_faces(shape, kin, x, reach):
 
 @noinline
 def _touched(shape, kin, x, about):
-    """Return the depth at `x`, and the unit direction out.
-
-    The direction is 0 if there is none or the surface is not close.
-    """
+    """Return the depth at `x`, and the unit direction out (0 if unknown or the surface is far)."""
     close, ball, reach, step, _ = about
     within = depth(shape, kin, x, close)
     if within <= -close:
@@ -85,16 +82,13 @@ def _touched_faces(shape, kin, x, about):
     _, _, _, step, away = about
     if not 0.01 * step < away:
         return _touched(shape, kin, x, about)
-    sign = 1.0 if encloses(kin, shape, x) else -1.0  # slopes would take six searches
+    sign = 1.0 if encloses(kin, shape, x) else -1.0  # differences would take six searches
     return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
 
 
 @noinline
 def _list_point(body, surface, s, block, p):
-    """Put a contact of point `p` with a surface into the next record.
-
-    Returns whether it touches.
-    """
+    """Put a contact of point `p` with a surface into the next record; return whether it touches."""
     kin, points, d = s.kin, block.points, s.kin.dimension
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
@@ -106,7 +100,7 @@ def _list_point(body, surface, s, block, p):
         speed += abs(points.v[c, p])
     if away > (constants.bound + 2 * h) ** 2:
         return False
-    # Reject points that cannot meet the surface in this step; a short reach is cheap.
+    # Reject points that cannot reach the surface in this step; a search in a short reach is cheap.
     move, number = 2 * dt * (speed + constants.speed), points.id[p]
     law, material = state_at(kin, points, block.laws, p)
     ball = radius(kin, volume_of(kin, points, law, material, p), x)
@@ -186,7 +180,7 @@ def _give_to_points(body, s, block, number, measures):
                 elif nodes.sums[n, arrays.MASS] > 0 and not reaction:
                     change = arrays.of_change(kin) + c
                     if measures:
-                        # mean velocity over the step, as for loads
+                        # with the mean velocity in the step, as for loads
                         work += impulse * (nodes.update[n, c] - 0.5 * nodes.update[n, change])
                     else:
                         nodes.update[n, c] += impulse / nodes.sums[n, arrays.MASS]
@@ -270,10 +264,11 @@ def _add_links(body, s):
 
 @noinline
 def _follow(s, n, again):
-    """Let a node of a body follow the surface that it touches, in the deforming velocity.
+    """Let a node of a body follow the surface that it touches, in the velocity that strains points.
 
-    A light body may be faster than the surface until the gap is closed: straining the surface by
-    the body's velocity would add more energy than the body has. `again`: v* of this step is known.
+    A light body may be faster than the surface until the gap is closed. If the surface were
+    strained by the velocity of the body, this would add more energy than the body has. `again`: v*
+    of this step is known.
     """
     contact, nodes = s.contact, s.nodes
     for body in s.bodies.bodies:
@@ -349,7 +344,7 @@ def _part(s):
 
 
 def _lead_point(s, block, p):
-    """Give a body's point its mean velocity in the step, which displaces it exactly."""
+    """Give a point of a body its mean velocity in the step, for an exact displacement."""
     points, d, now = block.points, s.kin.dimension, s.control.motion[0].now
     for body in s.bodies.bodies:
         state, before = body.state[0], body.solution.before
@@ -365,7 +360,7 @@ class NoBodies(NamedTuple):
 
 
 class FreeBodies(NamedTuple):
-    """Bodies, with rows around contact and around the deforming velocity."""
+    """Bodies, with rows before and after contact and the mapping of the velocity that strains."""
 
     bodies: tuple[motion.FreeBody, ...]
     held: np.ndarray  # (N, d) 1 + slot of the reaction where v is prescribed, else 0

@@ -1,9 +1,9 @@
 """A step on a GPU: thread functions for a point, a cell, a node, or the clock.
 
-A cell holds the points that see the same nodes, and is numbered by the first of these. Before each
-scatter, points are sorted by cell, then by id. One thread sums over a cell's points, another at a
-node over cells; no two threads add to one number, so results are reproducible and independent of
-the order in memory. `fate` (5,) has errors and extremes.
+A cell consists of the points with the same nodes, and has the number of the first node. Before each
+scatter, points are sorted by cell, then by id. A thread per cell sums over points, then a thread
+per node sums over cells. No two threads add to the same number, so results are reproducible and
+independent of the order in memory. `fate` (5,) contains errors and extremes.
 """
 
 import functools
@@ -31,15 +31,15 @@ from karamelo_py.points.basis.cpdi import of_corner
 from karamelo_py.points.basis.product import digits, node_number
 from karamelo_py.points.grid import inside
 
-MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # of `fate`; STATUS: 0, or 1 + a status of steps
+MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # in `fate`; STATUS: 0, or 1 + a status of steps
 BEHIND = 2.0**53  # above all point ids
 CHUNK = 64  # items summed per thread
 WARP = 32  # threads that read memory together
-REGISTERS = {4: 200, 8: 130}  # words summed per cell thread, by number size
+REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell may sum, by size of a number
 OCCUPIED = 1 << 40  # added to `CellLists.sums` per occupied cell
 
 
-# shown by `karamelo-py bench`
+# Names shown by `karamelo-py bench`.
 STAGES = {
     "gather_point": "gather from the nodes, update of points",
     "load_point": "loads of points",
@@ -59,10 +59,10 @@ OTHERS = "clock, reports, totals"
 
 
 class CellLists(NamedTuple):
-    """The n points of a block by cell, of N nodes; corner c of point p is listed as c n + p."""
+    """The n points of a block by cell, for N nodes; corner c of point p has the index c n + p."""
 
     count: np.ndarray  # (N,) int32: points of each cell not yet listed
-    number: np.ndarray  # (n,) int32
+    number: np.ndarray  # (n,) int32: cell of each point
     first: np.ndarray  # (N + 1,) int32: cell c has order[first[c]:first[c + 1]]
     box: np.ndarray  # (N + 1,) int32: index of an occupied cell, or -1; then the count
     cell: np.ndarray  # (boxes,) int32
@@ -80,7 +80,7 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
 # --- visits of points -------------------------------------------------------------------------
 
 
-@functools.cache  # one for all launches
+@functools.cache  # a single stage for all launches
 def while_steps_go_on(function: Callable) -> Callable:
     def go_on(i, fate, *arguments):
         if fate[STATUS] == 0:
@@ -104,7 +104,7 @@ def _report(fate, number, moved, rate, stride):
 
 
 def is_last(s):
-    """Return True in the last step, which sums nothing for a next one."""
+    """Return True in the last step, which leaves no sums for a next step."""
     values = s.control.values
     return values[TIME] + values[DT] >= s.control.step[0].end_time
 
@@ -166,7 +166,7 @@ class Stage:
             pt = pt._replace(stencil=sweep.stencil_of(pt.w, pt.p))
             x = sweep.position_of(pt.w, pt.p)
             totals = gathered_by(OneByOne(), tasks, pt.w, pt.stencil, x)
-            # from zero, as the running maximum depends on the order of threads
+            # Start from zero, as a running maximum would depend on the order of threads.
             moved, rate = updated_all(tasks, pt, totals, real(0, c.dt))
             _report(fate, block.points.id[pt.p], moved, rate, c.stride)
             keep(pt, cells)
@@ -218,9 +218,9 @@ class Stage:
                 for k in range(begin, end):
                     room_of(name, rooms, None)[k, column] = c.dt - c.dt
             out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
-            template = load_all(quantities, pt)  # only for its shape
+            template = load_all(quantities, pt)  # only its shape is used
             for q in range(first, last):
-                behind = cells.order[min(q + 1, last - 1)]  # read ahead
+                behind = cells.order[min(q + 1, last - 1)]  # for prefetching
                 here = pt._replace(p=p)
                 stencil = locate(out.basis, out.kin, out.grid, location(here))
                 seen = stencil if corners == 1 else of_corner(stencil, corner)
@@ -245,7 +245,7 @@ class Stage:
         return count * section // self.parts, count * (section + 1) // self.parts
 
     def sum(self, section: int, anew: bool) -> Callable:
-        """Return a node's function that sums over cells, from zero if `anew`."""
+        """Return the function of a node that sums over cells, from zero if `anew`."""
         columns, only_if_more, at = self.columns, self.row.only_if_more, self.at
         begin, end = self.nodes_of(section)
 
@@ -267,7 +267,7 @@ class Stage:
         return sum_node
 
     def age(self) -> Callable:
-        """Return a node's function before marking: 2 in use, 1 to be cleared, 0 unused."""
+        """Return the function of a node that ages its mark: 2 in use, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):
@@ -326,7 +326,10 @@ def sum_counts(i, fate, cells):
 
 
 def sum_sums(i, fate, cells, level):
-    """Sum a chunk of sums; `level` is their begin and count, and the next level's begin."""
+    """Sum a chunk of sums of a level;
+
+    `level`: begin and count of the sums, begin of the next level.
+    """
     begin, count, above = level
     total = 0
     for k in range(i * CHUNK, min((i + 1) * CHUNK, count)):
@@ -335,10 +338,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Sum the items before one of a level.
-
-    `above` is where the next level begins, or -1.
-    """
+    """Sum the items before an item of a level; `above` is the begin of the next level, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):
@@ -393,8 +393,8 @@ def sort_cell(corners: int) -> Callable:
 
 
 # --- order in memory --------------------------------------------------------------------------
-# Threads of a warp take adjacent cells, so the first points of these should be adjacent in memory,
-# then the second points.
+# Threads of a warp have adjacent cells, so the first points of these cells should be adjacent in
+# memory, then the second points, and so on.
 
 
 def order_cell(i, fate, cells, come_from):

@@ -1,7 +1,7 @@
 """Hooks of fixes, totals and the energy monitor on a GPU, as functions of one thread.
 
 Members are processed one by one with private scratch (:mod:`karamelo_py.kernels.hook_loop`). Totals
-are sums of integers, in any order; several copies spread the traffic.
+are sums of integers, exact in any order; several copies reduce collisions.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,7 @@
 """Heat flow through the nodes, and the fixes that act on it.
 
-Capacity and temperature are treated like mass and velocity: nodes of heat are `Nodes` with one
-component, for the same loops (:mod:`karamelo_py.kernels.equations.heat`).
+Capacity and temperature are treated like mass and velocity: nodes for heat are `Nodes` with one
+component and have the same loops (:mod:`karamelo_py.kernels.equations.heat`).
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ def at_heat_nodes(hooks, stage, target, s):
 
 @at_heat_nodes.on(arrays.Hooks)
 def _at_heat_nodes_hooks(hooks, stage, target, s):
-    # temperatures always use FLIP
+    # temperatures are always mapped as in FLIP
     heat = s.control.heat[0]
     heat.set_low, heat.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
@@ -98,16 +98,16 @@ def _at_heated_points(row, s, step):
     at_heated_points(step.hooks, s)
 
 
-# one loop gathers and scatters
+# The same loop gathers and scatters.
 MAP = Visit((of_heat.Warming(),), (of_heat.HeatContent(),), OldWeights())
 FLOW = Visit((of_heat.TemperatureGradient(),), (of_heat.HeatFlow(),), OldWeights())
 
-# capacity, heat and temperature at nodes
+# Capacity, heat and temperature at nodes.
 SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# and the heat flow from present gradients
+# The same, and heat flow by present gradients.
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
@@ -115,7 +115,7 @@ FLOW_TO_NODES = (
     AtHeatedPoints(),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
-# fixes hold the new nodal temperature
+# Fixes prescribe the new nodal temperature.
 HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 

@@ -28,15 +28,15 @@ from karamelo_py.points.kinematics import dot, planar
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.points.transfers import Moment
 
-# typed, so that each bare number is not a type
+# with a NumPy type, as each plain number would be a separate type in kernels
 NONE, THIRD = np.int64(0), np.int64(STACK + ROWS)
 VALUE, BEFORE = np.int64(arrays.VALUE), np.int64(arrays.BEFORE)
-TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)  # rows of the stack, free after evaluation
-END = np.iinfo(np.int64).max  # after the last member
+TERMS, WORKS = np.int64(STACK), np.int64(STACK + 1)  # rows of the stack, unused after evaluation
+END = np.iinfo(np.int64).max  # larger than any member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # tasks
-LOADS, LOADS_AGAIN = 3, 4  # targets: all nodes, with v* or the re-mapped velocity
-DONE, FREE = -1, 1e-3  # no stage; least fraction of the force that marks a node as held
+LOADS, LOADS_AGAIN = 3, 4  # targets for the work of loads: with v*, or with the re-mapped velocity
+DONE, FREE = -1, 1e-3  # no stage; smallest fraction of the force for which a node counts as held
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
 _call_point_function = caller_of(kinds.POINT_FUNCTION)
@@ -109,7 +109,7 @@ def _turns(members, k, parts):
     if isinstance(members, HookedNodes):
         shares = members.ranges[0, 0]
         return shares * k // parts, shares * (k + 1) // parts, NONE + 1
-    # interleaved, as members may be clustered
+    # Interleaved chunks, as members may be clustered.
     size = TURN if parts > 1 else max(members.ids.size, 1)
     return k * size, members.ids.size, parts * size
 
@@ -122,7 +122,7 @@ def _bounds(members, turn, parts):
 
 @point_function()
 def act(members, task, call, count):
-    """Do `task` with the chosen members and add to totals; return how many count."""
+    """Carry out `task` with the chosen members and add to totals; return the number of members."""
 
 
 @noinline
@@ -145,7 +145,7 @@ def _act_on_part(members, task, call, k, parts):
 
 @shared_out
 def _act_on_parts(members, task, call, k):
-    """Act on thread `k`'s members, with private scratch and exact private totals."""
+    """Act on the members of thread `k`, with private scratch arrays and exact private totals."""
     hooks, control, h = call.hooks, call.control, call.h
     private = record(hooks.apart, k)
     for i in range(control.values.size):
@@ -165,7 +165,7 @@ def _act_on_parts(members, task, call, k):
     mine_call = Call(here, mine, call.dt, h, call.share)
     _act_on_part(members, task, mine_call, k, hooks.apart.chosen.shape[0])
     totals.hand_over(private.totals, control.totals, totals.WORK)
-    # Totals of other hooks that held the nodes change too.
+    # Totals of other hooks that have held these nodes change, too.
     several = hooks.holders.size > 0
     for other in range(0 if several else h, len(hooks.table) if several else h + 1):
         first, count = _published(hooks, other)
@@ -194,7 +194,7 @@ def _act_on_all(members, task, call):
 
 
 def directions(hooks):
-    """Return the dimension as a run-time value, to leave loops rolled."""
+    """Return the dimension as a run-time value, so that loops are not unrolled."""
     return hooks.x0.shape[1]
 
 
@@ -266,7 +266,7 @@ def _clear_total(hooks, h, control):
 
 @noinline
 def publish_total(hooks, h, control):
-    totals.carry(control.totals[totals.WORK])  # accumulates over steps
+    totals.carry(control.totals[totals.WORK])  # it accumulates over steps
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)
@@ -352,7 +352,7 @@ def _clear_held(members, holders):
 
 @noinline
 def _take_over(call, q, c, force):
-    """Let a hook hold chosen node `q` by `force`; return the previous holders' force."""
+    """Let a hook hold the chosen node `q` by `force`; return the force of earlier holders."""
     hooks, control, h, before = call.hooks, call.control, call.h, 0.0
     n = hooks.chosen[q]
     if hooks.holders.size > 0 and hooks.table[h].holds:
@@ -406,7 +406,7 @@ def _called(call, state, force, values):
 
 @noinline
 def _change_force(members, call, c, q):
-    """Change a node's force; return the total. `_work_at_nodes` finds the work."""
+    """Change the force on a node; return the total. Work is summed in `_work_at_nodes`."""
     kin, sums, hooks, n = members.kin, members.nodes.sums, call.hooks, call.hooks.chosen[q]
     mass, values = sums[n, arrays.MASS], (hooks.scratch[VALUE, q], hooks.scratch[BEFORE, q])
     v, old = sums[n, arrays.of_momentum(kin) + c] / mass, sums[n, arrays.of_force(kin) + c]
@@ -418,10 +418,10 @@ def _change_force(members, call, c, q):
 
 @noinline
 def _change_update(members, call, c, q):
-    """Change v* of a node; return total, work, and force of previous holders.
+    """Change v* of a node; return total, work, and force of hooks that held it before.
 
-    Work is the impulse times the mean velocity over the step. If the hook holds the node this is
-    the wall's, as a node stopped by a bound moved differently before.
+    Work is the impulse times the mean velocity in the step. If the hook holds the node, this is the
+    velocity of the wall, as a node stopped by a bound moved differently before.
     """
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, dt, kept, work, before = hooks.table[call.h], call.dt, members.kept, 0.0, 0.0
@@ -430,7 +430,7 @@ def _change_update(members, call, c, q):
     old = old_star - nodes.update[n, change]
     force = nodes.sums[n, arrays.of_force(kin) + c]
     v, star, _, total = _called(call, (mass, old, old_star), force, values)
-    # Points take v* - v, so changing v is an impulse too.
+    # Points take v* - v, so a change of v is an impulse, too.
     total += kept * mass * (old - v) / dt
     holds = star == values[0]
     if holds:
@@ -456,7 +456,7 @@ def _change_update(members, call, c, q):
 def _change_velocity(members, call, c, q):
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces belongs to the last step and its holding hooks.
+    # Strain before the forces uses the velocity of the last step, and the hooks that held it.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
     # v* is of the last step
@@ -472,7 +472,7 @@ def _change_velocity(members, call, c, q):
 def _rub_at_nodes(members, call, count):
     hooks = call.hooks
     if members.target == arrays.ON_VELOCITY:
-        # else v* is of the last step
+        # otherwise v* is from the last step
         if hooks.table[call.h].stage == arrays.POST_VELOCITIES_TO_GRID:
             for q in range(count):
                 stick(members.kin, members.nodes, hooks.programs[call.h], hooks.chosen[q])
@@ -487,8 +487,8 @@ def _work_at_nodes(members, call, count):
     """Sum the work of loads on the chosen nodes, and clear them.
 
     Work is the force times the mean of the velocities before and after the step, including stress,
-    constraints and contact. The velocity mapped again after the step is what points received, so
-    for FLIP the work is exact; v* differs by first order in dt, strongly at light nodes.
+    constraints and contact. With the velocity mapped again after the step it is exact for FLIP, as
+    this is the velocity of the points; v* has an error of order dt, which is large at light nodes.
     """
     update, change = members.nodes.update, arrays.of_change(members.kin)
     velocity, again = members.nodes.velocity, members.target == LOADS_AGAIN
@@ -500,10 +500,10 @@ def _work_at_nodes(members, call, count):
             load = hooks.loads[n, c]
             hooks.loads[n, c] = 0
             counts = load != 0 and totals.counts(control.ranks, n) and not _is_of_rigid(hooks, n)
-            # XPIC has replaced the change of v* by now.
+            # XPIC has replaced the change of v*.
             moved = 2 * update[n, c] - update[n, change + c]
             if again and counts:
-                # Fixes that hold nodes prescribe v before the step too. In free fall v is v*.
+                # Fixes that hold nodes prescribe v before the step, too; in free fall v is v*.
                 v, mass, force = velocity[n, c], sums[n, arrays.MASS], arrays.of_force(members.kin)
                 before, pushed = sums[n, momentum + c] / mass, dt * sums[n, force + c] / mass
                 fixed = v == update[n, c] and abs(v - before - pushed) > FREE * abs(pushed)
@@ -545,7 +545,7 @@ def _act_on_whole_nodes(members, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points, which would recompile loops."""
+    """Omit functions of whole points, for which loops would be compiled again."""
     return arrays.with_items(hooks, whole=())
 
 
@@ -593,13 +593,13 @@ def _node_hooks(stage, members, whole, call):
         hook_call = Call(hooks, control, dt, h, share)
         if hooks.table[h].address == arrays.WHOLE:
             for one in whole:
-                # before the forces (usf) v* is of the last step
+                # before the forces (usf), v* is from the last step
                 if one.tag.row == h and members.target != arrays.ON_VELOCITY:
                     _act_on_all(one, ACT, hook_call)
         else:
             _act_on_all(members, ACT, hook_call)
         publish_total(hooks, h, control)
-    # Friction comes last: only now are the walls known that hold a node.
+    # Friction comes last, when all walls that hold a node are known.
     for h in range(len(hooks.table)):
         if hooks.table[h].stage != stage:
             continue
@@ -659,7 +659,7 @@ def _act_on_motion(members, task, call, count):
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # Forces act as the hook moves a point from its initial velocity.
+        # The force of the hook moves a point from its initial velocity.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
@@ -677,7 +677,7 @@ def _act_on_motion(members, task, call, count):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
             for moment in members.moments:
-                # else nodes and strains follow the point's grid velocity
+                # otherwise nodes and strains follow the grid velocity of the point
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
                 for k in range(d * d + c if leads else moment.shape[0], moment.shape[0], d):
@@ -709,7 +709,7 @@ def _act_on_warmth(members, task, call, count):
         members.temperature[0, p] = T
         if slot >= 0:
             totals.add_to(control.totals, slot, supply - before)
-        # the prescribed temperature is the bound
+        # the bound is the prescribed temperature
         if hooks.table[h].holds > 0:
             T = hooks.scratch[BEFORE, q]
         elif members.capacity[0, p] > 0:
@@ -721,7 +721,7 @@ def _act_on_warmth(members, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time now and at the end of the step (else 0), and contact times."""
+    """Return formulas of time at present and at the end of the step, and contact times."""
     values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):

@@ -1,26 +1,27 @@
 """Compiled hooks of fixes: functions of one component at a node or point, or of whole points.
 
-A fix applies a formula to a group through a small function. The loops select members, evaluate the
-formula block by block and call the function by address, so only new functions are compiled.
+A fix applies a formula to a group by a small function. The loops select members, evaluate the
+formula for blocks of members and call the function by address, so only new functions are compiled.
 
 Node function ``(node: OneNode) -> (v, v_star, force, total)``: `value` and `before` are the formula
 at the step's time and one step earlier; `share` is 1 / number of members with mass; `kick` is half
 of the last step plus half of this one. Totals are published, plus the momentum per kick by which a
-change of v before the update changes points. Where several hooks hold a node, the last one to set
-v_star to its value decides and gets the others' totals. Hooks also set v of the deforming velocity
-if it is mapped separately; before the forces (usf, usavg) those that hold set it to v_star.
+change of v before the update changes points. Where several hooks hold a node, the last one that
+sets v_star to its value applies and gets the totals of the other hooks. If the velocity that
+strains points is mapped separately, hooks also set v of it; before the forces (usf, usavg), hooks
+that hold set it to v_star.
 
-Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time of the move, `kick` the time
-that forces act.
+Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time for which the point moves,
+`kick` the time for which forces act.
 
 Heat function ``(pt: WarmPoint) -> (share, supply, T)``: `value` and `other` are the first and
 second formula, `face` the point's area, `supply` its heat per time, `share` the fraction it takes
 of the nodal temperature change. The total is the heat supplied; if the hook holds, `other` is the
-target temperature. Node functions of heat see capacity, temperature before and after the step, and
+target temperature. Node functions of heat get capacity, temperature before and after the step, and
 heat flow, in the order of `OneNode`.
 
-Functions of whole points (:func:`vector_hook`) see vectors, fields and the law's state, and are
-compiled into the loop.
+Functions of whole points (:func:`vector_hook`) get vectors, fields and the state of the law, and
+are compiled into the loop.
 """
 
 import sys
@@ -112,14 +113,14 @@ class CompiledHook(NamedTuple):
 
     function: Callable
     where: str  # "nodes" (also of heat), "points", "heated points", `WHOLE_POINTS`, `WHOLE_NODES`
-    publishes: bool  # totals, as ID_x, ID_y, ID_z
-    uses_before: bool  # the formulas one step earlier
-    uses_share: bool  # 1 / number of members with mass
+    publishes: bool  # publishes totals as ID_x, ID_y, ID_z
+    uses_before: bool  # uses the formulas one step earlier
+    uses_share: bool  # uses 1 / number of members with mass
     holds: bool  # sets or bounds v_star, or prescribes a temperature
     tag: Callable | None = None  # makes the tag of a whole-point function
     reads: tuple = ()
     writes: tuple = ()
-    internal: bool = False  # neither for plug-ins nor on GPUs
+    internal: bool = False  # not for plug-ins, and not on GPUs
 
     @property
     def on_nodes(self) -> bool:
@@ -131,7 +132,7 @@ class CompiledHook(NamedTuple):
 
 
 WHOLE_POINTS, WHOLE_NODES = "whole points", "whole nodes"
-# Hooks on whole points work at any point stage.
+# Hooks on whole points may act at any stage of points.
 ACTS_ON = {
     **dict.fromkeys([*NODE_STAGES, "post_heat_to_grid", "post_update_grid_heat"], "nodes"),
     **dict.fromkeys(ROTATION_STAGES, "nodes"),
@@ -141,8 +142,8 @@ ACTS_ON = {
 
 
 def of_numbers(view: type, function: Callable) -> Callable:
-    """Return a function of a `view` as one of plain numbers, callable by address."""
-    if not hasattr(function, "__name__"):  # refused with the fix
+    """Convert a function of a `view` to a function of plain numbers, callable by address."""
+    if not hasattr(function, "__name__"):  # an error is raised with the fix
         return function
 
     def of_its_numbers(*numbers):
@@ -182,7 +183,7 @@ class Member(NamedTuple):
     p: Index
     law: Tag
     state: tuple
-    values: tuple  # of the formulas
+    values: tuple  # values of the formulas
     dt: float
 
 
@@ -226,7 +227,7 @@ NODE_WORDS = {
         members, members.nodes.sums, n, arrays.of_force(members.kin)
     ),
 }
-# what hooks on whole nodes can change, besides fields
+# What hooks on whole nodes can change, in addition to fields.
 NODE_WRITES = {"post_particles_to_grid": "force", "post_update_grid_state": "velocity_update"}
 
 
@@ -289,10 +290,10 @@ def vector_hook(
     nodes: bool = False,
     shares: bool = False,
 ) -> CompiledHook:
-    """Make a hook that sees vectors, declared fields and the law's state of points.
+    """Make a hook for vectors, declared fields and the state of the law of points.
 
-    With `nodes`, it sees vectors (`NODE_WORDS`) and declared fields of nodes. With `shares`, 1 /
-    number of members with mass follows the values.
+    With `nodes`, it is for vectors (`NODE_WORDS`) and declared fields of nodes. With `shares`, the
+    values are followed by 1 / number of members with mass.
 
     Parameters
     ----------
@@ -307,12 +308,12 @@ def vector_hook(
         ``"velocity"`` or classes of declared fields.
     """
     where = WHOLE_NODES if nodes else WHOLE_POINTS
-    if not getattr(function, "__name__", "").isidentifier():  # refused with the fix
+    if not getattr(function, "__name__", "").isidentifier():  # an error is raised with the fix
         return CompiledHook(function, where, publishes, False, shares, False, None, reads, writes)
-    # Cached kernels import it from the function's module.
+    # Cached kernels import it from the module of the function.
     name = f"{function.__name__}_at_{'nodes' if nodes else 'points'}"
     module = sys.modules[function.__module__]
-    while hasattr(module, name):  # the function has another hook
+    while hasattr(module, name):  # the function already has another hook
         name += "_"
     made = namedtuple(name, ("row", "values"), module=function.__module__)
     setattr(module, name, made)

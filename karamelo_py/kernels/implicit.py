@@ -1,6 +1,6 @@
 """Implicit steps: nodal forces after trial displacements, and their derivatives.
 
-Weights and gradients are those before the step in all Newton iterations (as in Charlton, Coombs &
+All Newton iterations use the weights and gradients before the step (as in Charlton, Coombs &
 Augarde 2017). With H = sum_I u_I (x) grad N_I, the nominal stress P(H) = tau(H) (I + H)^-T gives
 the forces V0 P grad N, and dP/dH (:mod:`karamelo_py.compiler.slopes`) the consistent stiffness V0
 grad N dP/dH grad N.
@@ -34,23 +34,23 @@ from karamelo_py.points.kinematics import (
 )
 from karamelo_py.points.laws import advance, by_rates, kirchhoff_stress, specific_volume
 
-PARTS = 64  # of a parallel loop, each with whole groups of lanes
+PARTS = 64  # parts of a parallel loop, each with whole groups of lanes
 GROUP = 8
 
 
 class Seen(NamedTuple):
-    """Nodes that a block's points see, with nonzero weight or gradient."""
+    """Nodes in the stencils of a block's points, with nonzero weight or gradient."""
 
     count: np.ndarray  # (n,) int32
     nodes: np.ndarray  # (n, s) int32 index of the unknown (int64: in the grid)
     weights: np.ndarray  # (n, s)
     gradients: np.ndarray  # (n, s, c) before the step
     starts: np.ndarray  # (m + 1,) int64: range of each node in `entries`
-    entries: np.ndarray  # int32 or int64: p s + k, over the points that see a node
+    entries: np.ndarray  # int32 or int64: p s + k for point p and k-th node of its stencil, by node
 
 
 class Pairs(NamedTuple):
-    """Pairs of nodes seen by one point: the blocks of K, row by row."""
+    """Pairs of nodes in a common stencil: the blocks of K, row by row."""
 
     codes: np.ndarray  # (m,) int64 grid positions, whose differences identify pairs
     middle: int  # column of difference 0 in `rank`
@@ -69,7 +69,7 @@ class Tangent(NamedTuple):
     first: int
     end: int
     values: np.ndarray  # (t t, c) V0 dP/dH, row by row
-    done: np.ndarray  # (m,) int64 entries done of each node
+    done: np.ndarray  # (m,) int64 number of entries that are done, by node
 
 
 class Response(NamedTuple):
@@ -116,7 +116,7 @@ def see(frame, at, matter, seen, chunk):
                 gives = gives | (g != 0)
             if gives:
                 slot = count
-                if isinstance(basis, AtCorners):  # corners may see the same node
+                if isinstance(basis, AtCorners):  # corners may have common nodes
                     for other in range(count):
                         if seen.nodes[p, other] == node:
                             slot = other
@@ -150,7 +150,7 @@ def gradient_at(kin, seen, p, k):
 
 @by_threads
 def strain(kin, seen, u, response, chunk):
-    """Compute each point's H from displacements (m, d)."""
+    """Compute H of each point from displacements (m, d)."""
     seen, response = at_hand(seen), at_hand(response)
     count = seen.nodes.shape[0]
     most = 0.0
@@ -176,8 +176,8 @@ def strained_point(matter, response, p):
     return law, state, H, mass * specific_volume(law)
 
 
-# Rotation about an axis has H and a conjugate stress linear in the nodal unknowns, but dependent on
-# the point's radius r before the step.
+# For rotation around an axis, H and its conjugate stress are linear in the nodal unknowns, but
+# depend on the radius r of the point before the step.
 
 
 @point_function(otherwise=True)
@@ -269,7 +269,7 @@ def keep_stress(matter, stress):
 
 
 # --- at the nodes -----------------------------------------------------------------------------
-# A node sums over its points in order; threads divide nodes.
+# Each node sums over its points in order; nodes are divided among threads.
 
 
 @kernel
@@ -293,7 +293,7 @@ def list_points(seen):
 
 @kernel
 def spread(seen, places):
-    """Return the largest distance, along an axis, of nodes (at `places`) seen by one point."""
+    """Return the largest distance, along an axis, between nodes (at `places`) of a stencil."""
     most = 0
     for p in range(seen.nodes.shape[0]):
         for i in range(places.shape[1]):
@@ -332,7 +332,10 @@ def add_forces(kin, seen, stress, f, chunk):
 
 
 def along(kin, i):
-    """Return index and column of the tensor components that act on an unknown; hoop radially."""
+    """Return index and column of the tensor components that act on an unknown.
+
+    The hoop component acts on the radial unknown.
+    """
     d, places = kin.dimension, kin.Tensor.places
     return [
         (c, column) for c, (row, column) in enumerate(places)

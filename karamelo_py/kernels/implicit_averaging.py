@@ -1,16 +1,16 @@
 """F-bar in implicit steps, and its derivatives, which couple more nodes.
 
-With A = I + H and J = det A, the law sees s A, s = (r / J)^(1/k) in k directions, where
+With A = I + H and J = det A, the law gets s A, where s = (r / J)^(1/k) in k directions and
 
     r_p = sum_i N_ip R_i,    R_i = sum_q N_iq V_q J_q / sum_q N_iq V_q.
 
-The energy e(A, r) of a point has P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0 p / r, p being
-the mean of tau along these directions. Nodal forces are P grad N, plus V J A^-T grad N times the
-average of q. With S = dR/du, their derivatives
+The energy e(A, r) of a point has the derivatives P = de/dA = V0 (tau - p I) A^-T and q = de/dr = V0
+p / r, where p is the mean of tau along these directions. Nodal forces are P grad N, plus V J A^-T
+grad N times the average of q. With S = dR/du, their derivatives
 
     K + X^T S + S^T Y + S^T Z S
 
-are sums over points and products of nodal matrices: X of dP/dr, Y of dq/dA, Z of dq/dr.
+are sums over points and products of nodal matrices, where X contains dP/dr, Y dq/dA and Z dq/dr.
 """
 
 from typing import Any, NamedTuple
@@ -43,7 +43,7 @@ from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specifi
 
 
 class Averages(NamedTuple):
-    """Averaging of a block's n points; t components of a tensor."""
+    """Averages at the n points of a block; t components of a tensor."""
 
     volume: np.ndarray  # (1, n) V
     grown: np.ndarray  # (1, n) V J

@@ -1,7 +1,8 @@
 """Rotation around an axis in implicit steps: nodes have an angle as third unknown.
 
-In axes that rotate with a point, an increment moves it to radius r' and has r' dphi/dr and r'
-dphi/dz in 31 and 32. H has dphi/dr and dphi/dz there, its stress the torques r' P_31 and r' P_32.
+In axes that rotate with a point, an increment moves the point to the radius r', and its components
+31 and 32 are r' dphi/dr and r' dphi/dz. In H these components are dphi/dr and dphi/dz; the
+conjugate stress has the torques r' P_31 and r' P_32.
 """
 
 from karamelo_py.compiler.fields import field

@@ -15,7 +15,7 @@ class OneByOne(NamedTuple):
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose lanes for a loop over points: none if interpreted, or if a part has none."""
+    """Choose lanes for a loop over points: none if it is interpreted, or a part supports none."""
     return OneByOne()
 
 
@@ -37,15 +37,15 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
     """Return True if three loops over a stretch (gather, update, scatter) replace one.
 
-    They pay for passes in lanes that only strain, as a law may fill the instruction cache. Where
-    points move there is little to update, and finding stencils twice costs more.
+    Separate loops are faster for passes in lanes that only strain, as a law may fill the
+    instruction cache. If points move, the update is short, and computing stencils twice costs more.
     """
     strains = [isinstance(task, Strain) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Double the lanes, as operations of an update wait for each other."""
+    """Return twice the lanes, as operations of an update depend on each other."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

@@ -1,7 +1,7 @@
 """Pairs of touching points of two bodies, found with linked cells, and their forces.
 
-Sums are double precision, on one thread and by id, so they depend neither on the number of threads
-nor on the order in memory.
+Sums are in double precision, by one thread and in the order of ids, so they are independent of the
+number of threads and of the order in memory.
 """
 
 from math import inf, sqrt
@@ -47,7 +47,7 @@ class OneOfTwo(NamedTuple):
 class Push(NamedTuple):
     law: Tag  # `points.bodies`
     kin: Tag
-    reach: float  # largest distance of touching points along an axis
+    reach: float  # largest distance between touching points along an axis
     step: float  # time since the last positions
     dt: float  # sets the stiffness, with `kick`
     kick: float
@@ -89,7 +89,7 @@ def _radius(matter, x, p):
 
 @kernel
 def extend(matter, x, ids, extents):
-    """Extend the extents of two bodies by a block's points at `x` (w, n).
+    """Extend the extents of two bodies by the points of a block at `x` (w, n).
 
     `extents` (2, 7): largest -x, -y, -z, x, y, z and radius of each body.
     """
@@ -152,10 +152,7 @@ def _largest(values, begin, end):
 
 @noinline
 def _lay_cells(d, bodies, cells, reach):
-    """Cover with cells where the bodies may touch.
-
-    Returns the width of a cell, 0 if they touch nowhere.
-    """
+    """Cover the region of possible contact by cells; return the cell width, 0 without contact."""
     n, m = bodies.first2, bodies.mass.size
     width = min(_largest(bodies.radius, 0, n) + _largest(bodies.radius, n, m), reach)
     if not width > 0:
@@ -164,7 +161,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # excludes NaN
+        # also for NaN
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -201,7 +198,7 @@ def _find_cells(d, bodies, cells, width):
             cells.start[number + 1] += 1
     for c in range(used):
         cells.start[c + 1] += cells.start[c]
-    # Moves start[c] to the end of cell c, where c + 1 begins.
+    # This moves start[c] to the end of cell c, where cell c + 1 begins.
     for j in range(n, m):
         c = cells.cell[j]
         if c >= 0:
@@ -238,8 +235,8 @@ def _add(bodies, i, j, force, total):
 def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points; return 1 if they touch, else 0.
 
-    For the friction on `i`, `cells.contact` sums load, normal force, and each partner's stiffness
-    times tangential velocity.
+    For the friction on `i`, `cells.contact` sums load, normal force, and stiffness times tangential
+    velocity over the partners.
     """
     kin, contact = push.kin, cells.contact
     force, d = _push_between(push, bodies, i, j), kin.dimension
@@ -266,7 +263,7 @@ def _rub(push, bodies, i, contact):
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
-    slid = push.step if grip[i, d] > 0 else 0.0  # 0 if it did not touch before
+    slid = push.step if grip[i, d] > 0 else 0.0  # 0 if it was not in contact before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
     force = rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
     for k in range(d):
@@ -306,7 +303,7 @@ def push_apart(push, bodies, cells):
         contact[:] = 0.0
         for turn in range(2 if rubs else 1):
             if turn == 1:
-                if not contact[0] > 0:  # a bouncing point forgets gradually
+                if not contact[0] > 0:  # after contact, a bouncing point loses its grip gradually
                     for k in range(d + 2):
                         bodies.grip[i, k] *= 1 - NEW
                     break

@@ -1,4 +1,4 @@
-"""Rows of pore water, and how its quantities join the soil's."""
+"""Rows of pore water, and how its quantities join passes of the soil."""
 
 from typing import NamedTuple
 
@@ -45,7 +45,7 @@ def _at_water(row, s, step):
 
 
 def _rim(s):
-    # With hats every node is at the rim. With splines, positions of points make B nonzero inside.
+    # With a linear basis every node is at the rim. With splines, B is not exactly 0 inside.
     return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
 
 
@@ -73,7 +73,7 @@ SLOW_COMPANIES = COMPANIES[:1]
 
 
 class Water(NamedTuple):
-    """Fields of pore water, and what accompanies tasks and quantities."""
+    """Fields of pore water, and rows that accompany tasks and quantities."""
 
     point_fields = pores.POINT_FIELDS
     node_fields = pores.NODE_FIELDS

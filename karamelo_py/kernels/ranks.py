@@ -18,7 +18,7 @@ _call = caller_of(CALL)
 
 class Linked(NamedTuple):
     address: int  # of ``(request, a, b) -> number``
-    foreign: np.ndarray  # (N,) uint8: 1 if another process counts a node's terms
+    foreign: np.ndarray  # (N,) uint8: 1 if another process adds the terms of a node
 
 
 @kernel

@@ -48,10 +48,10 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
 
 
 def accumulate_affine(array, nodes, first, weights, field):
-    """Add an affine field times the weights to nodes, from component `first`.
+    """Add an affine field times the weights to nodes, from component `first` on.
 
-    `field` is the value at the first node, and its increments ``slopes[d]`` to the next node along
-    axis `d` (nodes form a square or cube, last axis fastest); () if constant.
+    `field` is the value at the first node, and increments ``slopes[d]`` from node to node along
+    axis `d`, or () if it is constant. Nodes form a square or cube, with the last axis fastest.
     """
     value, slopes = field
     width = _width(nodes, slopes)
@@ -73,7 +73,7 @@ def move_record(target, source, first, template, keep):
 
 @shared
 def prefetch_records(array: Any, i: Any) -> None:
-    """Prefetch the records `AHEAD` nodes after those in lanes."""
+    """Prefetch the records `AHEAD` nodes after the nodes in lanes."""
 
 
 def _width(nodes: Any, slopes: Any) -> int:
@@ -108,7 +108,7 @@ def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int
 
 
 def _chunks(count: int) -> list[tuple[int, int]]:
-    """Split components into (first, number), number 4, 2 or 1; 3 count as 4."""
+    """Split components into (first, number), with a number of 4 (also for 3), 2 or 1."""
     out, first = [], 0
     while first < count:
         left = count - first
@@ -154,7 +154,7 @@ def _gather_row(array, nodes, first, template):
 
 @intrinsic
 def _gather_weighted(array, nodes, first, weights, template):
-    """Sum by weight before records become lanes."""
+    """Return weighted sums over records, made before records are transposed to lanes."""
     lanes = weights[0]
     made = types.UniTuple(lanes, len(template))
 
@@ -203,7 +203,7 @@ def _row(array, i, first, template):
 
 @intrinsic
 def _scatter(array, nodes, first, values):
-    """Add to node records lane by lane; if all have one node, sum first."""
+    """Add to node records lane by lane; if all lanes have the same node, sum over lanes first."""
     lanes = Lanes(array.dtype, max(lanes_of(value) for value in values))
     at_once = types.Tuple([v if isinstance(v, Lanes) else lanes for v in values])
 
@@ -345,9 +345,9 @@ def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) ->
 
 
 def _kept_in_memory(builder: ir.IRBuilder, vectors: list) -> Callable:
-    """Store vectors in memory opaque to LLVM; return the address by vector and lane.
+    """Store vectors in memory opaque to LLVM; return a function: address by vector and lane.
 
-    A broadcast from memory is part of the load; from a register it costs a shuffle.
+    A broadcast from memory is part of the load, whereas one from a register takes a shuffle.
     """
     room = llvm.room(builder, ir.ArrayType(vectors[0].type, len(vectors)))
     room.align = 64

@@ -1,7 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
-Rigid points scatter to separate sums (`RigidSums`), so the nodal sums belong to other solids,
-whatever the body's density. The body's force acts on these.
+Rigid points scatter to separate sums (`RigidSums`), so the usual nodal sums belong to other solids,
+for any density of the rigid solid. Its force acts on these solids.
 """
 
 from typing import NamedTuple
@@ -30,8 +30,8 @@ def _at_nodes(s):
 def _impose(at, dt, control, n):
     """Set the velocity of a node with rigid points, and store the force in `rigid`.
 
-    Work is as for a prescribed velocity. The change v* - v includes the force, or FLIP points would
-    never acquire the body's velocity.
+    Work is as for a prescribed velocity. The change v* - v includes this force, otherwise points
+    would not get the velocity of the rigid solid with FLIP.
     """
     kin, nodes, rigid = at
     d = kin.dimension
@@ -45,7 +45,7 @@ def _impose(at, dt, control, n):
         impulse = change = 0.0
         if mass > 0:
             impulse = velocity - nodes.update[n, k]
-            # from the points' momentum, as a fix may have held the node
+            # from the momentum of points, as a fix may have held the node
             change = velocity - nodes.sums[n, of_momentum(kin) + k] / mass
         rigid[n, of_force(kin) + k] = -mass * impulse / dt
         nodes.update[n, k] = velocity

@@ -1,16 +1,16 @@
 """Contacts and joints between rigid bodies, solved together with all other loads.
 
 A link has a position, 3 x 6 matrices A and B, and the relative velocity r = A U_a - B U_b of two
-bodies there; its impulse p acts on the first, -p on the second, so that momentum and angular
-momentum are conserved to round-off. Impulses are stiff and implicit in the velocities at the end of
-the step (`SOFT` is the fraction of an approach that remains)::
+bodies at this position. Its impulse p acts on the first body and -p on the second, so that momentum
+and angular momentum are conserved to round-off. Impulses are stiff and implicit in the velocities
+at the end of the step (`SOFT` is the fraction of an approach that remains)::
 
     contact:  p_n = max(-(n . r + g / dt), 0) / (SOFT w_n), p_t = -r_t / (SOFT w_t), at most mu p_n
     joint:    p_k = -(e_k . r + c_k / dt) / (SOFT w_k), for each direction e_k that it holds
 
-with gap g, displacement c from where the joint holds, and w the velocity change per unit impulse.
-Newton's method finds the velocities of all bodies together, including their contacts with material
-points.
+where g is the gap, c the displacement of the joint from its fixed position, and w the velocity
+change per impulse. Newton's method finds the velocities of all bodies together, including their
+contacts with material points.
 
 Collisions come first and use the velocities before the forces of the step, so bodies at rest do not
 bounce (Guendelman, Bridson & Fedkiw 2003, "Nonconvex rigid bodies with stacking"). The fastest
@@ -41,10 +41,10 @@ from karamelo_py.kernels.surfaces import (
 )
 
 SOFT = 1e-5
-GIVEN_BACK = 0.1  # fraction of a penetration removed per step
+GIVEN_BACK = 0.1  # fraction of a penetration that is removed per step
 SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual over momentum, both as sums of p^2 / m
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope over initial slope
-SLOW = 1e-9  # collisions slower than this fraction of the fastest are ignored
+SLOW = 1e-9  # collisions slower than this fraction of the fastest one are ignored
 COLLISIONS = 50  # at most, per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
@@ -52,9 +52,9 @@ LINK = np.dtype([
     ("kind", np.int64), ("first", np.int64), ("second", np.int64),  # bodies
     ("at", *_VECTOR), ("ways", *_MATRIX),  # a contact's first direction is its normal
     ("gap", *_NUMBER), ("mu", *_NUMBER), ("restitution", *_NUMBER),
-    ("stiff", *_VECTOR), ("bias", *_VECTOR),  # per direction
+    ("stiff", *_VECTOR), ("bias", *_VECTOR),  # by direction
     ("constant", *_NUMBER),  # impulse along the first direction
-    ("impulse", *_VECTOR), ("hit", *_VECTOR),  # on the first body; by collisions
+    ("impulse", *_VECTOR), ("hit", *_VECTOR),  # impulse on the first body; part due to collisions
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
     ("most", *_NUMBER),  # friction bound
     ("slot", np.int64), ("torque", np.int64),  # indices of published force, torque; torque 0: none
@@ -63,7 +63,7 @@ LINK = np.dtype([
 JOINT = np.dtype([
     ("first", np.int64), ("second", np.int64),
     ("at", *_VECTOR), ("end", *_VECTOR),  # initial positions in the first and second body
-    ("axes", *_MATRIX),  # initial, as rows
+    ("axes", *_MATRIX),  # initial axes, as rows
     ("holds", np.int64, 6),  # 1 if held: displacement along each axis, then rotation about each
     ("spring", np.int64), ("stiffness", *_NUMBER), ("damping", *_NUMBER), ("length", *_NUMBER),
     ("slot", np.int64), ("torque", np.int64),
@@ -73,7 +73,7 @@ JOINT = np.dtype([
 class LinkedPart(NamedTuple):
     """A body, or a fixed region, in contact with others."""
 
-    body: int  # index; the last body is fixed
+    body: int  # index of the body; the last body is fixed
     shape: arrays.Tag
     balls: np.ndarray  # (n, 4) initial centres, radii
 
@@ -531,10 +531,7 @@ def _add_body(links, body, n, bounded):
 
 @noinline
 def _try(links, bodies, fraction, bounded):
-    """Try `fraction` of the step in the last column of the slope.
-
-    Returns the square of the residual.
-    """
+    """Try `fraction` of the step in the last column of the slope; return the squared residual."""
     m = links.slope.shape[0]
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -546,7 +543,7 @@ def _try(links, bodies, fraction, bounded):
 
 @noinline
 def _fall(links, rest):
-    """Return residual . Newton step."""
+    """Return the residual times the Newton step."""
     m, total = links.slope.shape[0], 0.0
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -557,7 +554,7 @@ def _fall(links, rest):
 
 @noinline
 def _descend(links, bodies):
-    """Move to the minimum along the Newton step; return the squared residual, 0 if not a descent.
+    """Go to the minimum along the Newton step; return the squared residual, 0 without descent.
 
     With bounded friction the residual is the gradient of a convex function.
     """
@@ -618,7 +615,7 @@ def _iterate(links, bodies, bounded):
 def _solve(links, bodies):
     if _iterate(links, bodies, False):
         return
-    # With friction bounds fixed from the last normal impulses the problem is convex, and Newton's
+    # With friction bounds by the previous normal impulses, the problem is convex and Newton's
     # method converges. The first pass has no friction.
     for n, body in enumerate(bodies):
         for a in range(6):
@@ -657,7 +654,7 @@ def _approach(links, link, dt):
 def _hit(links, link):
     """Resolve the collision of a contact.
 
-    Friction stops its slip, with an impulse of up to mu times the normal impulse.
+    Friction stops the slip, with an impulse of up to mu times the normal impulse.
     """
     _set_levers(links, link)
     _set_weight(links, link)
@@ -690,7 +687,7 @@ def _hit(links, link):
     work = 0.0
     for k in range(3):
         work += p[k] * r[k]
-    most = -2 * work / _along(links, p, p)  # more would add energy
+    most = -2 * work / _along(links, p, p)  # a larger impulse would add energy
     for k in range(3):
         p[k] *= min(most, 1.0)
         link.hit[k] += p[k]
@@ -793,7 +790,7 @@ def solve(links, bodies, control):
             link.impulse[c] += link.hit[c]
         _set_levers(links, link)
         _publish(link, values, kick)
-    # including hits, for published forces
+    # including collisions, for published forces
     _sum_impulses(links)
     for n, body in enumerate(bodies):
         for a in range(6):

@@ -7,14 +7,14 @@ velocity at x is A U = V + w x (x - X), and the impulse has a closed form::
     p_n = s m max(n . (A U - v*) - g / dt, 0)
     p_t = m (A U - v*)_t, but at most mu p_n
 
-Newton's method solves the body's equations, at most six: M (U - U*) + sum A^T p = 0. Being
-implicit, it does not limit the step. Contact at points has s = 0.1 (dt / dt0)^2, with dt0 the
-unshortened step: an implicit spring of constant stiffness. Contact at nodes has s = 1.
+Newton's method solves the body's equations, at most six: M (U - U*) + sum A^T p = 0. As the impulse
+is implicit, it does not limit the step. Contact at points has s = 0.1 (dt / dt0)^2, where dt0 is
+the unshortened step: an implicit spring of constant stiffness. Contact at nodes has s = 1.
 
-Forces act over `kick`, motion over dt. With constant angular momentum the body rotates about one
-principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma & Wisdom 1994, "Lie-Poisson
-integrators for rigid body dynamics in the solar system"), so the energy of a free top oscillates by
-O(dt^2) without drift.
+Forces act for the time `kick`, and the body moves for dt. At constant angular momentum it rotates
+about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma & Wisdom 1994,
+"Lie-Poisson integrators for rigid body dynamics in the solar system"), so the energy of a free top
+oscillates by O(dt^2) without drift.
 """
 
 from math import atan2, cos, sin, sqrt
@@ -30,24 +30,24 @@ from karamelo_py.kernels.contact import ListedPairs
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
 # Vectors have three components in any dimension. Restart files use this layout.
 STATE = np.dtype([
-    ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # of the centre
-    ("momentum", *_VECTOR),  # angular
+    ("x", *_VECTOR), ("v", *_VECTOR), ("spin", *_VECTOR),  # position, velocity, spin
+    ("momentum", *_VECTOR),  # angular momentum
     ("q", np.float64, 4),  # rotation since the start (quaternion)
     ("angle", *_VECTOR),  # 2D: rotation about z, may exceed 2 pi; 3D: rotation vector
-    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step; about the centre
+    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step; torque about the centre
     ("R", *_MATRIX),  # rotation matrix of q
     ("move", *_VECTOR),  # displacement of the centre in this step / dt
     ("spread", *_MATRIX),  # velocity gradient: (rotation in this step - 1) / dt
     ("passes", *_NUMBER),  # Newton iterations in this step
     ("failed", *_NUMBER),  # steps that did not converge
 ])  # fmt: skip
-NUMBERS = STATE.itemsize // 8  # indices from here on: torque about the origin
+NUMBERS = STATE.itemsize // 8  # numbers in a state; further indices: torque about the origin
 CONSTANTS = np.dtype([
     ("mass", *_NUMBER), ("inertia", *_VECTOR),  # principal moments
     ("axes", *_MATRIX),  # principal axes, as columns
     ("start", *_VECTOR),
     ("bound", *_NUMBER),  # largest distance of a point from x
-    ("speed", *_NUMBER),  # bound of point speeds in this step
+    ("speed", *_NUMBER),  # upper bound of the speeds of points in this step
     ("offset", *_VECTOR),  # centre of mass minus x, in the initial frame
 ])  # fmt: skip
 CONTACT = np.dtype([
@@ -62,7 +62,7 @@ CONTACT = np.dtype([
     ("torque", np.int64),  # slot, or 0
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
-SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # of the initial squared residual
+SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # fractions of the initial squared residual
 # Formulas of a body: prescribed velocity and spin, force and torque, acceleration
 LED, LOADED, FALLS, FORMULAS = 0, 6, 12, 15
 
@@ -78,7 +78,7 @@ class Formulas(NamedTuple):
 class Solution(NamedTuple):
     """Work arrays of a step, (6,): translation, then rotation."""
 
-    momentum: np.ndarray  # without contact
+    momentum: np.ndarray  # momentum without contact
     u: np.ndarray  # velocities
     trial: np.ndarray
     residual: np.ndarray
@@ -89,7 +89,7 @@ class Solution(NamedTuple):
     before: np.ndarray  # centre before the step, (3,)
     mass: np.ndarray  # (6, 6)
     slope: np.ndarray  # (6, 7), right-hand side last
-    lever: np.ndarray  # (3, 6): A, first half constant (unit matrix)
+    lever: np.ndarray  # (3, 6): A, whose first half is the unit matrix
 
 
 class FreeBody(NamedTuple):
@@ -189,7 +189,7 @@ def _set_spin(body):
 
 @noinline
 def _turn_by_spin(body, dt):
-    """Rotate by the spin of the step, for partly prescribed rotation."""
+    """Rotate by the spin in the step, if the rotation is partly prescribed."""
     state = body.state[0]
     w = state.spin
     size = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
@@ -321,7 +321,7 @@ def add_slope(body, i, bounded):
                 way = c.slip[k] / c.speed
                 slope -= c.rub * way * c.slip[j] / c.speed
                 slope += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
-            for a in range(A.shape[1]):  # 36 terms: loops compile faster
+            for a in range(A.shape[1]):  # loops compile faster than 36 terms
                 for b in range(A.shape[1]):
                     J[a, b] += slope * A[k, a] * A[j, b]
 
@@ -395,7 +395,7 @@ def solve(body, dt):
     state.passes = 0
     if _iterate(body, dt, False):
         return
-    # With friction bounds fixed from the last normal impulses the problem is convex.
+    # With friction bounds by the previous normal impulses, the problem is convex.
     for _ in range(BOUNDS_AT_MOST):
         change = largest = 0.0
         for i in range(body.count[0]):

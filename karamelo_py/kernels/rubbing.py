@@ -1,4 +1,4 @@
-"""Friction of points on tools, one by one, in double precision."""
+"""Friction of points on tools, point by point and in double precision."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from karamelo_py.points.kinematics import zero_vector
 class Rubbing(NamedTuple):
     normal: np.ndarray  # (n, d) unit
     load: np.ndarray  # (n,)
-    pull: np.ndarray  # (n, d) stretch of springs in the step, as force
+    pull: np.ndarray  # (n, d) force due to the stretch of springs in the step
     stop: np.ndarray  # (n, d) force that would stop the slip
 
 

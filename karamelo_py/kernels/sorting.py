@@ -23,10 +23,10 @@ class TileGrid(NamedTuple):
 class Neighbourhood(NamedTuple):
     top: np.ndarray  # (g, d) last node of each grid
     per_cell: int
-    beyond: int  # nodes seen beyond the cell
-    least: int  # points at a wall see all nodes up to this one
+    beyond: int  # nodes of the stencil beyond the cell
+    least: int  # stencils of points at a wall include all nodes up to this one
     reach: float
-    offset: float  # of the first node seen (`points.basis.first_node`)
+    offset: float  # offset of the first node of a stencil (`points.basis.first_node`)
 
 
 class SortKeys(NamedTuple):
@@ -38,10 +38,10 @@ class SortKeys(NamedTuple):
 class SortedOrder(NamedTuple):
     """Order and boxes of n points, sorted by threads in parts."""
 
-    width: int  # of groups of points
+    width: int  # number of points in a group
     ends: np.ndarray  # (parts, T) ends of tiles; the last row is final
     share: np.ndarray  # (parts + 1,) first tile of each part, by number of points
-    boxes: np.ndarray  # (2, T, d) first and last nodes a tile's points may see
+    boxes: np.ndarray  # (2, T, d) first and last nodes in stencils of the points of a tile
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
     order: np.ndarray  # (n,) previous indices
     tile: np.ndarray  # (n,)
@@ -49,15 +49,12 @@ class SortedOrder(NamedTuple):
 
 
 def cell_of(grid: Grid, direction: int, at: Number) -> int:
-    """Return the cell of a point at `at` cells, clamped to the grid.
-
-    A hook may have moved the point anywhere.
-    """
+    """Return the cell of a point at `at` cells, clamped to the grid, as hooks may have moved it."""
     return min(max(int(at), 0), cells_along(grid, direction) - 1)
 
 
 def _seen(grid, around, g, direction, at):
-    """Return the first and last node that a point of grid `g`, at `at` cells, may see."""
+    """Return the first and last node in the stencil of a point of grid `g`, at `at` cells."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]
@@ -87,7 +84,7 @@ def find_tiles(at, tiles, ends, tile, k):
 
 @noinline
 def _begin_tiles(sorting):
-    """Set where each part's points begin in each tile; divide tiles by number of points."""
+    """Find where the points of each part begin in each tile; divide tiles by number of points."""
     ends, share, points = sorting.ends, sorting.share, sorting.order.size
     parts = ends.shape[0]
     position = shares = 0
@@ -105,7 +102,7 @@ def _begin_tiles(sorting):
 
 @shared_out
 def _order_parts(sorting, k):
-    """Place the k-th part of the points (counting sort); `ends` moves from begin to end."""
+    """Place the k-th part of the points (counting sort), which moves `ends` from begin to end."""
     ends, tile, order = sorting.ends, sorting.tile, sorting.order
     parts = ends.shape[0]
     for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):
@@ -116,7 +113,7 @@ def _order_parts(sorting, k):
 
 @shared_out
 def _order_in_all_tiles(at, by, sorting, k):
-    """Sort a tile's points by first node, then id; cells filling groups of `width` come first."""
+    """Sort the points of a tile by first node, then id; cells that fill groups come first."""
     (_, kin, grids, of, x), sorting = at_hand(at), at_hand(sorting)
     tiles, around, ids = at_hand(by)
     boxes, bins, cell, order = sorting.boxes, sorting.bins, sorting.room, sorting.order
@@ -143,7 +140,7 @@ def _order_in_all_tiles(at, by, sorting, k):
             cell[0, q] = number
             cell[1, q] = p
             bins[k, 0, number] += 1
-        # cells of whole groups, then the rest; bins become begin and end
+        # Cells of whole groups come first, then the rest; bins become begin and end.
         position = begin
         for rest in (False, True):
             for c in range(cells):
@@ -155,7 +152,7 @@ def _order_in_all_tiles(at, by, sorting, k):
             c, p = cell[0, q], cell[1, q]
             last = bins[k, 1, c]
             bins[k, 1, c] += 1
-            # insertion sort, as nearly all are in order
+            # Insertion sort, as nearly all points are in order.
             while last > bins[k, 0, c] and ids[order[last - 1]] > ids[p]:
                 order[last] = order[last - 1]
                 last -= 1
@@ -231,7 +228,7 @@ _sort_by_team = by_team(_sort)
 
 @kernel
 def sort_points(mode, at, by, sorting, rows):
-    """Sort points by tile, then by first node; `rows` has the addresses of all their rows."""
+    """Sort points by tile, then by first node; `rows` are the addresses of all arrays of points."""
     _sort_by_team(mode, at, by, sorting, rows)
 
 

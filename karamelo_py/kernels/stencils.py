@@ -1,6 +1,6 @@
 """Gather and scatter over the nodes of a stencil, one by one or all at once.
 
-Moments along a stencil's arms, affine sums and domain corners are done at once.
+Moments, affine sums and corners of domains are done for all nodes at once.
 """
 
 from karamelo_py.compiler import all_lanes, point_function, real
@@ -19,8 +19,8 @@ from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block,
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
 from karamelo_py.points.kinematics import from_columns
 
-# --- affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point,
-# not per node. This is half of a scatter's work in 2D, two thirds in 3D.
+# --- affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point
+# instead of per node, which is half of the work of a scatter in 2D, and 67 % in 3D.
 
 
 def _beside(a, b):
@@ -66,8 +66,8 @@ def _gathered_at_once_move(task, w, stencil, total):
     if not len(factor):
         return ()
     velocities = [node.v_star(total[0]) for node in PointView(w, stencil, (), ()).nodes]
-    # sum N v (X - x)^T follows from sum N v and sum N v k, X being k nodes from the first. It is
-    # summed by rows, then planes, as weights are products.
+    # sum N v (X - x)^T follows from sum N v and sum N v k, where k counts nodes from the first. The
+    # sums are made by rows, then planes, as weights are products.
     sums = tuple([(v,) for v, _ in velocities])
     changes = tuple([dv for _, dv in velocities])
     for line in reversed(stencil.lines):
@@ -107,8 +107,8 @@ def affine_parts(quantities, w, stencil, loads):
 
 
 # --- corners of domains as nodes. CPDI functions are sums over corners, N_I = sum_c w_c
-# N_I^lin(x_c). What is linear in a node's weight or gradient is done with the few corners: a corner
-# interpolates from the nodes around it and distributes to them.
+# N_I^lin(x_c). Operations that are linear in the weight or gradient of a node are done with the few
+# corners, which interpolate from the nodes around them and distribute to these.
 
 
 def all_by_corners(parts, w):
@@ -170,7 +170,7 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
         return _gather(tasks, w, stencil, totals)
     if isinstance(lanes, OneByOne):
         return _gather_parts(tasks, w, stencil, totals)
-    # Sorted points mostly see the same nodes, loaded once for all lanes.
+    # Sorted points mostly have the same nodes, which are loaded once for all lanes.
     if product.sees_same_nodes(stencil):
         return _gather_parts(tasks, w, product.with_one_node(stencil), totals)
     _ask_ahead(tasks, w, stencil)

@@ -50,7 +50,7 @@ def untaken(rows: Iterable[Any], backend: type) -> list[str]:
 class InStep(NamedTuple):
     mode: Tag
     hooks: Tag
-    more: bool  # another step follows: leave its sums on the nodes (fused)
+    more: bool  # another step follows, for which a fused step leaves sums at the nodes
 
 
 class StepKind(NamedTuple):
@@ -128,7 +128,7 @@ def _take_all(rows, s, step):
 
 
 def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
-    """Make a function that takes a scheme's rows and returns whether no point failed."""
+    """Make a function that carries out the rows of a scheme; it returns False if a point failed."""
     cached: Any = functools.cache(rows_of_kind)  # for interpreted runs
 
     def take_all(kind, s, hooks, more):
@@ -143,7 +143,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# A step (with `more`, a fused one leaves the next sums); the rows before the first
+# A step (with `more`, a fused one leaves the next sums), and the rows before the first step.
 step, begin = _taking(rows_of), _taking(first_rows)
 
 
@@ -160,7 +160,7 @@ SMALLEST = 1e-6  # fraction of the first stable step below which a run stops
 
 
 def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
-    """Take up to `count` steps, to the end time at most; return why it stopped.
+    """Take up to `count` steps, at most to the end time; return the reason for the end.
 
     DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt near
     0), GAINED (spurious energy), HEATED (unexplained temperatures), SORT (a point may soon leave

@@ -1,10 +1,10 @@
-"""Faces in trees of boxes: distance to the nearest, and whether they enclose a position.
+"""Trees of faces: distance to the nearest face, and whether faces enclose a position.
 
 Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes; node k
-has children 2k and 2k + 1, so walks need no stack. A position is enclosed if its winding number is
-not 0: each face crossed by a ray along the last axis counts 1 or -1. Crossings of a common edge are
-computed bit for bit alike, so none is missed or counted twice. (Sunday 2001; triangles: Ericson
-2005, section 5.1.5.)
+has children 2k and 2k + 1, so traversal needs no stack. A position is enclosed if its winding
+number is not 0: each face crossed by a ray along the last axis counts 1 or -1. For a common edge of
+two faces, crossings are computed with the same bits, so none is missed or counted twice. (Sunday
+2001; triangles: Ericson 2005, section 5.1.5.)
 """
 
 from collections.abc import Callable
@@ -66,7 +66,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
 
 @noinline
 def _behind(k):
-    """Return the node after node `k` and its subtree; 0 after the last."""
+    """Return the node that follows node `k` and its subtree; 0 after the last."""
     k += 1
     while k & 1 == 0:
         k >>= 1
@@ -146,7 +146,7 @@ def distance(surface, kin, x, reach):
     leaves = surface.low.shape[0] // 2
     best = reach * reach
     k = 1
-    while k < leaves:  # descend to a near face first, so that few boxes are entered
+    while k < leaves:  # first descend to a near face, so that few boxes are searched
         left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
         if min(left, right) >= best:
             break
@@ -236,7 +236,7 @@ def _crossed(a, b, point):
     (ax, ay), (bx, by), (x, y) = a, b, point
     if (ay > y) == (by > y):
         return 0
-    if ay < by:  # the same operations for both faces of an edge
+    if ay < by:  # so that operations are the same for both faces of an edge
         return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
     return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
 
@@ -269,7 +269,7 @@ def _crossing_triangle(kin, surface, i, x):
         return 0
     normal = _cross(b - a, c - a)
     low, high = min(min(a[2], b[2]), c[2]), max(max(a[2], b[2]), c[2])
-    # edge-on: any height between its ends serves
+    # the face is parallel to the ray: take any height between its ends
     height = low
     if normal[2] != 0:
         fall = normal[0] * (x[0] - a[0]) + normal[1] * (x[1] - a[1])
@@ -300,7 +300,7 @@ def encloses(kin, surface, x):
 
 class HalfSpace(NamedTuple):
     normal: np.ndarray  # (d,) inward
-    offset: float  # product of the normal with a point on the plane
+    offset: float  # product of the normal and a position on the plane
 
 
 class Joined(NamedTuple):
@@ -331,7 +331,7 @@ def is_endless(shape: NamedTuple, axis: int) -> bool:
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, negative outside. It is exact where below `reach`."""
+    """Return the depth of `x` in a shape, negative outside; it is exact below `reach`."""
 
 
 @point_function(otherwise=True)
@@ -427,8 +427,7 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Functions of positions (n, d) and a reach. They return, per position (n,): the depth, negative
-# outside; the distance to the nearest face; and the largest component of the vector to it. Each is
-# at most `reach`.
+# Functions of positions (n, d) and a reach that return, for each, the depth (negative outside), the
+# distance to the nearest face, and the largest component of the vector to it, all at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
 offsets = _of_positions(_offset)

@@ -42,8 +42,8 @@ from karamelo_py.points.grid import Grid, inside, renumbered
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.transfers import in_step
 
-ROUNDING = 1e-3  # of distances, in cells
-STRETCH = 64  # points whose totals and arrays fit in the L1 cache
+ROUNDING = 1e-3  # tolerance of distances, in cells
+STRETCH = 64  # number of points whose totals and arrays fit into the L1 cache
 
 
 class Visit(NamedTuple):
@@ -51,14 +51,14 @@ class Visit(NamedTuple):
 
     tasks: tuple
     quantities: tuple
-    weights: Tag  # of the scatter: old or present
+    weights: Tag  # weights of the scatter: old or present
 
 
 class Extent(NamedTuple):
     dt: Number
     gathers: bool
     scatters: bool
-    moves: bool  # new locations go to the other array
+    moves: bool  # new locations are stored in the other array
 
 
 class Context(NamedTuple):
@@ -73,7 +73,7 @@ class Context(NamedTuple):
     nodes: Nodes
     buffers: Nodes  # to scatter to
     now: int
-    room: Number  # cells that points may still move within their tile's box
+    room: Number  # cells that points may still move within the box of their tile
     stride: Number
     common: tuple  # (d,)
     then: int  # index of the new locations
@@ -105,7 +105,7 @@ def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points fit their tile's box; otherwise they scatter after sorting."""
+    """Return True while points remain in the box of their tile; otherwise they must be sorted."""
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
@@ -139,7 +139,7 @@ class TileVisit(NamedTuple):
 
 @noinline
 def visit_tile(visit: Visit, s: Context, block: Block, t: int) -> None:
-    """Visit the points of a block's t-th tile; after a failed point, scatter nothing."""
+    """Visit the points of the t-th tile of a block; if a point fails, nothing is scattered."""
     s, block = at_hand(s), at_hand(block)
     points, tiling = block.points, block.tiling
     grid = record(s.grids, tiling.grid[t])
@@ -200,7 +200,7 @@ def _visit_at_once(tile):
 
 
 def _visit_in_stretches(tile):
-    """Gather, update and scatter a stretch of points in a loop each (`one_loop_each`)."""
+    """Gather, update and scatter stretches of points, in a loop each (`one_loop_each`)."""
     visit, s, lanes, w, out, begin, end = tile
     dt, wide = s.dt, lanes_of_update(lanes, visit)
     template = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
@@ -256,7 +256,7 @@ def _visit_nodes(task: Tag, used: tuple, dt: Number, k: int) -> None:
 
 def context_of(s: Setup, extent: Extent) -> Context:
     step, motion, (dt, gathers, scatters, moves) = s.control.step[0], s.control.motion[0], extent
-    # slightly more, as points are sorted whenever one did not fit (run.tiles)
+    # slightly more, as points are sorted as soon as one leaves its box (run.tiles)
     room = motion.drift_limit - motion.drift - motion.move + 0.5 * ROUNDING
     return Context(
         s.frame, s.kin, s.basis, in_step(s.transfer, step.kept), s.averaging, s.grids, s.nodes,
@@ -285,14 +285,14 @@ def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
 
 @point_function(otherwise=True)
 def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context) -> None:
-    """Sweep over all blocks; begin to send to other processes."""
+    """Sweep over all blocks, and begin to send to other processes."""
     for block in s.blocks:
         sweep_points(mode, visit, context, block)
 
 
 def sweep(s: Setup, mode: Tag, visit: Visit, extent: Extent) -> None:
-    """Visit all points and sum at the nodes; tiles have the reports (`clock.read_reports`)."""
-    # without buffers, nodes start from zero
+    """Visit all points and sum at the nodes; reports are stored by tile (`clock.read_reports`)."""
+    # without buffers, nodes must be set to zero first
     direct, scatters = s.buffers.count[1], extent.scatters
     anew = tuple(quantity for quantity in visit.quantities if not adds(quantity))
     sum_given(mode, anew, s, scatters & (direct == 1))

@@ -1,9 +1,9 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
-A scheme lists its stages once, in ``rows``. From these come the staged step, in which fixes act on
-points between stages; the fused step with the fewest passes over the points, whose first scatter
-joins the last pass of the previous step; the text of `karamelo-py check`; and the memory traffic of
-`karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
+A scheme lists its stages once, in ``rows``. From these rows are made: the staged step, in which
+fixes act on points between stages; the fused step with the fewest passes over the points, whose
+first scatter joins the last pass of the previous step; the text of `karamelo-py check`; and the
+memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -44,16 +44,16 @@ class Processor(NamedTuple):
 
 @point_function(tags=2)
 def take(row: Any, backend: Any) -> Any:
-    """Take a row on a back end, `Processor` or `~.compiler.gpu.Card`: ``take.on(Row, Card)``.
+    """Carry out a row on a back end; ``@take.on(Row, Card)`` declares the function.
 
-    Processor: ``(row, s, step)`` with a `Setup` and `~.kernels.step.InStep` is traced; it may
-    return whether no point failed. Card: ``(row, steps)`` with a `~.run.gpu.StepsOnCard` yields
-    launches.
+    For `Processor`, ``(row, s, step)`` with a `Setup` and `~.kernels.step.InStep` is traced, and
+    may return False if a point failed. For `~.compiler.gpu.Card`, ``(row, steps)`` with a
+    `~.run.gpu.StepsOnCard` yields launches.
     """
 
 
 class AtPoints(NamedTuple):
-    """Fixes act on points; `then` is 1 once new positions are known, else 0."""
+    """Fixes act on points; `then` is 1 after new positions are known, before that 0."""
 
     stage: int
     then: int
@@ -67,7 +67,7 @@ class AtNodes(NamedTuple):
 
 
 class Gather(NamedTuple):
-    """Grid to points: a task for a fraction of dt."""
+    """A task from grid to points, for a fraction of dt."""
 
     task: NamedTuple
     share: float = 1.0
@@ -83,8 +83,8 @@ class NodeTask(NamedTuple):
     """A task at every node in use."""
 
     task: Any  # a tag, or the class of tags that `make` returns
-    at: Any = None  # function of the setup: one with other nodes
-    length: Any = None  # function of the setup: time interval instead of `kick`
+    at: Any = None  # function of the setup: a setup with other nodes
+    length: Any = None  # function of the setup: a time interval instead of `kick`
     make: Any = None  # function of the setup: the tag
 
 
@@ -110,7 +110,7 @@ class Once(NamedTuple):
 
 
 class WorkOfLoads(NamedTuple):
-    """Sums the work of nodal loads; with `again`, velocity has been mapped again after the move."""
+    """Sums the work of nodal loads; `again`: velocities have been mapped again after the move."""
 
     again: bool = False
 
@@ -140,7 +140,7 @@ class Sweep(NamedTuple):
     moves: bool = True  # new positions go to the other array
     only_if_more: bool = False  # the scatter is for the next step
     at: Any = None
-    reported: Any = take_reports  # receives the points' reports, unless None
+    reported: Any = take_reports  # takes the reports of points, unless None
 
 
 def each_node(function: Any) -> EachNode:
@@ -163,7 +163,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of one pass; strain depends on a preceding move, and on the step of its v."""
+    """List the tasks of a pass; strain depends on a preceding move, and on the step of velocity."""
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -181,7 +181,7 @@ class _FusedStep:
     def __init__(self, rows: Iterable[Any]):
         self.rows: list[Any] = []
         self.visits: list[Visit] = []
-        self.gathers: list[Gather] = []  # of the next pass
+        self.gathers: list[Gather] = []  # gathers of the next pass
         self.next_sums: Scatter | None = None  # the first scatter, for the last pass
         for row in rows:
             _FUSED.get(type(row), _FusedStep.add)(self, row)
@@ -226,7 +226,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows one by one, as parts of the fused step's passes if possible."""
+    """List the rows one by one, as parts of passes of the fused step if possible."""
     rows = list(rows)
     return one_by_one(rows, _FusedStep(rows).visits)
 
@@ -274,10 +274,10 @@ def _described_scene(row, setup):
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row with the parts that join it in a scene; None if it does nothing."""
+    """Describe a row with the parts that join it in a scene; None for a row without effect."""
     return _described.find((type(row),))(row, setup)
 
-    # Kinds of rows that are replaced before a step
+    # Kinds of rows that are replaced before a step.
 
 
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
@@ -335,7 +335,7 @@ def _after_others(row, s):
 
 @in_scene.on(Sweep)
 def _in_company(row, s):
-    """Add tasks that join the pass, and rows before it; F-bar adds a pass before strains."""
+    """Add tasks that join a pass and rows before it; F-bar adds a pass before strains."""
     averages = average_volumes(row, s) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)
@@ -410,7 +410,7 @@ def _next_term(k: int) -> tuple:
 
 
 def average_volumes(row: Sweep, s: Setup) -> tuple:
-    """Average the coming strain's volume change at the nodes (F-bar)."""
+    """Average the volume change of the next strain at the nodes (F-bar)."""
     if not (row.gathers and any(isinstance(task, strain.Strain) for task in row.visit.tasks)):
         return ()
     trial = strain.TrialStrainOfLastStep() if row.of_last_step else strain.TrialStrain()
@@ -449,8 +449,9 @@ def any_node(s):
 def light_node(s):
     """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
 
-    It is at most 1; below m / m_p the node's strain would outrun its stress. Moments in the total
-    frame return the whole nodal velocity, which any limit would make grow.
+    This fraction is at most 1. At nodes of less mass, strain would change faster than stress can
+    follow. There is no limit with moments in the total frame, which return the whole nodal velocity
+    and would grow with any limit.
     """
     if stores_moment(s.transfer) and not s.frame.moves:
         return any_node(s)
@@ -495,7 +496,7 @@ CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
 )
 WORK_OF_LOADS = WorkOfLoads()
-# The deforming velocity must satisfy contact too, unless it is v*.
+# The velocity that strains points must satisfy contact, too, unless it is v*.
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
@@ -506,7 +507,7 @@ BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
 MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
-# for schemes that strain first: nodal velocity before the forces
+# Nodal velocity before the forces, for schemes that strain first.
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
     AXIS,
@@ -515,7 +516,7 @@ VELOCITY_BEFORE = (
     CONTACT_BEFORE,
 )
 FORCE = Scatter((InternalForce(),), OldWeights())
-# v* = v + dt f / m with loads, prescribed velocities, contact; heat flow
+# v* = v + dt f / m with loads, prescribed velocities and contact; heat flow.
 UPDATE = (
     SceneTask(sort_in_time),
     AVERAGED,
@@ -537,7 +538,7 @@ MOVE = (
     AtPoints(arrays.POST_ADVANCE_PARTICLES, 1),
     Check(),
 )
-# velocity of the moved points, mapped again
+# Velocities of the moved points, mapped again.
 MOMENTUM_AGAIN = (
     Scatter((MomentumAgain(),), OldWeights()),
     SEAM_AGAIN,

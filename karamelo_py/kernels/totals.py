@@ -1,8 +1,8 @@
 """Sums independent of the order of their terms: reactions, work, energies.
 
 A total is a superaccumulator: a fixed-point number over the range of doubles, in limbs of 32 bits
-with room for carries. Terms are added without rounding; a published total is right within a unit in
-the last place (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
+with room for carries. Terms are added without rounding; a published total is correct within a unit
+in the last place (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
 superaccumulators").
 """
 
@@ -15,7 +15,7 @@ from karamelo_py.compiler import kernel, noinline, point_function
 from karamelo_py.compiler.threads import add_among, many_threads
 
 LIMBS = 68
-LOST = LIMBS - 1  # counts NaN and infinite terms
+LOST = LIMBS - 1  # limb that counts NaN and infinite terms
 DIGIT = (1 << 32) - 1
 MANTISSA = (1 << 52) - 1
 MANY = 1 << 10  # terms whose integers sum without overflow
@@ -23,7 +23,7 @@ COARSE, FINE = 1e-200, 1e200  # range of the largest term that allows integer su
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign; ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# rows of totals, in slots of published values that are not sums (time, timestep, dt)
+# Rows of totals, in the slots of published values that are no sums (time, timestep, dt).
 KINETIC, STORED, WORK = 0, 1, 2
 
 
@@ -65,10 +65,10 @@ def add_to(totals, row, x):
 def add_many(totals, row, terms, count):
     """Add the first `count` of `terms`, at most `MANY`, without rounding.
 
-    They are summed as integers of two sizes, except terms 2^30 times smaller than the largest. A
-    number plus 1.5 2^52 has its integer part in its last bits, so the loop vectorises.
+    Terms are summed as integers of two sizes, except terms 2^30 times smaller than the largest. The
+    last bits of a number plus 1.5 2^52 are its integer part, so the loop vectorises.
     """
-    if many_threads():  # a term or two each
+    if many_threads():  # each has one or two terms
         for q in range(count):
             add_to(totals, row, terms[q])
         return
@@ -130,7 +130,7 @@ def rounded(total):
     carry(total)
     sign = 1.0
     if total[LOST - 1] < 0:
-        # digits of one sign sum without cancellation
+        # Digits of the same sign are summed without cancellation.
         sign = -1.0
         for k in range(LOST):
             total[k] = -total[k]
@@ -175,7 +175,7 @@ def collect(ranks, control, first, count):
 
 @point_function(otherwise=True)
 def counts(ranks, n):
-    """Return True if this process counts the terms of node `n`."""
+    """Return True if this process adds the terms of node `n`."""
     return True
 
 

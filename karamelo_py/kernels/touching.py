@@ -22,7 +22,7 @@ from karamelo_py.points.kinematics import dot, zero_vector
 STIFF = 0.5  # stiffness / (m / dt^2)
 DAMPED = 0.02  # damping / (m / dt)
 STIFFENING = 0.02  # growth of the stiffness of a deep contact per step
-ASIDE = 0.05  # step of depth differences / reach
+ASIDE = 0.05  # step of depth differences over reach
 LEVEL = 1e-3  # relative change of depth below which there is no direction
 CALL = types.int64(types.int64)
 
@@ -40,11 +40,11 @@ class Touch(NamedTuple):
     lost: int  # address of a function for points without a way out
 
     of_nodes = False
-    of_time = True  # formulas of time, also at the end of the step
+    of_time = True  # formulas of time are evaluated at the end of the step, too
 
 
 def direction_of(falls, step):
-    """Return the unit direction of depth differences over two steps; 0 if level."""
+    """Return the unit direction of depth differences over two steps; 0 if depth is constant."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
@@ -55,10 +55,10 @@ def memory_of(tag, members):
 
 
 def ball_at_first(ball, within, closer):
-    """Return the radius of a point at first touch, after approaching by `closer` in the last step.
+    """Return the radius of a point at first contact; `closer`: approach in the last step.
 
-    Points that begin inside, as at stair-stepped faces, must not gain energy from this: their balls
-    only reach to the surface.
+    Points that begin inside, as at stair-stepped faces, must not gain energy: the radius of their
+    balls is the distance to the surface.
     """
     room = max(closer, 0.0) - within
     return min(ball, room) if room > 0 else ball
@@ -67,7 +67,7 @@ def ball_at_first(ball, within, closer):
 def spring_rate(before, now, within, reach):
     """Return stiffness over mass, constant from the first touch on to conserve energy.
 
-    A larger one would add energy, a much softer one let points through.
+    A larger stiffness would add energy, and a much smaller one would let points through.
     """
     if before == 0:
         return now
@@ -114,7 +114,7 @@ def push(terms, memory, p, near):
     d, last_dt, closer = len(x), dt, dt * dot(slip, normal)
     ball, aside = reach_of(lever, p, whole, d)
     rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, reach)
-    if lever[d + 1, p] > 0:  # from positions, as velocities are noisy
+    if lever[d + 1, p] > 0:  # by positions, as velocities are noisy
         closer, last_dt = within + ball + aside - float(lever[d + 2, p]), 2 * kick - dt
     else:
         ball = ball_at_first(ball, within, closer)
@@ -129,7 +129,7 @@ def push(terms, memory, p, near):
     hold = x._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = x - x
-    if mean > 0:  # from positions, as velocities are noisy
+    if mean > 0:  # by positions, as velocities are noisy
         slid = x._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + mass * rate * slid, normal)
@@ -156,7 +156,7 @@ def push_points(kin, terms, memory, near, force):
 
 @noinline
 def force_of(tag, members, volume, one):
-    """Return a shape's force (d,) on a point, a `~.hooks.Member`."""
+    """Return the force (d,) of a shape on a point, `one`, a `~.hooks.Member`."""
     kin, d, (p, _, _, values, dt) = members.kin, members.kin.dimension, one
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
@@ -164,7 +164,7 @@ def force_of(tag, members, volume, one):
     whole, memory = radius(kin, float(volume), position), memory_of(tag, members)
     ball, aside = reach_of(memory[0], p, whole, d)
     x, mass = position - way, float(members.points.mass[p])
-    # most points are far, and a short reach is cheap
+    # Most points are far away, and a search in a short reach is cheap.
     within = depth(tag.shape, kin, x, 1.001 * max(ball + aside, whole))
     if within + ball + aside <= 0:
         return leave(memory, p, NearPoint(x, within, none, whole, none, mass))

@@ -1,4 +1,4 @@
-"""Rows of rotation around an axis, on nodes of a line, as for heat."""
+"""Rows of rotation around an axis; nodes have one component, as for heat."""
 
 from typing import Any, NamedTuple
 
@@ -52,7 +52,7 @@ def _at_rotation_hooks(hooks, stage, target, s):
     here, heat = at_its_nodes(s), s.control.heat[0]
     members = hook_loop.hooked_nodes(here, target, s.control.step[0].kept)
     hook_loop.node_hooks(stage, members, hooks, here, kick(s))
-    heat.set_low = heat.set_high = 0.0  # temperatures only
+    heat.set_low = heat.set_high = 0.0  # used by temperatures only
 
 
 @take.on(AtRotation, Processor)
@@ -85,7 +85,7 @@ COMPANIES = (
 
 
 class Rotating(NamedTuple):
-    """Fields of rotation around the axis, and what accompanies tasks and quantities."""
+    """Fields of rotation around the axis, and rows that accompany tasks and quantities."""
 
     point_fields = (twist.VelocityAround, twist.AngleAround, twist.RadiusAfterMove)
     node_fields = (

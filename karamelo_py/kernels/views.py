@@ -1,6 +1,6 @@
-"""Views of a point, `pt`, and of a node it sees, `node`, which equations read.
+"""Views of a point, `pt`, and of a node in its stencil, `node`, which equations use.
 
-They exist only while a kernel is traced. docs/house/kernels.md lists their attributes, with shapes
+Views exist only while a kernel is traced. docs/house/kernels.md lists their attributes, with shapes
 and units.
 """
 
@@ -74,7 +74,7 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 
     def v_star(self, template):
-        """Return v* and v* - v in the type of `template`; one record in 2D, two in 3D."""
+        """Return v* and v* - v in the type of `template`; they are one record in 2D, two in 3D."""
         kin, records, i = self.w.kin, self.w.nodes.update, self.i
         first, d = of_change(kin), kin.dimension
         if many_threads() and not isinstance(i, Weighted):  # adjacent records
@@ -157,7 +157,7 @@ def deformation_of(frame: Tag, kin: Tag, points: Points, material: tuple, p: Ind
 
 
 def ask_ahead(w: Work, p: Index, template: Number, apart: bool) -> None:
-    """Prefetch the next points in 3D, if more arrays are read than hardware prefetchers follow."""
+    """Prefetch the next points in 3D, if more arrays are read than hardware prefetches."""
     d, fields = w.kin.dimension, w.points.fields
     moment = len(zero_moment(w.transfer, w.kin, template))
     if d == 3 and (apart or moment):

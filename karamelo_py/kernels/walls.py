@@ -1,7 +1,7 @@
-"""Coulomb friction at walls: nodes that a fix holds across a wall rub along it.
+"""Coulomb friction at walls, on nodes that a fix holds in the normal direction.
 
-The normal force is the one for the prescribed velocity. The tangential force is at most mu times as
-large, and stops at most the motion. The wall does not move along itself.
+The normal force is the reaction of the fix. The tangential force is at most mu times the normal
+force, and at most stops the motion. The wall does not move in tangential directions.
 """
 
 from math import sqrt
@@ -22,7 +22,7 @@ def _is_free(holders, programs, n, c):
 
 @noinline
 def rub(members, call, q, mu):
-    """Apply wall friction to chosen node `q`; the holder's change of v* is the normal impulse."""
+    """Apply wall friction to the chosen node `q`; the fix has given the normal impulse."""
     kin, nodes, hooks, control, dt = members.kin, members.nodes, call.hooks, call.control, call.dt
     slot, programs, kept = hooks.table[call.h].slot, hooks.programs[call.h], members.kept
     d, holders, n = kin.dimension, hooks.holders, hooks.chosen[q]
@@ -59,13 +59,13 @@ def rub(members, call, q, mu):
                 if torque > 0:
                     x = (positions[0, q], positions[1, q], positions[2, q])
                     add_torque(control.totals, torque, x, c, -mass * taken / dt)
-    # walls take no heat
+    # the wall takes no heat
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Stop a stuck node's deforming velocity too, or stress would do work on spurious slip."""
+    """Stop a node that sticks in the velocity that strains, too; stress would do spurious work."""
     d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:

@@ -1,10 +1,10 @@
 """Compiled monitor of energy and temperatures.
 
 Kinetic plus stored plus dissipated energy minus the work of loads must not grow. Velocities belong
-to mid-steps and stresses to ends, so two consecutive steps are combined, to second order. Growth is
-relative to the energy without the drift of centres of mass, which could hide vibrations. The checks
-also count the cells that stressed material crosses (`note_crossing`), by which a linear basis in
-the updated frame loses stress.
+to the middle of a step and stresses to its end, so two consecutive steps are combined, with
+second-order accuracy. Growth is relative to the energy without the drift of centres of mass, which
+could hide vibrations. The checks also count the cells through which stressed material moves
+(`note_crossing`), as a linear basis in the updated frame then loses stress.
 """
 
 from math import exp, inf, sqrt
@@ -36,19 +36,19 @@ from karamelo_py.points.laws.across import Across
 from karamelo_py.points.laws.pore_water import Saturated, water_content
 
 LOOK = 10  # steps between checks
-FEW = 3  # checks compared before a window is full
+FEW = 3  # number of first checks that are compared before a window is full
 LOOKS = 10  # checks per window
-GROWTH = 0.01  # growth per window that gives a warning
-WITHIN = 0.1  # growth since the start that gives a warning
-DRIFTING = 1e-3  # least fraction of drift energy in the unit; relevant vibrations exceed it
-BOUND = 10.0  # times initial energy plus work of loads: a larger gain stops the run
+GROWTH = 0.01  # growth per window for a warning
+WITHIN = 0.1  # growth since the start for a warning
+DRIFTING = 1e-3  # smallest unit over drift energy; relevant vibrations exceed it
+BOUND = 10.0  # gain over initial energy plus work of loads above which a run stops
 ROUND_OFF = 1e-14  # fraction of m c^2 below which energy is noise
-COARSE = 1000.0  # round-off errors: a strain of this size is noise
+COARSE = 1000.0  # strain in units of round-off below which it is noise
 ENERGIES, OF_SOLID = 3, 5  # columns of tile reports
 HEAT_NOISE = 1e-4  # tolerated fraction of a uniform temperature
-OVERSHOOT = 0.1  # fraction of the range of source temperatures that stops the run
-# Tolerated multiple of conduction's stable step: null-space temperatures decay (measured with 2
-# points per cell: 4, and 5.8 without convection).
+OVERSHOOT = 0.1  # overshoot over the range of source temperatures above which a run stops
+# Tolerated step over the stable step of conduction, up to which null-space temperatures decay
+# (measured with 2 points per cell: 4, and 5.8 without convection).
 BORNE = 4.0
 
 
@@ -150,10 +150,7 @@ def _take_work_at_nodes(spans, work, control):
 
 
 def sum_energies(s, mode):
-    """Sum kinetic, stored plus dissipated energy, and work in the clock.
-
-    Rigid bodies are omitted.
-    """
+    """Sum kinetic, stored plus dissipated energy, and work in the clock, without rigid solids."""
     s.control.totals[: totals.WORK] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
@@ -185,7 +182,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, motion, tiling, control):
-    """Add the solids' mass and momentum, then elastic energy and that times velocity."""
+    """Add mass and momentum of solids, elastic energy, and elastic energy times velocity."""
     (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
@@ -243,9 +240,9 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add the cells that elastic energy moved through since the last check.
+    """Add the path in cells of elastic energy since the last check.
 
-    New energy has no path; vibrations renew it in one wave period.
+    New energy has no path; vibrations renew the energy within a wave period.
     """
     energy, row = control.energy[0], (control.firsts.size - 1) * (1 + d)
     now, before = control.answer[row], energy.elastic
@@ -261,7 +258,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((energy.kinetic - energy.of_drift) / now, 0.0), 1.0) * lasting / energy.to_and_fro
     )
-    # loss by a linear basis does not count as leaving
+    # Energy that a linear basis loses does not count as energy that has left.
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -289,7 +286,7 @@ def keeps(first, later, unit, within=WITHIN):
 
 
 def unit_of(energy):
-    """Return the largest energy, with a limited part of drift."""
+    """Return the largest energy, which contains only a limited part of drift."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 
@@ -297,8 +294,8 @@ def unit_of(energy):
 def judge(control):
     """Update the balance; return whether energy is within its bound."""
     energy = control.energy[0]
-    # Mean of the balances at mid-step and end, the other energy interpolated. They oscillate by
-    # (omega dt)^2/8 in opposite phase, the mean by (omega dt)^3/16.
+    # Mean of two balances, at mid-step and at the end, each with the other energy interpolated.
+    # They oscillate by (omega dt)^2/8 in opposite phase, their mean by (omega dt)^3/16.
     moving = energy.kinetic - energy.work
     balance = moving + energy.level * (energy.moving_before - moving)
     balance += energy.stored_before + energy.level * (energy.stored - energy.stored_before)
@@ -316,7 +313,7 @@ def judge(control):
         energy.supplied,
         energy.of_bodies,
     )
-    # A small part of a rigid body's energy may be all of what a touched body has.
+    # The energy of another body may be a small part of the energy of a rigid body that hits it.
     vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
@@ -328,15 +325,15 @@ def judge(control):
         if loss > energy.lost:
             energy.lost = loss
             energy.crossed = way
-            # means, as a single check shows the shortest waves
+            # means, as a single check contains the shortest waves
     unit = unit_of(energy)
     if energy.looks == FEW:
         energy.first_few = energy.first_mean = energy.largest_mean = (
             balance + energy.last_balance + energy.last_but_one
         ) / FEW
     if energy.looks >= 2 * FEW:
-        # A minimum, as single checks may err in collisions; stored, so the last check does not
-        # decide.
+        # The minimum, as single checks have errors in collisions; stored, as the last check alone
+        # should not decide.
         least = min(balance, energy.last_balance, energy.last_but_one)
         energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
     energy.sum_of_balance += balance
@@ -362,7 +359,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # also replaced by NaN
+            # NaN replaces it, too
             heat.T_low = T if not heat.T_low <= T else heat.T_low
             heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)
@@ -377,7 +374,7 @@ def measure_heat(s):
 
 
 def look_at_heat(s):
-    """Return whether temperatures are within what fixes, sources and initial state allow."""
+    """Return whether temperatures are within the bounds by fixes, sources and initial state."""
     heat = s.control.heat[0]
     if heat.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
@@ -390,7 +387,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store energies if a check is due; `level` is the weight of the later stored energy."""
+    """Store energies if a check is due; `level` is the weight of the stored energy at the end."""
     energy = s.control.energy[0]
     energy.level = level
     if anew:

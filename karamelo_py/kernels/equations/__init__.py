@@ -1,7 +1,7 @@
 """Quantities that points scatter, and tasks that gather, one file each.
 
-A quantity is a tag with equations as data (`takes`, `gives`), a task one with functions `empty`,
-`gathered` and `updated`. See docs/house/kernels.md for examples.
+A quantity is a tag with equations as data (`takes`, `gives`). A task is a tag with functions
+`empty`, `gathered` and `updated`. docs/house/kernels.md has examples.
 """
 
 from collections import namedtuple
@@ -38,8 +38,9 @@ def _zero(kin):
 class Sum(NamedTuple):
     """Nodal sum over points; ``of(pt, node)`` is a point's contribution, a tuple.
 
-    If that is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b (none if 0),
-    else (). Lanes arrange affine sums like records once per point, not per node.
+    If the contribution is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b
+    (none if b is 0), otherwise (). In lanes, affine sums are arranged like records once per point
+    instead of once per node.
     """
 
     into: NodeColumns
@@ -102,7 +103,7 @@ class Task(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Result of a point in a task; NaN or infinite if it failed."""
+    """Result of a task for a point; NaN or infinite if the point failed."""
 
     moved: Number  # in cells
     rate: Number  # largest so far
@@ -115,7 +116,7 @@ def empty(task: Tag, w: Work, x: tuple) -> tuple:
 
 @point_function()
 def gathered(task: Tag, node: NodeView, total: tuple) -> tuple:
-    """Return `total` plus a node's contribution."""
+    """Return `total` with the contribution of a node added."""
 
 
 @point_function()

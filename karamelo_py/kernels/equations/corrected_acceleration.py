@@ -1,8 +1,8 @@
 """Nodal accelerations with the error of the lumped mass removed.
 
-Lumping averages what the transfer maps to a node: a wave of wave number k loses the fraction kappa
-(k h)^2 of its acceleration, kappa = D / h^2. Adjacent nodes along the axes return it in pairs,
-which conserves linear momentum to round-off::
+Mass lumping averages what the transfer maps to a node: a wave of wave number k loses the fraction
+kappa (k h)^2 of its acceleration, where kappa = D / h^2. Differences between adjacent nodes restore
+it in pairs, which conserves linear momentum to round-off::
 
     a_I + kappa / m_I sum_J min(m_I, m_J) (a_I - a_J)
 """
@@ -20,7 +20,7 @@ from karamelo_py.points.kinematics import zero_vector
 
 
 class Acceleration(StepField):
-    """A node's velocity change by forces, 0 where the velocity is prescribed; and its mass."""
+    """Velocity change of a node by forces, 0 where the velocity is prescribed; and the mass."""
 
     @staticmethod
     def shape(kin):

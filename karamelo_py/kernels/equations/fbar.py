@@ -1,4 +1,4 @@
-"""F-bar: volume changes averaged over the surroundings.
+"""F-bar: volume changes averaged over neighbouring points.
 
 The volume ratio J_p of an increment becomes the average over the nodes of Jbar_i = sum_q N_iq V_q
 J_q / sum_q N_iq V_q (after Coombs et al. 2018, "Overcoming volumetric locking in material point
@@ -32,7 +32,7 @@ class AveragedStress(StepField):
 
 
 class PressureBeside(Field):
-    """Averaged minus the point's pressure in the last forces."""
+    """Averaged pressure minus the point's pressure, in the last forces."""
 
 
 class NodalStress(SummedField):
@@ -48,8 +48,9 @@ class PointByPoint(NamedTuple):
 class FBar(NamedTuple):
     """Averages volume changes, against volumetric locking.
 
-    Volume rates d_p become sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. This is self-adjoint:
-    forces of the mean stress, averaged alike, have the power of the averaged strain.
+    Volume rates d_p become sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. This map is
+    self-adjoint: if the mean stress is averaged in the same way, the power of nodal forces is the
+    power of the averaged strain.
     """
 
     in_lanes = True
@@ -60,8 +61,9 @@ class FBar(NamedTuple):
 class FBarOfSoil(FBar):
     """F-bar for laws whose yield surface uses part of the averaged pressure.
 
-    With its point's pressure alone, soil that dilates less than associated flow would lose strength
-    in stripes (:func:`~karamelo_py.points.laws.strengths.frictional.fraction_by_dilatancy`).
+    With the pressure of the point only, soil that dilates less than in associated flow would lose
+    strength in stripes
+    (:func:`~karamelo_py.points.laws.strengths.frictional.fraction_by_dilatancy`).
     """
 
     point_fields = (*FBar.point_fields, PressureBeside)

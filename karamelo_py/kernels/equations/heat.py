@@ -56,10 +56,7 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # in the order
 
 
 def at_least_round_off(weight):
-    """Return `weight`, but at least round-off.
-
-    Nodes that a point reaches only by its gradient need a temperature, too.
-    """
+    """Return `weight`, at least round-off: nodes with a gradient only need a temperature, too."""
     return max(weight, round_off(weight))
 
 
@@ -75,7 +72,7 @@ def content(pt):
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance
     pt.of(Volume)[0, p] = volume
-    # initial values, which fixes change
+    # initial values; fixes change them
     pt.of(Supply)[0, p] = real(0, pt.dt)
     pt.of(TemperatureShare)[0, p] = real(1, pt.dt)
     return of_present(p, capacity), of_present(p, conductance), T
@@ -150,7 +147,7 @@ class TemperatureGradient(eq.Task):
         return x - x
 
     def gathered(task, node, total):
-        # a scalar has no hoop component in axisymmetry
+        # the gradient of a scalar has no hoop component in axisymmetry
         return total + node.w.nodes.velocity[node.i, 0] * node.grad_N.planar()
 
     def updated(task, pt, total, totals, fastest):

@@ -25,10 +25,10 @@ class Force(StepField):
 
 
 class Lever(Field):
-    """Contact at the surface of a point: sqrt(f r) n (d,), and the distance r to it along n.
+    """Contact at the surface of a point: sqrt(f r) n (d,), 0 without contact, and the distance r.
 
-    The force f n at x - r n acts like a force at x and the stress f r n n / V. The value 0 means no
-    contact. Then follow stiffness over mass, depth, the damping part of f, the depth that is due to
+    The force f n at x - r n is equivalent to a force at x and the stress f r n n / V. Further
+    components are stiffness over mass, depth, the damping part of f, the depth due to
     `follow_strain`, and the last increment of strain along n.
     """
 
@@ -36,7 +36,7 @@ class Lever(Field):
 
 
 class ContactLoss(Field):
-    """Energy that contact damping and friction took from a point."""
+    """Energy of a point dissipated by contact damping and friction."""
 
 
 class WorkOfForces(Field):
@@ -65,7 +65,7 @@ def _levers(pt):
 def stretch_levers(pt, growth, mean):
     """Stretch levers by a spatial increment dt grad v, and add their work.
 
-    `mean`: forces act between two increments; else within this one.
+    `mean`: forces act between two increments; otherwise within this one.
     """
     for lever in _levers(pt):
         arm = load_vector(pt.kin, lever, pt.p)
@@ -78,10 +78,10 @@ def stretch_levers(pt, growth, mean):
 
 
 def follow_strain(pt, v, dt):
-    """Let contact and the work of forces follow the re-mapped velocity v (d,), which strains.
+    """Let contact depth and the work of forces follow the re-mapped velocity v (d,).
 
-    Points moved by v*, which differs by a part of dt f / m; a spring following that would generate
-    energy.
+    Points have moved with v*, but are strained by v, which differs by a part of dt f / m. A contact
+    spring that followed v* would generate energy.
     """
     further = dt * v - (pt.y - pt.x)
     increase(pt.of(WorkOfForces), pt.p, (0.5 * pt.w.kick / dt * dot(pt.load(Force, v), further),))
@@ -103,7 +103,7 @@ def force_on_point(pt):
     force, around = pt.load(Force, pt.v), force_around(pt.kin, pt)
     if not len(force):
         return around
-    # A force on rigid points would act on others at their nodes.
+    # A force on rigid points would act on other points at their nodes.
     force = of_present(pt.p, real(0 if laws.is_rigid(pt.w.laws) else 1, force[0])) * force
     return force + around if len(around) else force
 
@@ -120,10 +120,7 @@ def force_at(pt, node):
 
 
 def affine_force(pt, w):
-    """Return the force at the point and its slope.
-
-    This is where gradients are moments of weights (MLS); otherwise it returns ().
-    """
+    """Return force and slope at the point if gradients are moments of weights (MLS), else ()."""
     inverse_d = inverse_spread(w.basis, w.grid)
     if not (len(inverse_d) and forces_by_arms(w.transfer, w.kin)):
         return ()

@@ -1,17 +1,18 @@
 """Kinetic energy lost in a transfer, returned as heat to laws with internal energy.
 
-A point p of mass m gives node i, with weight N_ip m, the velocity a_ip: v_p plus its moment's part.
-Nodes take the mean v_i and lose sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is returned by the same
-weights. Back at the points, m sum_i N_ip |v_i - v_p|^2 / 2 minus the moment's energy is lost. FLIP,
-v -> alpha v + (1 - alpha) P v with P to the nodes and back, loses 1 - alpha^2 of the first and (1 -
-alpha)^2 of the second; AFLIP and related transfers with their moments.
+A point p of mass m contributes to node i, with weight N_ip m, the velocity a_ip: v_p plus the part
+of its moment. Nodes have the mean v_i. This loses sum_p N_ip m |a_ip - v_i|^2 / 2 >= 0, which is
+returned to points by the same weights. Back at the points, m sum_i N_ip |v_i - v_p|^2 / 2 minus the
+moment's energy is lost. FLIP, v -> alpha v + (1 - alpha) P v, where P maps to the nodes and back,
+loses the fraction 1 - alpha^2 of the first part and (1 - alpha)^2 of the second; likewise AFLIP and
+related transfers, with their moments.
 
 XPIC removes Q^m v, Q = 1 - P, and loses <v, Q^m v> - |Q^m v|^2 / 2. With r_k = Q^k v and the terms
 of its series w_k = S+ r_k, this is half of |r_q|^2 + sum_(k >= q) |S w_k|^2 + 2 sum_(k >= [m/2])
 sum_i N_ip |w_ki - S w_k|^2, q = [(m+1)/2]: each term is local and >= 0.
 
-The change dv by forces is excluded: in musl, which strains by the re-mapped velocity, the part of
-dv that points do not take does not strain them, and a hot isolated point would heat itself.
+The change dv by forces is not included. In musl, which strains by the re-mapped velocity, the part
+of dv that points do not take does not strain them, and a hot isolated point would heat itself.
 """
 
 from collections import namedtuple
@@ -27,13 +28,13 @@ from karamelo_py.points import laws, transfers
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 OnePoint = namedtuple("OnePoint", "mass v moment")  # for `transfers.nodal_momentum`
-# Mass fraction at its nodes (per dimension) above which a point loses its moment. One point per
-# cell, on nodes, has 0.594 with quadratic splines, less with other bases.
+# Fraction of the mass at its nodes (per dimension) above which a point loses its moment. With one
+# point per cell, at nodes, it is 0.594 with quadratic splines, and less with other bases.
 ALONE = 0.6
 
 
 class EnergyLoss(SummedField):
-    """Kinetic energy brought to a node (fused: for the next step), loss per mass, mass."""
+    """Kinetic energy mapped to a node (fused: for the next step), loss per mass, and mass."""
 
     shape = triple
 
@@ -58,7 +59,7 @@ class KeepLoss(NamedTuple):
             for k in range(kin.dimension):
                 v = nodes.sums[n, of_momentum(kin) + k] * factor
                 kinetic += real(0.5, mass) * v * v
-            # in rigid motion the difference is round-off of either sign
+            # In rigid motion, the difference is round-off of either sign.
             noise = real(8, mass) * round_off(mass) * kinetic
             lost[n, 1] = max(lost[n, 0] * factor - kinetic - noise, mass - mass)
             lost[n, 2] = mass
@@ -112,9 +113,9 @@ def warm(pt, v):
 
 
 def in_company(pt, moment):
-    """Return the retained part of a gas point's `moment`: none if it is isolated.
+    """Return the part of the `moment` that a point of gas retains: none if the point is isolated.
 
-    Nodes seen by no other point return its moment, and its pressure would expand it without bound.
+    Nodes of no other point would return its moment, and its pressure would expand it without bound.
     The energy of the rest becomes heat.
     """
     lost = field(pt.w.nodes.fields, EnergyLoss)
@@ -135,7 +136,7 @@ def _heat(pt, gone):
 
 
 def reflect(pt, term, k):
-    """Subtract `term`, the k-th of XPIC's series, from the remainder; sum the energy lost."""
+    """Subtract the k-th `term` of XPIC's series from the remainder, and sum the energy lost."""
     reflected = pt.of(Reflected)
     if reflected is not None:
         v = pt.v

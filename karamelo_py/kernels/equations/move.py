@@ -26,7 +26,7 @@ class VelocityBefore(Field):
 
 
 class Move(Task):
-    """Gathers v* and its change, updates velocity, position and corners, and reports the move."""
+    """Gathers v* and its change; updates velocity, position and corners; reports the move."""
 
     not_at_corners = ("moments",)
     records = "update"
@@ -54,7 +54,7 @@ class Move(Task):
         y = x + step
         force = pt.load(Force, old)
         if len(force) and not laws.is_rigid(w.laws):
-            # mean nodal velocity of the step, including stress and constraints
+            # Work uses the mean nodal velocity in the step, including stress and constraints.
             work = w.kick * dot(force, v_pic - 0.5 * dv)
             increase(pt.of(WorkOfForces), pt.p, (work,))
         warm_by_friction(pt)
@@ -91,7 +91,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the location `new` with moved corners, by gathered velocities if known."""
+    """Return the location `new` with moved corners, by velocities of corners if these are known."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

@@ -10,7 +10,7 @@ from karamelo_py.kernels.arrays import Index, Nodes, Number, Tag
 
 @point_function()
 def at_node(task: Tag, kin: Tag, nodes: Nodes, n: Index, dt: Number) -> None:
-    """Do `task` at node `n`; nodes without mass stay at rest."""
+    """Carry out `task` at node `n`; nodes without mass remain at rest."""
 
 
 def node_task(tag: Any) -> Any:
@@ -27,7 +27,7 @@ def per_mass(nodes: Nodes, n: Index, template: Number) -> Number:
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of its velocity change that a node shows, < 1 if it is light."""
+    """Return the fraction of a node's velocity change that enters gradients, < 1 if light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass
@@ -36,11 +36,11 @@ def unlimited(seen, n, mass, light):
 
 
 class WorkAtNodes(Field):
-    """Work at a node since the last check of the energy: on pore water, and of torques."""
+    """Work at a node since the last energy check: on pore water, and of torques."""
 
 
 class SquaredMass(SummedField):
-    """Nodal sum of N m^2; over the sum of N m, the points' mean mass (USL)."""
+    """Nodal sum of N m^2; divided by the sum of N m, it is the mean mass of points (USL)."""
 
     @staticmethod
     def needed(basis):
@@ -88,11 +88,12 @@ class SumsToVelocity(NamedTuple):
 
 @node_task
 class UpdateToVelocity(NamedTuple):
-    """Limits the deforming velocity v* at light nodes (USL).
+    """Limits the velocity v* that strains points, at light nodes (USL).
 
-    A point of mass m gets back the strain of f dt / (N m) from a node to which it gives the
-    fraction N. This oscillates and grows if (c dt / h)^2 > N, in d directions at once. The limit
-    acts below `light` = d (c dt / h)^2 times the points' mean mass, and vanishes with the step.
+    A point of mass m that gives the fraction N to a node gets a strain from the velocity change f
+    dt / (N m) of this node. The strain oscillates and grows if (c dt / h)^2 > N, in d directions at
+    once. The limit applies to nodal masses below `light` = d (c dt / h)^2 times the mean mass of
+    the points, and vanishes with the step.
     """
 
     light: float
@@ -100,7 +101,7 @@ class UpdateToVelocity(NamedTuple):
     goes_through = ("sums", "update", "velocity")
 
     def at_node(task, kin, nodes, n, dt):
-        # Points take the whole change, which conserves momentum; only the gradient is limited.
+        # Points take the whole change, so momentum is conserved; only the gradient is limited.
         one = real(1, dt)
         share = unlimited(
             field(nodes.fields, SquaredMass), n, nodes.sums[n, arrays.MASS], task.light

@@ -1,7 +1,7 @@
 """Periodic directions: nodes a period apart are images of one node.
 
-The grid has `GHOSTS` extra cells at both ends of a periodic direction. Images get the same total,
-summed in one order, hence the same bits. Points return to the cell every `EVERY` steps
+The grid has `GHOSTS` extra cells at both ends of a periodic direction. All images get the total of
+the same sum, with the same bits. Points return to the domain every `EVERY` steps
 (`karamelo_py.run.periodic`).
 """
 
@@ -24,15 +24,15 @@ class InUse(StepField):
 
 
 class Axis(NamedTuple):
-    first: int  # node number
-    stride: int  # of node numbers
+    first: int  # number of the first node
+    stride: int  # difference of node numbers
     count: int  # nodes along the axis
     period: int  # in cells
 
 
 class Seam(NamedTuple):
     axes: tuple  # of `Axis`
-    joined: tuple  # axes with images at nodes
+    joined: tuple  # axes along which images coincide with nodes
     shear: tuple = ()  # or `sheared.Shear`
 
 
@@ -43,7 +43,7 @@ def position_on(axis, n):
 
 @counts.on(Seam)
 def _counts_seam(ranks, n):
-    """Return True for one of the images of a node."""
+    """Return True for exactly one of the images of a node."""
     counted = n >= 0
     for axis in ranks.axes:
         position = position_on(axis, int(n)) - GHOSTS

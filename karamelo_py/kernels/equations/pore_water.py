@@ -1,20 +1,21 @@
 """Water in the pores: nodal sums, drag between soil and water, and the flux back to points.
 
-One layer of points moves with the soil; nodes have a second velocity (Jassim, Stolle & Vermeer
-2013; Bandara & Soga 2015). A node has the mass of water m = sum N m_w, its momentum, the volume V
-and the pore volume, the pressure force P = sum p V g and the outward area B = sum V g. The water
-takes the fraction n = pores / V of P - B p_b, the soil the rest. p_b is the prescribed pressure at
-open nodes and the mean pressure elsewhere; no flux crosses B at nodes that are not open.
+Points are soil with water and move with the soil; nodes have a second velocity (Jassim, Stolle &
+Vermeer 2013; Bandara & Soga 2015). A node has the mass of water m = sum N m_w, its momentum, the
+volume V and the pore volume, the pressure force P = sum p V g and the outward area B = sum V g. The
+fraction n = pores / V of P - B p_b acts on the water, the rest on the soil, where p_b is the
+prescribed pressure at open nodes and the mean pressure at others. There is no flux through B at
+nodes that are not open.
 
-The flux is j = m / V (v_w - v_s) at nodes. Rate and force use the same gradients: at the cell
-centre with a linear basis (one pressure rate per cell), else at the points. With splines, pressure
-in the null space of the grid would grow, so p loses the fraction R = 1/20 of (1 - S)^2 p per step,
-S being the mean through the nodes and back; the pore volume follows, not the water.
+The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
+linear basis at the cell centre (one pressure rate per cell), otherwise at the points. With splines,
+pressure in the null space of the grid would grow. Therefore R (1 - S)^2 p is subtracted from p in
+each step, where R = 1/20 and S maps p to the nodes and back; this changes pore volumes only.
 
-Drag D is integrated over the step as for constant acceleration: with b = dt D / m and f = (1 -
-exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then behaves
-like a mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixes see this, so a fix that
-holds the node gets the reaction of soil and water.
+Drag D is integrated exactly for constant acceleration in the step: with b = dt D / m and f = (1 -
+exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then moves
+like a mass m_s + m (1 - f) under the force f_s + (1 - f) f_w + D f w. Fixes get these values, so a
+fix that holds the node has the reaction of soil and water.
 """
 
 from math import exp, inf, nan, sqrt
@@ -84,7 +85,7 @@ class WaterSums(SummedField):
 
 
 class PoreSums(SummedField):
-    """Nodal sums: volume, volume of pores, volume times pressure, its unseen part, drag."""
+    """Nodal sums: volume, pore volume, volume times pressure and times unseen pressure, drag."""
 
     shape = numbers(5)
 
@@ -110,8 +111,9 @@ class WaterUpdate(StepField):
 class Flux(Field):
     """Mass flux per area (d,); two outflows; two pressures.
 
-    The outflow through a closed node, per volume, stays in the points; the outflow through an open
-    node is a mass per time. The pressures are the node's mean, and the mean of the unseen part.
+    The first outflow, per volume, is for closed nodes, where points retain the water; the second, a
+    mass per time, leaves through open nodes. The pressures are the mean at the node, and the mean
+    of the unseen part.
     """
 
     shape = numbers(4, 1)
@@ -165,7 +167,7 @@ def pore_grad(node):
 
 @eq.reads("mass", "state", "material")
 def water(pt):
-    """Return the mass of a point's water, (m,), or () if dry."""
+    """Return the mass (m,) of water of a point, or () if it is dry."""
     if not _is_wet(pt):
         return ()
     law, state = pt.law_and_state
@@ -316,7 +318,8 @@ def _is_closed(nodes, kin, n, rim):
 def _by_pressure(nodes, kin, n, rim):
     """Return the force of the pressure on the water (d,), and the boundary pressure.
 
-    That is the prescribed one at an open node, the mean one elsewhere at the rim, else 0.
+    The latter is the prescribed pressure at an open node, the mean pressure at other nodes of the
+    rim, and otherwise 0.
     """
     sums, force = field(nodes.fields, PoreSums), field(nodes.fields, PoreForce)
     p, d = real(0, sums[n, 0]), kin.dimension
@@ -353,7 +356,7 @@ def _is_wet_node(nodes, n):
 
 @node_task
 class ShareForces(NamedTuple):
-    """Sets the force on the water, and the node as fixes see it, with dragged water."""
+    """Sets the force on the water, and for fixes mass and force of a node with dragged water."""
 
     rim: float  # |B| / V of closed nodes
     surface: float  # |B| / V of nodes at the surface
@@ -371,7 +374,7 @@ class ShareForces(NamedTuple):
         along = real(0, m)
         pushed, _ = _by_pressure(nodes, kin, n, task.rim)
         if _is_closed(nodes, kin, n, task.surface):
-            # A wall carries the weight of its water, which the mean pressure omits.
+            # A wall supports the weight of water next to it, which is not in the mean pressure.
             squared = real(0, m)
             for k in range(d):
                 along += water[n, arrays.of_force(kin) + k] * force[n, d + k]
@@ -452,8 +455,8 @@ class MakeFlux(NamedTuple):
         stays = across + supply if closed else supply
         flux[n, d] = real(0, dt) if drained else stays / V
         flux[n, d + 1] = across + supply if drained else real(0, dt)
-        # With the mean relative velocity over the step, the remaining work is the weight's less the
-        # drag's; water that enters or leaves adds the work of its pressure.
+        # With the mean relative velocity in the step, the remaining work is the work of weight
+        # minus the work of drag, and the work of pressure on water that enters or leaves.
         water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
         pushed, p = _by_pressure(nodes, kin, n, task.rim)
         work = dt * (supply - flux[n, d + 1]) * p * field(nodes.fields, PoreSums)[n, 1] / m
@@ -495,7 +498,7 @@ class MoveWater(eq.Task):
         at_nodes, change = total
         law, state = pt.law_and_state
         new = updated_velocity(pt.w.transfer, pt.load(RelativeVelocity, pt.v), at_nodes, change)
-        # Drag on velocities in the grid's null space, at constant momentum of the point.
+        # Drag on velocities in the null space of the grid, with constant momentum of the point.
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
@@ -503,7 +506,7 @@ class MoveWater(eq.Task):
         unseen = (b / (1 + b)) * (new - at_nodes)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
         store(pt.w.points.v, pt.p, pt.v + (m / (1 + m)) * unseen)
-        # Work of this impulse: the nodes take the velocity after it as the end of their step.
+        # Work of this impulse: for nodes, the step ends with the velocity after it.
         way = dot(unseen, change) - new.squared() + (new - unseen).squared()
         increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * (m / (1 + m)) * way,))
         return eq.Report(real(0, pt.dt), fastest)
@@ -552,7 +555,7 @@ class Seep(eq.Task):
         new = old._replace(content=content, pores=pores)
         store(pt.w.points.state, pt.p, new)
         v = pt.v
-        ratio = old.content / content  # the water retains its momentum
+        ratio = old.content / content  # momentum of the water is conserved
         w = pt.load(RelativeVelocity, v)
         store(pt.of(RelativeVelocity), pt.p, ratio * (v + w) - v)
         good = (content > 0) & (pores > 0)

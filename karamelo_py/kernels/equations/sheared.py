@@ -1,8 +1,9 @@
 """Sheared periodic cells (Lees & Edwards 1972): images across y move along x.
 
-The image of a point a length L above it is `shift` further along x and `speed` faster. Images of a
-node lie between nodes: it gets fractions of their sums, and they get the same fractions of its
-velocity. The two maps are transposes, which conserves momentum to round-off.
+The image of a point, one period above it, is `shift` further along x and `speed` faster. Images of
+a node lie between nodes: the node gets fractions of the sums at these nodes, and these nodes get
+the same fractions of its velocity. The two maps are transposes of each other, so momentum is
+conserved to round-off.
 """
 
 from math import floor
@@ -19,14 +20,14 @@ from karamelo_py.kernels.equations.periodic import GHOSTS, Axis, InUse, position
 class Shear(NamedTuple):
     along: Axis  # x
     across: Axis  # y
-    speed: float  # of the upper images
+    speed: float  # velocity of the upper images
     h: float
 
 
 class ShearedImages(NamedTuple):
     along: Axis
     across: Axis
-    shift: float  # of the upper images, in cells
+    shift: float  # shift of the upper images, in cells
     speed: float
 
 

@@ -32,9 +32,9 @@ class Strain(Task):
         return add_gradient(node, gradient), fbar.gathered_ratio(node, ratio), mapped
 
     def updated(task, pt, total, totals, fastest):
-        """Report the domain's growth in cells, and the rate."""
+        """Update the state; report the growth of the domain in cells, and the rate."""
         w, (gradient, ratio, mapped) = pt.w, total
-        if not len(gradient):  # `Move` gathered it
+        if not len(gradient):  # `Move` has gathered it
             gradient = totals[0][2]
         dl = increment_at(w.kin, pt, gradient)
         if task.of_last_step:
@@ -43,7 +43,7 @@ class Strain(Task):
         law, old, f = pt.law_state_F
         growth = frames.spatial_increment(w.frame, w.kin, dl, f)
         load_step = task.of_load_step and laws.by_rates(law)
-        strained = large(growth) if load_step else growth  # domains grow by the whole gradient
+        strained = large(growth) if load_step else growth  # domains grow by the complete gradient
         extra = sum(pt.load(fbar.PressureBeside, (pt.dt,)))
         state = laws.advance_fbar(law, w.kin, old, laws.FbarStep(strained, pt.dt, extra))
         store(w.points.state, pt.p, state)
@@ -62,7 +62,7 @@ class Strain(Task):
 
 
 class StrainOfLastStep(Strain):
-    """`Strain` by the last step's velocity at the new positions."""
+    """`Strain` by the velocity of the last step, at the new positions."""
 
     of_last_step = True
 
@@ -115,7 +115,7 @@ class TrialStrainOfLastStep(TrialStrain):
 
 
 def _maps_again(task, w):
-    """True if forces act on points that moved, whose velocity was mapped to the nodes again."""
+    """Return True if forces act on moved points whose velocity has been mapped to nodes again."""
     before = task.of_last_step or task.of_load_step or task.in_move
     return not before and field(w.points.fields, Force) is not None and not laws.is_rigid(w.laws)
 
@@ -157,7 +157,7 @@ def further_reach(basis, kin, grid, before, after):
 
 
 def _fastest_wave(pt, material, fastest):
-    """Return max(fastest, c + max |v_i - common_i|); c is only computed if its bound is larger."""
+    """Return max(fastest, c + max |v_i - common_i|); c is computed only if its bound is larger."""
     w, (law, state, now) = pt.w, material
     shorter = frames.inverse_stretch_squared(w.frame, w.kin, now, pt.dt)
     most = laws.wave_speed_bound(law, w.kin, state) * shorter

@@ -1,9 +1,10 @@
 """Rotation of axisymmetric bodies around their axis.
 
-Points store the velocity around the axis, nodes an angular velocity w with inertia sum N m r^2,
-angular momentum sum N m r v and torque -sum V r (s_31 dN/dr + s_32 dN/dz). Mapping r^2 w conserves
-angular momentum with any transfer, torques sum to 0, and a moving point retains r v (Coriolis).
-Rigid rotation is exact, and w is regular at the axis. Points push outwards with m v^2 / r.
+Points store the velocity v around the axis. Nodes have an angular velocity w, with inertia sum N m
+r^2, angular momentum sum N m r v and torque -sum V r (s_31 dN/dr + s_32 dN/dz). Angular momentum is
+conserved with any transfer, since r^2 w is mapped; torques sum to 0; and a point that moves retains
+r v (Coriolis). Rigid rotation is exact, and w is regular at the axis. The centrifugal force of a
+point is m v^2 / r.
 """
 
 from typing import NamedTuple
@@ -97,7 +98,7 @@ TORQUE = eq.NodeColumns(SumsAround, lambda kin: 2, lambda kin: 1, lambda kin: 3)
 def rotation(pt, r):
     """Return inertia, angular velocity and its moment (or ()) of a point at radius r.
 
-    Velocity and moment are in both components of a plane, as transfers map vectors.
+    Velocity and moment are in both components of a plane vector, as transfers map vectors.
     """
     omega = pt.of(VelocityAround)[0, pt.p] / r
     moment = pt.load(MomentAround, (r, r))
