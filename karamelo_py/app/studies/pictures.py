@@ -243,7 +243,10 @@ def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     return time < after
 
 
-def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | None = None) -> None:
+def draw_histories(
+    curves: Sequence[History], sheet: Sheet, exact: History | None = None,
+    measured: History | None = None, marker: str = "",
+) -> None:  # fmt: skip
     figure = blank_figure(7.2, 4.0)
     axes = figure.subplots()
     ys = np.concatenate([each.y for each in curves])
@@ -263,8 +266,8 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
     for k, each in enumerate(curves):
         colour = look.PALETTE[places[k] % len(look.PALETTE)]
         axes.plot(
-            each.x, each.y, color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
-            linewidth=1.6, zorder=3,
+            each.x, each.y, marker=marker, color=colour,
+            linestyle=look.DASHES[k % len(look.DASHES)], linewidth=1.6, zorder=3,
         )  # fmt: skip
         name = each.label
         if each.stopped:
@@ -272,6 +275,10 @@ def draw_histories(curves: Sequence[History], sheet: Sheet, exact: History | Non
             name += " (stopped)"
         last = max(np.flatnonzero(each.y >= low), default=-1)
         ends.append((each.x[last], max(each.y[last], low), name, colour))
+    if measured is not None:
+        axes.plot(measured.x, measured.y, "k+", markersize=9, zorder=4)
+        last = int(np.argmax(measured.x))
+        ends.append((measured.x[last], measured.y[last], measured.label, "k"))
     sheet.finish(figure, axes, ends)
 
 

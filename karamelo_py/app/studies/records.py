@@ -2,7 +2,6 @@
 
 import csv
 import io
-import itertools
 import os
 import re
 from collections.abc import Container, Mapping, Sequence
@@ -86,9 +85,9 @@ class Recorded:
         if not name.isidentifier() or not formula:
             raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
         self.word = name
-        size = _SIZE.fullmatch(formula)
-        if size and _is_closed(size[1]):
-            self.signed = Recorded(f"{name}{SIGNED}={size[1]}")
+        if size := _SIZE.fullmatch(formula):
+            with suppress(ScriptError):  # as in abs(a) + abs(b)
+                self.signed = Recorded(f"{name}{SIGNED}={size[1]}")
 
         def named(match: re.Match) -> str:
             self.parts[f"part{len(self.parts)}"] = Reduction(*match.groups(), word)
@@ -131,11 +130,6 @@ def recorded(
             hint = f"log_modify(custom, step, dt, time, {column}) in the script"
             raise unknown(message, column, headings, hint)
     return items
-
-
-def _is_closed(text: str) -> bool:
-    depths = itertools.accumulate((sign == "(") - (sign == ")") for sign in text)
-    return min(depths, default=0) >= 0
 
 
 def _apart(text: str) -> list[str]:

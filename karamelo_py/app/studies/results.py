@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from karamelo_py.app.studies import look
 from karamelo_py.app.studies.curves import Table, column, label, require
-from karamelo_py.app.studies.pictures import SUFFIXES, History, Sheet
+from karamelo_py.app.studies.pictures import SUFFIXES, History, Sheet, draw_histories
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import NamesOfCase, along, names, out_file
-from karamelo_py.output.plots import blank_figure
 from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.evaluation import evaluate
@@ -37,7 +35,13 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
         first = table.label(results[0]) if len(results) == 1 else ""
         title = table.title if options.title is None else options.title
         sheet = Sheet(out, *along(options, table.label(options.x), first), title)
-        _picture(lines, law, measured, sheet)
+        some = [line for line in lines if len(line.x)]
+        exact = None
+        if law is not None:
+            x = np.concatenate([line.x for line in (*some, *filter(None, [measured]))])
+            x = np.linspace(x.min(), x.max(), LAW)
+            exact = History(x, law(x), law.text)
+        draw_histories(some, sheet, exact, measured, marker="o")
     _tell(lines, law, options)
     if out is not None:
         print(f"drawn: {out}")
@@ -69,13 +73,11 @@ class Law:
         self.raw, self.node = parse_text(text, "-law")
 
     def __call__(self, xs: Sequence[float] | np.ndarray) -> np.ndarray:
-        return np.array([self._value(float(x)) for x in xs])
-
-    def _value(self, x: float) -> float:
-        value = evaluate(self.node, self.raw, NamesOfCase("-law", {self.x: x}))
-        if not isinstance(value, float):
+        cases = [NamesOfCase("-law", {self.x: float(x)}) for x in xs]
+        values = [evaluate(self.node, self.raw, case) for case in cases]
+        if not all(isinstance(value, float) for value in values):
             raise ScriptError(f"-law {self.text} is no number", expected=f"a formula of {self.x}")
-        return value
+        return np.array(values)
 
 
 def measured_in(path: Path, x: str, result: str) -> History:
@@ -86,30 +88,6 @@ def measured_in(path: Path, x: str, result: str) -> History:
     named = x in columns and result in columns
     across, up = (columns[x], columns[result]) if named else (columns[first], columns[second])
     return History(across, up, path.name)
-
-
-def _picture(
-    lines: Sequence[History], law: Law | None, measured: History | None, sheet: Sheet
-) -> None:
-    figure = blank_figure(7.2, 4.0)
-    axes, ends = figure.subplots(), []
-    if law is not None:
-        abscissas = [line.x for line in (*lines, *([measured] if measured else ())) if len(line.x)]
-        across = np.linspace(min(x.min() for x in abscissas), max(x.max() for x in abscissas), LAW)
-        axes.plot(across, law(across), color="0.6", linewidth=4, zorder=1)
-        ends.append((across[-1], law(across[-1:])[0], law.text, "0.4"))
-    for k, line in enumerate(line for line in lines if len(line.x)):
-        colour = look.PALETTE[(k + 1) % len(look.PALETTE)]
-        axes.plot(
-            line.x, line.y, "o", color=colour, linestyle=look.DASHES[k % len(look.DASHES)],
-            linewidth=1.2, zorder=3,
-        )  # fmt: skip
-        ends.append((line.x[-1], line.y[-1], line.label, colour))
-    if measured is not None:
-        axes.plot(measured.x, measured.y, "k+", markersize=9, zorder=4)
-        last = int(np.argmax(measured.x))
-        ends.append((measured.x[last], measured.y[last], measured.label, "k"))
-    sheet.finish(figure, axes, ends)
 
 
 def _tell(lines: Sequence[History], law: Law | None, options: Namespace) -> None:
