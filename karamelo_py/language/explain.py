@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 from karamelo_py.language import registry
 from karamelo_py.language.arguments import NUMBER, Argument, with_gap
@@ -77,7 +78,10 @@ def unknown_keyword(
     by_name = [p.name for p in expected if not p.variadic]
     longer = next((f"did you mean '{name}'?" for name in by_name if name.startswith(word)), None)
     turned = next((f"did you mean '{n}'?" for n in by_name if n == word[:1] + word[:0:-1]), None)
-    hint = turned or meant(word, by_name) or longer or table()["otherwise"].get(owner)
+    same = table()["synonyms"].get(word, "").split()
+    same_hint = next((f"write {name}=..." for name in same if name in by_name), None)
+    hint = same_hint or turned or meant(word, by_name) or longer
+    hint = hint or table()["otherwise"].get(owner)
     choices = ", ".join(f"{n}=..." for n in by_name)
     if not hint and any(p.variadic for p in expected):
         choices, hint = form, f"arguments of {owner} are given by position"
@@ -123,6 +127,18 @@ def swapped(
     return None
 
 
+def comma_in_number(arguments: Sequence[Argument]) -> str | None:
+    """Suggest 0.5 for 0,5, and 12500 for 12,500, in a line with blanks after other commas."""
+    for one, two in pairwise(arguments):
+        adjacent = one.mark.column + one.mark.length + 1 == two.mark.column
+        digits = one.text.lstrip("+-").isdigit() and two.text[:1].isdigit()
+        if adjacent and digits and ", " in one.mark.text:
+            if re.fullmatch(r"\d{3}", two.text) and int(one.text):
+                return "commas separate arguments: a million is 1e6 or 1000000"
+            return f"with a decimal point: {one.text}.{two.text}"
+    return None
+
+
 def misfit(
     parameter: Parameter, argument: Argument, number: int | None, unfit: Unfit
 ) -> ScriptError:
@@ -130,8 +146,8 @@ def misfit(
     family, text, hint = parameter.kind.family, parameter.kind.text, unfit.hint
     if family and NUMBER.fullmatch(argument.text):
         text, hint = f"one of {', '.join(registry.names(family))}", None
-    if re.fullmatch(r"0\d\d", argument.text):  # probably the 000 of 1,000
-        hint = "commas separate arguments: a million is 1e6 or 1000000"
+    if "time(T)" in text and NUMBER.fullmatch(argument.text):
+        hint = f"time({argument.text}) is a time"
     message, mark = f"{which} must be {text}, not {unfit.got}", unfit.mark or argument.mark
     return ScriptError(message, mark=mark, expected=text, hint=hint, code="argument")
 

@@ -297,6 +297,9 @@ class Interpreter:
             return node.value
         return evaluation.evaluate(node, raw, self)
 
+    def usage(self, family: str, style: str) -> str:
+        return signature.syntax(registry.find(family, style), f"{family} {style}")
+
     def knows(self, name: str) -> bool:
         return (
             name in self.variables or name in SEEDS or name in CONSTANTS or name in self.hub.values

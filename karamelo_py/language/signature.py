@@ -41,7 +41,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import check_name, renamed
-from karamelo_py.script.errors import FAILURES, ScriptError, meant
+from karamelo_py.script.errors import FAILURES, ScriptError, meant, table
 
 __all__ = [
     "Argument", "AtLeast", "ByName", "Constraint", "In", "InputFile", "Keyword", "NonNegative",
@@ -127,6 +127,7 @@ def call(
                     value = convert(hub, parameter, argument, number)
                 except ScriptError as error:
                     error.hint = explain.swapped(hub, expected, bound, parameter) or error.hint
+                    error.hint = error.hint or table()["misfits"].get(name)
                     raise
                 if in_order:
                     values.append(value)
@@ -147,6 +148,8 @@ def call(
             message = "there is not enough memory for this"
             raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
+        if not error.complete:
+            error.hint = explain.comma_in_number(arguments) or error.hint
         for wrong in () if error.complete else (error, *error.others):
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
                 wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"
@@ -209,7 +212,10 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
     except ScriptError as error:
         if not arguments or not registry.knows(family, style):
             words = [argument.text for argument in arguments]
-            error.hint = renamed(family, style, ID, words) or error.hint
+            right = next((word for word in words if registry.knows(family, word)), None)
+            first = ", ".join(filter(None, (ID, right, style)))
+            swapped = f"{family}({first}, ...)" if right else None
+            error.hint = renamed(family, style, ID, words) or swapped or error.hint
         raise
 
 

@@ -40,14 +40,15 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
 def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptError:
     commands = registry.names("command")
     kind = "command" if statement else "function"
-    other = in_own_words(script, name) or instead("command", name) if statement else None
+    other = in_own_words(script, name) or instead("command", name) or as_style(script, name)
+    other = other if statement else None
     if script.knows(name) and not other:
         message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"
         hint, code = f"{name}*(...)", "unknown-command"
         return ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
     shown = commands if statement else sorted(FUNCTIONS)
-    callables = commands if statement else [*FUNCTIONS, *commands]
+    callables = commands if statement else [*FUNCTIONS, "value"]
     return ScriptError(
         f"unknown {kind} '{name}'",
         code="unknown-command",
@@ -57,6 +58,18 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
         hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, callables),
     )
+
+
+def as_style(script: Any, name: str) -> str | None:
+    """Write the line of a style that is used as a command."""
+    for family in ("compute", *registry.families()):
+        line = instead(family, name) or ""
+        if line.startswith(f"{family}("):
+            return line
+        for style in (name, name.replace("_", "-")) if family != "command" else ():
+            if registry.knows(family, style):
+                return script.usage(family, style)
+    return None
 
 
 def no_value(name: str, mark: Any) -> ScriptError:

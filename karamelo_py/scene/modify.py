@@ -253,8 +253,6 @@ def per_direction(
         if not _is_nothing(extra):
             last = ": gravity is a component of it" * (name == "b")
             hint = f"the last direction here is {axes[-1]}{last}"
-            if len(formulas) == d + 1 and extra.text.isdigit() and formulas[d - 1] is not None:
-                hint = f"with a decimal point: {formulas[d - 1].text}.{extra.text}; else {hint}"
             if twists:
                 hint = AROUND
             elif around and domain.kin.hoops == 1 and d == 2:

@@ -192,7 +192,8 @@ def _at_end(at: _Stop) -> Mistake:
     span = before.start_pos, before.end_pos
     if before.type in _OPERATORS:
         message = f"the expression ends after '{before}'"
-        return Mistake(message, *span, expected=f"{_VALUE} after '{before}'")
+        hint = "per cent as a fraction: 30 % is 0.3" if before == "%" else None
+        return Mistake(message, *span, f"{_VALUE} after '{before}'", hint)
     if at.opened:
         return open_parenthesis(at.code, at.opened[0])
     return Mistake("the expression ends too early", *span, expected=_VALUE)
@@ -259,6 +260,8 @@ def _side_by_side(at: _Stop) -> Mistake:
             return Mistake(message, start, end, "an exponent as in 1e-5", hint)
         message = f"an operator is missing between '{before}' and '{here}'"
         hint = f"{before}*{here}; a name cannot start with a digit"
+        if re.fullmatch(r"[xX]10", here):
+            hint = f"a power of 10 is written {before}e6"
         return Mistake(message, start, end, "an operator, such as *", hint)
     if len(at.before) == 1 and before.type == "NAME":
         words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]

@@ -27,7 +27,7 @@ from karamelo_py.points.kinematics import (
 )  # fmt: skip
 from karamelo_py.points.laws import Absent, LawTraits, law_parts, law_traits
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
-from karamelo_py.script.errors import Mark, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError, plural
 
 ENOUGH = 1e3  # strain increments over round-off whose stiffness is known
 LEAST = 0.01  # least stiffness, over that at rest, of a strain that counts
@@ -194,7 +194,7 @@ class Viscoelastic(NamedTuple):
             message = f"material '{material.id}' has no temperature that could shift times"
             raise ScriptError(message, argument="wlf", expected="an elastic law with cp and kappa")
         if len(g) != len(tau):
-            message = f"there are {len(g)} fractions g and {len(tau)} times tau"
+            message = f"there are {plural(len(g), 'fraction')} g and {plural(len(tau), 'time')} tau"
             raise ScriptError(message, argument="tau", expected="a time for each fraction")
         if not sum(g) < 1:
             message = f"the fractions g sum to {sum(g):g}: no stiffness would remain"
