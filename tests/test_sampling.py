@@ -248,10 +248,10 @@ def test_sensitivity_of_a_linear_function(folder, capsys):
     ("words", "says"),
     [
         (["-sample", "8", "-var", "a=nromal(1, 2)"], "did you mean 'normal'"),
-        (["-sample", "8", "-var", "a=normal(1, 0)"], "a deviation of 0"),
-        (["-sample", "8", "-var", "a=uniform(2, 1)"], "from 2 to 1"),
+        (["-sample", "8", "-var", "a=normal(1, 0)"], "normal(mean, deviation) with numbers, deviation > 0"),
+        (["-sample", "8", "-var", "a=uniform(2, 1)"], "with numbers, low < high"),
         (["-sample", "8", "-var", "a=normal(1)"], "normal(mean, deviation) with numbers"),
-        (["-sample", "8", "-var", "a=lognormal(0, 1)"], "lognormal of 0"),
+        (["-sample", "8", "-var", "a=lognormal(0, 1)"], "mean > 0 && deviation > 0"),
         (["-sample", "8", "-var", "a=1,2"], "no variable is random"),
         (["-sample", "9", "-var", "a=normal(1, inf)"], "normal(mean, deviation) with numbers"),
         (["-sample", "9", "-sequence", "sobol", "-var", "a=normal(1, 1)"], "a power of 2"),

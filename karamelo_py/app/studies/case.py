@@ -124,9 +124,8 @@ class Launch:
             return None
         if stored["status"] == "too long" and (self.limit or 1e300) > stored["facts"]["wall_s"]:
             return None
-        status, reason, facts = (stored[name] for name in ("status", "reason", "facts"))
-        ends = stored.get("code", ""), stored.get("machine", "")
-        return CaseOutcome(status, reason, facts, folder, *ends)
+        fields = ("status", "reason", "facts", "code", "machine")
+        return CaseOutcome(folder=folder, **{name: stored.get(name, "") for name in fields})
 
     def run(self, case: Mapping[str, str], folder: Path) -> CaseOutcome:
         with reported(folder):
@@ -147,8 +146,7 @@ class Launch:
                 facts["seconds_spread"] = max(seconds) - min(seconds)
         if "particle_steps" in facts and facts["seconds"] > 0:
             facts["particle_steps_per_s"] = facts["particle_steps"] / facts["seconds"]
-        names = ("status", "reason", "code", "machine")
-        end = {name: getattr(outcome, name) for name in names}
+        end = {name: vars(outcome)[name] for name in ("status", "reason", "code", "machine")}
         record = {"key": self.key(case), "variables": dict(case), **end, "facts": facts}
         write_whole(folder / KEPT, json.dumps(record, indent=1))
         return outcome

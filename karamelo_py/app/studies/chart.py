@@ -41,7 +41,7 @@ def add_options(parser: ArgumentParser) -> None:
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",
     )  # fmt: skip
-    wanted = parser.add_mutually_exclusive_group()
+    wanted = parser.add_mutually_exclusive_group(required=True)
     wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
         "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
@@ -83,12 +83,6 @@ def run(options: Namespace) -> int:
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
         raise ScriptError("-axes", expected="-curve, or -accuracy or -y with -o")
-    if not (
-        options.accuracy or options.curve or options.keeps or options.y or options.distribution
-    ):
-        hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
-        expected = "-accuracy of an error, -y of a result, -curve or -keeps"
-        raise ScriptError("no column is named", expected=expected, hint=hint)
     if (options.law or options.data) and not options.y:
         raise ScriptError("-law and -data are drawn with -y", expected="-y COLUMN -x NAME")
     if options.versus:
@@ -195,8 +189,9 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
     over = options.x or "Time"
 
     def read(column: str) -> list[pictures.History]:
-        settings = {"log": options.log, "names": names(options.names)}
-        return pictures.histories(table, differing, over, column, **settings)
+        return pictures.histories(
+            table, differing, over, column, log=options.log, names=names(options.names)
+        )
 
     exact = None
     if options.exact:

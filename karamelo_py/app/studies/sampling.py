@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.app.options import positive
+from karamelo_py.app.studies.variables import holds
 from karamelo_py.scene.tables import read_table
 from karamelo_py.script.errors import ScriptError, unknown
 from karamelo_py.script.terms import number_of
@@ -18,6 +19,11 @@ KINDS = {
     "uniform": "uniform(low, high)", "loguniform": "loguniform(low, high)",
     "normal": "normal(mean, deviation)", "lognormal": "lognormal(mean, deviation)",
     "triangular": "triangular(low, mode, high)",
+}  # fmt: skip
+RULES = {
+    "uniform": "low < high", "loguniform": "0 < low && low < high", "normal": "deviation > 0",
+    "lognormal": "mean > 0 && deviation > 0",
+    "triangular": "low <= mode && mode <= high && low < high",
 }  # fmt: skip
 SEQUENCES = ("latin", "sobol", "halton")
 CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
@@ -60,34 +66,20 @@ def _law(name: str, kind: str, text: str) -> Any:
 
     if kind not in KINDS:
         raise unknown(f"-var {name}: unknown distribution '{kind}'", kind, KINDS)
-    parts = [number_of(piece.strip()) for piece in text.split(",")]
-    numbers = [piece for piece in parts if piece is not None]
-    expected = f"{KINDS[kind]} with numbers"
-    if (
-        not np.isfinite(numbers).all()
-        or len(numbers) != len(parts)
-        or len(numbers) != KINDS[kind].count(",") + 1
-    ):
+    given = [piece.strip() for piece in text.split(",")]
+    names, numbers = re.findall(r"\w+", KINDS[kind])[1:], [number_of(word) for word in given]
+    counted = len(given) == len(names) and None not in numbers and np.isfinite(numbers).all()
+    if not counted or not holds(RULES[kind], dict(zip(names, given, strict=True))):
+        expected = f"{KINDS[kind]} with numbers, {RULES[kind]}"
         raise ScriptError(f"-var {name}: {kind}({text})", expected=expected)
-    a, b, *more = numbers
-    if kind in ("normal", "lognormal") and not b > 0:
-        raise ScriptError(f"-var {name}: a deviation of {b:g}", expected="a number above 0")
-    if kind in ("uniform", "loguniform") and not a < b:
-        raise ScriptError(f"-var {name}: from {a:g} to {b:g}", expected="low below high")
-    if kind in ("lognormal", "loguniform") and not a > 0:
-        raise ScriptError(f"-var {name}: {kind} of {a:g}", expected="a number above 0")
-    if kind == "uniform":
-        return stats.uniform(a, b - a)
-    if kind == "loguniform":
-        return stats.loguniform(a, b)
-    if kind == "normal":
-        return stats.norm(a, b)
+    a, b, c = [*numbers, 0.0][:3]
     if kind == "lognormal":
         variance = np.log1p((b / a) ** 2)
         return stats.lognorm(np.sqrt(variance), scale=a * np.exp(-variance / 2))
-    if not (a <= b <= more[0] and a < more[0]):
-        raise ScriptError(f"-var {name}: {kind}({text})", expected="low <= mode <= high")
-    return stats.triang((b - a) / (more[0] - a), a, more[0] - a)
+    if kind == "triangular":
+        return stats.triang((b - a) / (c - a), a, c - a)
+    law = {"uniform": stats.uniform, "loguniform": stats.loguniform, "normal": stats.norm}[kind]
+    return law(a, b - a if kind == "uniform" else b)
 
 
 def samples(

@@ -111,9 +111,6 @@ class Study:
         write_whole(self.out.with_suffix(".json"), json.dumps(made, indent=1) + "\n")
 
     def claim_folder(self) -> None:
-        if self.folder.exists() and not self.folder.is_dir():
-            expected = "a free name for the folder of the runs"
-            raise ScriptError(f"{self.folder} is a file", expected=expected)
         with reported(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
         self.claim = claim(self.folder)
