@@ -248,7 +248,7 @@ def test_sensitivity_of_a_linear_function(folder, capsys):
     ("words", "says"),
     [
         (["-sample", "8", "-var", "a=nromal(1, 2)"], "did you mean 'normal'"),
-        (["-sample", "8", "-var", "a=normal(1, 0)"], "normal(mean, deviation) with numbers, deviation > 0"),
+        (["-sample", "8", "-var", "a=normal(1, 0)"], "deviation) with numbers, deviation > 0"),
         (["-sample", "8", "-var", "a=uniform(2, 1)"], "with numbers, low < high"),
         (["-sample", "8", "-var", "a=normal(1)"], "normal(mean, deviation) with numbers"),
         (["-sample", "8", "-var", "a=lognormal(0, 1)"], "mean > 0 && deviation > 0"),
