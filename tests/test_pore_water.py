@@ -290,6 +290,23 @@ USUAL = {
 }
 
 
+def test_forces_on_points_leave_the_water_its_weight(run_interpreted):
+    """A force of 0 changes nothing in a column under its weight."""
+    tail = """
+        fix(weight, body_force, all, 0, -9.81)
+        fix(base, velocity_nodes, all, 0, NULL)
+        {}
+        compute(p, probe, all, pore_pressure, wy)
+        log_modify(custom, p_pore_pressure, p_wy)
+        run(3)
+    """
+    plain, loaded = (
+        last(run_interpreted(SCENE.format(**USUAL | {"tail": tail.format(more)})))
+        for more in ("", "fix(none, force_particles, all, 0, 0)")
+    )
+    assert plain == loaded and plain["p_wy"] != 0
+
+
 @pytest.mark.parametrize("head", REFUSED)
 def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
     err = run_interpreted(SCENE.format(**USUAL | {"head": head}), status=1).err

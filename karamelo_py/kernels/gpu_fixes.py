@@ -18,14 +18,11 @@ from karamelo_py.kernels import arrays, hook_loop, totals, watch
 from karamelo_py.kernels.arrays import TIMESTEP, known_to_laws, with_items
 from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
-from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
+from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes
-from karamelo_py.kernels.equations.pore_water import RelativeVelocity
-from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
-from karamelo_py.points.laws.pore_water import Saturated
 
 
 def _hooks_with_room(hooks):
@@ -33,6 +30,10 @@ def _hooks_with_room(hooks):
     scratch[:6] = 0.0
     chosen = room_for(1, (0,))[0]
     return with_items(hook_loop.without_whole(hooks), chosen=chosen, scratch=scratch)
+
+
+def _copy_of(copies, i):
+    return copies[index((i // 32) % len(copies))]
 
 
 def _control(count: int) -> Callable:
@@ -43,7 +44,7 @@ def _control(count: int) -> Callable:
         return room
 
     def control_of(s, copies, i):
-        copy = copies[index((i // 32) % len(copies))]
+        copy = _copy_of(copies, i)
         if count:
             return with_items(s.control, totals=copy, values=own_values(s.control.values))
         return with_items(s.control, totals=copy)
@@ -256,30 +257,15 @@ def _add_all(copy, first_row, solid, total):
             totals.add_to(copy, first_row + solid * len(total) + k, number)
 
 
-ADDED = WorkOfForces, VelocityAround
-
-
 def add_work_at_node(i, fate, s, copies):
     work = field(s.nodes.fields, WorkAtNodes)
-    totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[i, 0]))
+    totals.add_to(_copy_of(copies, i), totals.WORK, float(work[i, 0]))
     work[i, 0] = 0
 
 
-def add_work(i, fate, s, block, copies):
-    """Add a point's work of forces, and its energy of rotation or of water in its pores."""
-    if isinstance(block.laws, Saturated):
-        relative = field(block.points.fields, RelativeVelocity)
-        energy = watch.water_energy(s.kin, known_to_laws(block.points), block.laws, relative, i)
-        totals.add_to(copies[index((i // 32) % len(copies))], totals.KINETIC, energy)
-    around = field(block.points.fields, VelocityAround)
-    if around is not None:
-        v = float(around[0, i])
-        energy = 0.5 * float(block.points.mass[i]) * v * v
-        totals.add_to(copies[index((i // 32) % len(copies))], totals.KINETIC, energy)
-    work = field(block.points.fields, WorkOfForces)
-    if work is not None:
-        totals.add_to(copies[index((i // 32) % len(copies))], totals.WORK, float(work[0, i]))
-        work[0, i] = 0
+def add_more(i, fate, s, block, copies):
+    points, more = known_to_laws(block.points), watch.more_of(block)
+    watch.add_more(s.kin, points, more, _copy_of(copies, i), index(i))
 
 
 def look_before(i, fate, s):

@@ -17,7 +17,7 @@ from karamelo_py.kernels.equations import heat as of_heat
 from karamelo_py.kernels.equations.fbar import TakeMean
 from karamelo_py.kernels.equations.node_updates import NodalUpdate, SumsToVelocity
 from karamelo_py.kernels.sweep import OldWeights, Visit
-from karamelo_py.kernels.table import NodeTask, Processor, Sweep, take
+from karamelo_py.kernels.table import AtNodes, AtPoints, NodeTask, Processor, Sweep, take
 from karamelo_py.kernels.totals import agree_on_heat
 from karamelo_py.points.kinematics import Line
 
@@ -33,9 +33,8 @@ def _at_heat_nodes_hooks(hooks, stage, target, s):
     heat = s.control.heat[0]
     heat.set_low, heat.set_high = np.inf, -np.inf
     here = at_its_nodes(s)
-    hook_loop.node_hooks(
-        stage, hook_loop.hooked_nodes(here, target, 1.0), hooks, here, step_size(s)
-    )
+    members = hook_loop.hooked_nodes(here, target, 1.0)
+    hook_loop.node_hooks(stage, members, hooks, here, step_size(s))
     agree_on_heat(s.control.ranks, s.control)
     heat.coldest = min(heat.coldest, heat.set_low)
     heat.hottest = max(heat.hottest, heat.set_high)
@@ -80,12 +79,12 @@ def _take_factor(control):
     heat.heat_limit = heat.heat_reference / control.motion[0].new_rate
 
 
-class AtHeatNodes(NamedTuple):
-    stage: int
-    target: int
+class AtHeatNodes(AtNodes):
+    __slots__ = ()
 
 
-class AtHeatedPoints(NamedTuple): ...
+class AtHeatedPoints(AtPoints):
+    __slots__ = ()
 
 
 @take.on(AtHeatNodes, Processor)
@@ -111,12 +110,12 @@ SHOW = (
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),
-    AtHeatNodes(arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY),
-    AtHeatedPoints(),
+    AtHeatNodes(arrays.POST_HEAT_TO_GRID, arrays.ON_VELOCITY, at_its_nodes),
+    AtHeatedPoints(arrays.SUPPLY_HEAT, 0),
     Sweep(FLOW, moves=False, at=_of_heat, reported=None),
 )
 # Fixes prescribe the new nodal temperature.
-HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE)
+HOLD = AtHeatNodes(arrays.POST_UPDATE_GRID_HEAT, arrays.ON_UPDATE, at_its_nodes)
 WARM = Sweep(MAP, scatters=False, moves=False, at=_of_heat, reported=_take_factor)
 
 

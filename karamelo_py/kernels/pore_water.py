@@ -2,10 +2,8 @@
 
 from typing import NamedTuple
 
-from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels import arrays, hook_loop
-from karamelo_py.kernels.clock import kick
+from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations import pore_water as pores
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
@@ -13,35 +11,17 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import Company, NodeTask, Processor, companies, take
+from karamelo_py.kernels.table import AtNodes, Company, NodeTask, companies
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
 
-class AtWater(NamedTuple):
-    pass
-
-
-@point_function(otherwise=True)
-def at_water(hooks, s):
-    pass
-
-
-def at_its_nodes(s):
+def _of_water(s):
     sums = field(s.nodes.fields, pores.WaterSums)
     return arrays.with_items(s, nodes=arrays.with_items(s.nodes, sums=sums))
 
 
-@at_water.on(arrays.Hooks)
-def _at_water_hooks(hooks, s):
-    here = at_its_nodes(s)
-    members = hook_loop.hooked_nodes(here, arrays.ON_SUMS, 0.0)
-    hook_loop.node_hooks(arrays.POST_WATER_TO_GRID, members, hooks, here, kick(s))
-
-
-@take.on(AtWater, Processor)
-def _at_water(row, s, step):
-    at_water(step.hooks, s)
+AT_WATER = AtNodes(arrays.POST_WATER_TO_GRID, arrays.ON_SUMS, _of_water)
 
 
 def _rim(s):
@@ -65,7 +45,7 @@ COMPANIES = (
     (MassMomentum, Company(then=(pores.WaterMomentum(),))),
     (InternalForce, Company(then=(pores.PoreVolumes(), pores.WaterForce()))),
     (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
-    (NodalUpdate, Company(before=(AtWater(), NodeTask(pores.ShareForces, make=share_forces)))),
+    (NodalUpdate, Company(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))),
     (Strain, Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )

@@ -66,7 +66,7 @@ def _at_points(row, s, step):
 
 @take.on(table.AtNodes, Processor)
 def _at_nodes(row, s, step):
-    at_nodes(step.hooks, row.stage, row.target, s)
+    at_nodes(step.hooks, row.stage, row.target, row.at(s) if row.at else s)
 
 
 @take.on(table.WorkOfLoads, Processor)

@@ -64,6 +64,7 @@ class AtNodes(NamedTuple):
 
     stage: int
     target: int
+    at: Any = None  # function of the setup: one with other nodes
 
 
 class Gather(NamedTuple):

@@ -2,23 +2,14 @@
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import point_function
 from karamelo_py.compiler.fields import field
-from karamelo_py.kernels import arrays, contact_twist, hook_loop  # noqa: F401
-from karamelo_py.kernels.clock import kick
+from karamelo_py.kernels import arrays, contact_twist  # noqa: F401
 from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations import twist
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.table import (
-    Company,
-    NodeTask,
-    Processor,
-    any_node,
-    companies,
-    take,
-)
+from karamelo_py.kernels.table import AtNodes, Company, NodeTask, any_node, companies
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.transfers import stores_moment
@@ -35,39 +26,14 @@ def at_its_nodes(s):
     return arrays.with_items(s, nodes=rotating)._replace(kin=Line())
 
 
-class AtRotation(NamedTuple):
-    """Fixes act on the nodes' angular velocity."""
-
-    stage: int
-    target: int
-
-
-@point_function(otherwise=True)
-def at_rotation(hooks, stage, target, s):
-    pass
-
-
-@at_rotation.on(arrays.Hooks)
-def _at_rotation_hooks(hooks, stage, target, s):
-    here, heat = at_its_nodes(s), s.control.heat[0]
-    members = hook_loop.hooked_nodes(here, target, s.control.step[0].kept)
-    hook_loop.node_hooks(stage, members, hooks, here, kick(s))
-    heat.set_low = heat.set_high = 0.0  # used by temperatures only
-
-
-@take.on(AtRotation, Processor)
-def _at_rotation(row, s, step):
-    at_rotation(step.hooks, row.stage, row.target, s)
-
-
-AGAIN = AtRotation(arrays.POST_ROTATION_TO_GRID, arrays.ON_VELOCITY)
+AGAIN = AtNodes(arrays.POST_ROTATION_TO_GRID, arrays.ON_VELOCITY, at_its_nodes)
 
 
 def _task(task: Any) -> NodeTask:
     return NodeTask(task, at_its_nodes)
 
 
-HELD = AtRotation(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE)
+HELD = AtNodes(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE, at_its_nodes)
 LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=any_node)
 COMPANIES = (
     (MassMomentum, Company(then=(twist.RotationToNodes(),))),

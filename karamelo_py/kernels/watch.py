@@ -98,44 +98,41 @@ def _sum_energies(mode, matter, tiling, control):
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
 
 
-@kernel
-def _add_rotation(mass, around, control):
-    for p in range(mass.size):
+MORE = VelocityAround, RelativeVelocity, WorkOfForces
+
+
+def more_of(block):
+    """Return law and fields of points with energy or work beyond `energies_of`, or empty tuples."""
+    law = block.laws if isinstance(block.laws, (Across, Saturated)) else ()
+    return law, tuple([one for one in block.points.fields if type(one) in MORE])
+
+
+def add_more(kin, points, more, sums, p):
+    """Add a point's energy of rotation and of water, and take its work of forces and across."""
+    laws, (around, relative, work) = more[0], [field(more[1], kind) for kind in MORE]
+    if around is not None:
         v = float(around[0, p])
-        totals.add_to(control.totals, totals.KINETIC, 0.5 * float(mass[p]) * v * v)
-
-
-@kernel
-def _take_work(work, control):
-    for p in range(work.size):
-        totals.add_to(control.totals, totals.WORK, float(work[0, p]))
-        work[0, p] = 0
-    totals.carry(control.totals[totals.WORK])
-
-
-def water_energy(kin, points, laws, relative, p):
-    law, state = state_at(kin, points, laws, p)
-    v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
-    mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
-    return float(0.5 * mass * dot(v, v))
-
-
-@kernel
-def _add_water(matter, relative, control):
-    (kin, points, laws), relative = at_hand(matter), at_hand(relative)
-    for p in range(points.mass.size):
-        energy = water_energy(kin, points, laws, relative, p)
-        totals.add_to(control.totals, totals.KINETIC, energy)
-
-
-@kernel
-def _take_work_across(matter, control):
-    kin, points, laws = at_hand(matter)
-    for p in range(points.mass.size):
+        totals.add_to(sums, totals.KINETIC, 0.5 * float(points.mass[p]) * v * v)
+    if isinstance(laws, Saturated):
         law, state = state_at(kin, points, laws, p)
-        work = points.mass[p] * specific_volume(law) * state.work
-        totals.add_to(control.totals, totals.WORK, float(work))
+        v = load_vector(kin, points.v, p) + load_vector(kin, relative, p)
+        mass = points.mass[p] * specific_volume(law) * water_content(law, kin, state)
+        totals.add_to(sums, totals.KINETIC, float(0.5 * mass * dot(v, v)))
+    if isinstance(laws, Across):
+        law, state = state_at(kin, points, laws, p)
+        across = points.mass[p] * specific_volume(law) * state.work
+        totals.add_to(sums, totals.WORK, float(across))
         store(points.state, p, state._replace(work=0))
+    if work is not None:
+        totals.add_to(sums, totals.WORK, float(work[0, p]))
+        work[0, p] = 0
+
+
+@kernel
+def _add_more(kin, points, more, control):
+    points, more = at_hand(points), at_hand(more)
+    for p in range(points.mass.size):
+        add_more(kin, points, more, control.totals, p)
     totals.carry(control.totals[totals.WORK])
 
 
@@ -155,17 +152,8 @@ def sum_energies(s, mode):
     for block in s.blocks:
         if not is_rigid(block.laws):
             _sum_energies(mode, matter_of(s.kin, block), block.tiling, s.control)
-        around = field(block.points.fields, VelocityAround)
-        if around is not None:
-            _add_rotation(block.points.mass, around, s.control)
-        work = field(block.points.fields, WorkOfForces)
-        if work is not None:
-            _take_work(work, s.control)
-        if isinstance(block.laws, Across):
-            _take_work_across(matter_of(s.kin, block), s.control)
-        if isinstance(block.laws, Saturated):
-            relative = field(block.points.fields, RelativeVelocity)
-            _add_water(matter_of(s.kin, block), relative, s.control)
+        if any(more_of(block)):
+            _add_more(s.kin, known_to_laws(block.points), more_of(block), s.control)
     at_nodes = field(s.nodes.fields, WorkAtNodes)
     if at_nodes is not None:
         _take_work_at_nodes(s.spans, at_nodes, s.control)

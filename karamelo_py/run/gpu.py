@@ -13,7 +13,7 @@ from numpy.lib.stride_tricks import as_strided
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.gpu import Card, Images, KernelLaunch, numbers_of
 from karamelo_py.compiler.programs import EVALUATE
-from karamelo_py.kernels import arrays, gpu, heat, pore_water, table, twist
+from karamelo_py.kernels import arrays, gpu, heat, table
 from karamelo_py.kernels import gpu_fixes as fixes
 from karamelo_py.kernels.clock import kick, step_size, take_reports
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes
@@ -23,7 +23,7 @@ from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.table import take
 from karamelo_py.kernels.totals import WORK
 from karamelo_py.kernels.walls import FRICTION
-from karamelo_py.kernels.watch import LOOK
+from karamelo_py.kernels.watch import LOOK, more_of
 from karamelo_py.points.basis import support
 from karamelo_py.points.laws import is_rigid
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
@@ -228,21 +228,20 @@ class StepsOnCard:
     def _slots_read(self) -> list[int]:
         return [int(slot) for op, slot in self.hooks.code if op % UNIFORM == GLOBAL]
 
-    def hooks_on_nodes(
-        self, stage: int, target: int, at: Callable | None = None
-    ) -> Iterator[KernelLaunch]:
-        s, of_heat = at(self.s) if at else self.s, at is heat.at_its_nodes
-        rows = [h for h, row in enumerate(self.table) if row.stage == stage]
+    def hooks_on_nodes(self, row: table.AtNodes) -> Iterator[KernelLaunch]:
+        stage, target, at = row
+        s, of_heat = at(self.s) if at else self.s, isinstance(row, heat.AtHeatNodes)
+        rows = [h for h, hook in enumerate(self.table) if hook.stage == stage]
         yield from self._clear_again(stage, rows)
         if rows and target == arrays.ON_UPDATE and self.hooks.holders.size:
             yield self.launch(fixes.clear_held, self.nodes, self.hooks.holders)
         nodes_of, length = fixes.hooked_nodes(target, of_heat), step_size if of_heat else kick
         for h in rows:
-            row = self.table[h]
-            if row.uses_share:
+            hook = self.table[h]
+            if hook.uses_share:
                 yield self.launch(gpu.clear, 1, self.heavy, h)
                 yield self._act(fixes.count_node, h, s)
-            if row.address != arrays.WHOLE:
+            if hook.address != arrays.WHOLE:
                 yield self._act(fixes.on_node(nodes_of, ACT, self._values(h), length), h, s)
             elif target != arrays.ON_VELOCITY:
                 act = fixes.on_node(fixes.whole_nodes(target, stage), ACT)
@@ -338,8 +337,8 @@ class StepsOnCard:
             if not is_rigid(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
                 launches.append(self.launch(fixes.add_energies, threads, s, block, copies))
-            if any(field(block.points.fields, kind) is not None for kind in fixes.ADDED):
-                launches.append(self.of_points(fixes.add_work, block, copies))
+            if any(more_of(block)):
+                launches.append(self.of_points(fixes.add_more, block, copies))
         if field(s.nodes.fields, WorkAtNodes) is not None:
             launches.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
         launches += [*self.collect(0, WORK + 1), *self.collect(*solids)]
@@ -474,33 +473,12 @@ def _check(row, steps):
 
 @take.on(table.AtNodes, Card)
 def _at_nodes(row, steps):
-    return steps.hooks_on_nodes(row.stage, row.target)
-
-
-@take.on(heat.AtHeatNodes, Card)
-def _at_heat_nodes(row, steps):
-    return steps.hooks_on_nodes(row.stage, row.target, heat.at_its_nodes)
-
-
-@take.on(twist.AtRotation, Card)
-def _at_rotation(row, steps):
-    return steps.hooks_on_nodes(row.stage, row.target, twist.at_its_nodes)
-
-
-@take.on(pore_water.AtWater, Card)
-def _at_water(row, steps):
-    stage = arrays.POST_WATER_TO_GRID
-    return steps.hooks_on_nodes(stage, arrays.ON_SUMS, pore_water.at_its_nodes)
+    return steps.hooks_on_nodes(row)
 
 
 @take.on(table.AtPoints, Card)
 def _at_points(row, steps):
     return steps.hooks_on_points(row.stage, row.then)
-
-
-@take.on(heat.AtHeatedPoints, Card)
-def _at_heated_points(row, steps):
-    return steps.hooks_on_points(arrays.SUPPLY_HEAT, 0)
 
 
 @take.on(table.WorkOfLoads, Card)

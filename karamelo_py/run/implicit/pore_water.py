@@ -25,7 +25,7 @@ from karamelo_py.kernels.equations.pore_water import (
     RelativeVelocity,
     WaterSums,
 )
-from karamelo_py.kernels.pore_water import AtWater
+from karamelo_py.kernels.pore_water import AT_WATER
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import Saturated, State, drag_per_volume, porosity
@@ -60,7 +60,7 @@ class Seepage:
         self._read_stencils()
         of_water, first = field(s.nodes.fields, WaterSums), of_force(s.kin)
         of_water[equations.nodes, first : first + self.d] = 0.0
-        take_rows((AtWater(),), s, equations.mode, hooks)
+        take_rows((AT_WATER,), s, equations.mode, hooks)
         sums = of_water[equations.nodes]
         self.weight = sums[:, first : first + self.d].astype(float)
         mass = np.where(sums[:, MASS] > 0, sums[:, MASS], 1.0)[:, None]

@@ -14,7 +14,6 @@ from karamelo_py.kernels.heat import at_heat_nodes, at_heated_points
 from karamelo_py.kernels.hook_loop import add_work, at_nodes, at_points
 from karamelo_py.kernels.hooks import STAGES, CompiledHook
 from karamelo_py.kernels.totals import LIMBS
-from karamelo_py.kernels.twist import at_rotation
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.language.faults import as_script_error
 from karamelo_py.run.boxes import unique
@@ -292,11 +291,6 @@ def _at_points_acting_fixes(hooks, stage, then, s):
 def _at_heat_nodes_acting_fixes(hooks, stage, target, s):
     at_heat_nodes(hooks.compiled, stage, target, s)
     hooks.act(_on_heat_nodes, s, stage, target)
-
-
-@at_rotation.on(ActingFixes)
-def _at_rotation_acting_fixes(hooks, stage, target, s):
-    at_rotation(hooks.compiled, stage, target, s)
 
 
 @at_heated_points.on(ActingFixes)
