@@ -156,24 +156,25 @@ def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = N
         return law_here(law, getattr(law, component), state), first, getattr(state, kept)
 
 
-_columns: dict[type, dict[str, NamedTuple]] = {}
+_columns: dict[type, dict[str, NamedTuple] | None] = {}
 
 
 def column(component: type, name: str, source: Callable | NamedTuple | None = None) -> None:
     """Declare an output column by a `number` or a tag of `shown`; by default, a field of the state.
 
-    Derived classes inherit it unless they declare columns.
+    Derived classes inherit it. Laws with a `dissipated_energy` also have the column `dissipated`.
     """
     if source is None:
         source = _by_field(name)
         source.__name__, source.__module__ = name, component.__module__
         source = number(source)
-    _columns.setdefault(component, {})[name] = source if isinstance(source, tuple) else source.tag
+    declared = _columns.setdefault(component, {})
+    declared[name] = source if isinstance(source, tuple) else source.tag
 
 
 def no_columns(component: type) -> None:
     """Declare that a class has no columns, whatever its bases have."""
-    _columns[component] = {}
+    _columns[component] = None
 
 
 def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
@@ -183,8 +184,14 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
         tags |= columns_of(part)
     if within.defined(type(law)):
         tags = {name: Within(tag) for name, tag in tags.items()}
-    bases = type(law).__mro__
-    return tags | next((_columns[kind] for kind in bases if kind in _columns), {})
+    kind = type(law)
+    own: dict[str, NamedTuple] = {}
+    for base in reversed(kind.__mro__):
+        declared = _columns.get(base, {})
+        own = {} if declared is None else own | declared
+    if dissipated_energy.defined(kind) and dissipated_energy.find((kind,)) not in _handing_on:
+        own.setdefault("dissipated", dissipated_energy.tag)
+    return tags | own
 
 
 @point_function(otherwise=True)
@@ -255,9 +262,9 @@ def kirchhoff_stress(law, kin, state):
     """Return det F times the Cauchy stress; forces take it times the reference volume."""
 
 
-@point_function()
+@point_function(otherwise=True)
 def cauchy_stress(law, kin, state):
-    pass
+    return kirchhoff_stress(law, kin, state) / jacobian(law, kin, state)
 
 
 @point_function(otherwise=True)

@@ -242,11 +242,6 @@ def _kirchhoff_stress_cam_clay(law, kin, state):
     return 2 * law.G * dev(state.e) - pressure(law, state.e) * I
 
 
-@laws.cauchy_stress.on(CamClay)
-def _cauchy_stress_cam_clay(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / state.J
-
-
 laws.answers(
     CamClay,
     {
@@ -260,7 +255,6 @@ laws.answers(
 
 laws.column(CamClay, "ep", laws.plastic_strain)
 laws.column(CamClay, "pc")
-laws.column(CamClay, "dissipated", laws.dissipated_energy)
 
 
 @laws.wave_speed_squared.on(CamClay)

@@ -48,7 +48,7 @@ def of_deformation(law: type) -> type:
     """Declare a law whose state is its deformation gradient F (class decorator)."""
     for function in (
         laws.initial_state, laws.by_rates, laws.deformation, laws.jacobian, laws.advance,
-        laws.cauchy_stress, laws.elastic_strain,
+        laws.elastic_strain,
     ):  # fmt: skip
         function.on(law)(function.find((OfDeformation,)))
     return law
@@ -78,11 +78,6 @@ def _jacobian_of_deformation(law, kin, state):
 @laws.advance.on(OfDeformation)
 def _advance_of_deformation(law, kin, state, dl, dt):
     return State(state.F.after(dl))
-
-
-@laws.cauchy_stress.on(OfDeformation)
-def _cauchy_stress_of_deformation(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
 
 
 @laws.elastic_strain.on(OfDeformation)

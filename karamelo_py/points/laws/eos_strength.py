@@ -24,7 +24,7 @@ from karamelo_py.points.kinematics import (
     tr,
     von_mises,
 )
-from karamelo_py.points.laws import Absent, can, column, eos, law_traits, parameter, strengths
+from karamelo_py.points.laws import Absent, can, eos, law_traits, parameter, strengths
 from karamelo_py.points.laws.damages import (
     FlowStep,
     JohnsonCookDamage,
@@ -174,9 +174,6 @@ class EosStrength(NamedTuple):
         further = [laws.pop(kind) for kind in list(laws) if kind not in cls._fields]
         elastic = Absent() if strain == "rate" else Logarithmic()
         return cls(**laws, strain=elastic, further=chained(further))
-
-
-column(EosStrength, "dissipated", laws.dissipated_energy)
 
 
 def _idle_damage(law, scene):

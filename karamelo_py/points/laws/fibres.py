@@ -133,7 +133,6 @@ warn_of_leaning(PlacedFibre, "fibres", _lean_somewhere, INSTEAD)
 
 for _axis, _letter in enumerate("xyz"):
     laws.column(PlacedFibre, f"fibre_{_letter}", DirectionShown(_axis))
-    laws.column(PlacedFibres, f"fibre_{_letter}", DirectionShown(_axis))
     laws.column(PlacedFibres, f"fibre2_{_letter}", DirectionShown(3 + _axis))
 
 

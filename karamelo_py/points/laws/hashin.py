@@ -20,7 +20,6 @@ from karamelo_py.points.laws.orthotropic import (
 )
 from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.points.laws.tsai_hill import (
-    COLUMNS,
     DirectionalBase,
     Ply,
     Turn,
@@ -214,7 +213,5 @@ def _damage_initiation_hashin(law, kin, state):
     )
 
 
-for _name, _source in COLUMNS.items():
-    laws.column(BreakingApart, _name, _source)
 for _mode in ("fibre_t", "fibre_c", "matrix_t", "matrix_c"):
     laws.column(BreakingApart, _mode)

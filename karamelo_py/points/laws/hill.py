@@ -25,6 +25,7 @@ from karamelo_py.points.kinematics import (
     tr,
     unit,
 )
+from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.eos_strength import Strength
 from karamelo_py.points.laws.linear import LinearElastic
 from karamelo_py.points.laws.oriented import Axes, oriented
@@ -161,7 +162,7 @@ RATES = 3  # index of the first field
 TO, FROM = RATES + 6, RATES + 42
 
 
-class YieldingByHill(_Fields):
+class YieldingByHill(OfDeformation, _Fields):
     """Constants of the law in coordinates z of elastic strain, in which flow is diagonal.
 
     With stiffness C and q^2 = T.P.T: z = V^T C^(1/2) e, where V holds the eigenvectors of C^(1/2) P
@@ -366,15 +367,7 @@ def as_tensor(kin, s):
     return kin.Tensor._make([a[place] for place in kin.Tensor.places])
 
 
-laws.answers(
-    YieldingByHill,
-    {
-        laws.by_rates: False,
-        laws.deformation: "F",
-        laws.elastic_strain: "e",
-        laws.dissipated_energy: "loss",
-    },
-)
+laws.answers(YieldingByHill, {laws.elastic_strain: "e", laws.dissipated_energy: "loss"})
 
 
 def stretching(kin, state, dl, U):
@@ -477,11 +470,6 @@ def _plastic_strain_slopes(law, squares, memory, dt):
     return (total(changes) + by_limit * limit).chain(x, where(yields, -1 / slope, 0))
 
 
-@laws.jacobian.on(YieldingByHill)
-def _jacobian_hill(law, kin, state):
-    return det(state.F)
-
-
 def rotation_of(kin, state):
     return state.F @ inv(as_tensor(kin, state.U))
 
@@ -489,11 +477,6 @@ def rotation_of(kin, state):
 @laws.kirchhoff_stress.on(YieldingByHill)
 def _kirchhoff_stress_hill(law, kin, state):
     return stress_of(law, state.e).carried(rotation_of(kin, state) - I)
-
-
-@laws.cauchy_stress.on(YieldingByHill)
-def _cauchy_stress_hill(law, kin, state):
-    return laws.kirchhoff_stress(law, kin, state) / det(state.F)
 
 
 @laws.energy_density.on(YieldingByHill)
@@ -504,9 +487,6 @@ def _energy_density_hill(law, kin, state):
 @laws.plastic_strain.on(YieldingByHill)
 def _plastic_strain_hill(law, kin, state):
     return state.m.strength.ep
-
-
-laws.column(YieldingByHill, "dissipated", laws.dissipated_energy)
 
 
 @laws.wave_speed_squared.on(YieldingByHill)

@@ -352,9 +352,7 @@ def _with_stress_jointed(law, kin, state, stress):
     return state._replace(sigma=symmetric_tensor(kin, stress))
 
 
-for _kind in (Jointed, YieldingBetween):
-    laws.column(_kind, "slip")
-    laws.column(_kind, "opening")
-    laws.column(_kind, "dissipated", laws.dissipated_energy)
+laws.column(Jointed, "slip")
+laws.column(Jointed, "opening")
 laws.column(YieldingBetween, "ep", laws.plastic_strain)
 laws.no_columns(RockBetweenJoints)

@@ -150,9 +150,6 @@ def _dissipated_energy_mullins(law, kin, state):
     return softened(law, state.peak - state.peak, state.peak)[2]
 
 
-laws.column(Mullins, "dissipated", laws.dissipated_energy)
-
-
 @laws.energy_density.on(Mullins)
 def _energy_density_mullins(law, kin, state):
     whole = laws.energy_density(law.elastic, kin, state.elastic)

@@ -133,9 +133,6 @@ def _dissipated_energy_newtonian(law, kin, state):
     return state.loss + laws.dissipated_energy(law.law, kin, state.solid)
 
 
-laws.column(Newtonian, "dissipated", laws.dissipated_energy)
-
-
 def _damp(function):
     @function.on(Newtonian)
     def _damped_by_viscosity(law, kin, state):

@@ -5,7 +5,7 @@ axes then rotate with the body.
 """
 
 from math import sqrt
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -127,33 +127,22 @@ def _initial_state_oriented(law, kin, template):
 
 # Not laws.deformation: the inner law's F is another one.
 laws.wraps(Oriented, "elastic", "elastic", (*ELASTIC, laws.with_stress))
-
-
 laws.answers(Oriented, {has_short_trials: True, laws.is_round: False})
 
 
-def axis(state, i):
-    """Return a component of the present direction of axis 1, a line of the body."""
+class AxisShown(NamedTuple):
+    """Output column of a component of the present direction of axis 1, a line of the body."""
+
+    index: int
+
+
+@laws.shown.on(AxisShown)
+def _shown_axis(tag, law, kin, state):
     a = state.elastic.F.at()
     line = [a[k, 0] for k in range(3) if (k, 0) in a]
     size = sqrt(total([x * x for x in line]))
-    return (line[i] if i < len(line) else size - size) / size
+    return (line[tag.index] if tag.index < len(line) else size - size) / size
 
 
-@laws.number
-def axis_x(law, kin, state):
-    return axis(state, 0)
-
-
-@laws.number
-def axis_y(law, kin, state):
-    return axis(state, 1)
-
-
-@laws.number
-def axis_z(law, kin, state):
-    return axis(state, 2)
-
-
-for _source in (axis_x, axis_y, axis_z):
-    laws.column(Oriented, _source.__name__, _source)
+for _i, _letter in enumerate("xyz"):
+    laws.column(Oriented, f"axis_{_letter}", AxisShown(_i))

@@ -218,8 +218,6 @@ def _energy_density_failing(law, kin, state):
 
 
 laws.answers(Failing, {laws.damage_initiation: "index"})
-
-
 laws.answers(Ply, {laws.dissipated_energy: "loss"})
 
 
@@ -243,10 +241,5 @@ def _is_round_ply(law):
     return laws.is_round(law.elastic)
 
 
-COLUMNS = {
-    "damage": laws.damage,
-    "damage_init": laws.damage_initiation,
-    "dissipated": laws.dissipated_energy,
-}
-for _name, _source in COLUMNS.items():
-    laws.column(Ply, _name, _source)
+laws.column(Ply, "damage", laws.damage)
+laws.column(Ply, "damage_init", laws.damage_initiation)

@@ -334,9 +334,6 @@ def _dissipated_energy_viscoelastic(law, kin, state):
     return state.loss + laws.dissipated_energy(law.elastic, kin, state.elastic)
 
 
-laws.column(Viscoelastic, "dissipated", laws.dissipated_energy)
-
-
 def around_elastic(outer, stiffening):
     """Delegate functions to the elastic law; `stiffening` raises the squared wave speed."""
     laws.wraps(
@@ -346,10 +343,6 @@ def around_elastic(outer, stiffening):
             is_warm,
         ),
     )  # fmt: skip
-
-    @laws.cauchy_stress.on(outer)
-    def _cauchy_stress(law, kin, state):
-        return laws.kirchhoff_stress(law, kin, state) / laws.jacobian(law, kin, state)
 
     def stiffen(function):
         @function.on(outer)
