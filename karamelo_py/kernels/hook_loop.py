@@ -254,6 +254,16 @@ def _add_torque(call, q, c, slot, force):
         totals.add_torque(call.control.totals, row, x, c, force)
 
 
+def _add_numbers(call, q, kin, numbers):
+    """Add what a function of the `q`-th whole member publishes, with the torque of a force."""
+    slot = call.hooks.table[call.h].slot
+    if slot >= 0:
+        for c in range(len(numbers)):
+            totals.add_to(call.control.totals, slot + c, float(numbers[c]))
+            if c < kin.dimension:
+                _add_torque(call, q, c, slot, float(numbers[c]))
+
+
 @noinline
 def _clear_total(hooks, h, control):
     first, count = _published(hooks, h)
@@ -536,11 +546,8 @@ def _act_on_whole_nodes(members, task, call, count):
             if not members.before_update:
                 load = nodes.sums[n, arrays.MASS] * (nodes.update[n, c] - star[c]) / dt
             hooks.loads[n, c] += load  # see _work_at_nodes
-        if counted and hooks.table[h].slot >= 0:
-            for c in range(len(numbers)):
-                totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
-                if c < kin.dimension:
-                    _add_torque(call, q, c, hooks.table[h].slot, float(numbers[c]))
+        if counted:
+            _add_numbers(call, q, kin, numbers)
     return 0
 
 
@@ -737,7 +744,7 @@ def _of_time(tag, kin, call):
 @act.on(WholePoints)
 def _act_on_whole_points(members, task, call, count):
     tag, points, kin = members.tag, members.points, members.kin
-    hooks, control, dt, h = call.hooks, call.control, call.dt, call.h
+    hooks, control, dt = call.hooks, call.control, call.dt
     rows = (VALUE, BEFORE, THIRD)
     led = _of_time(tag, kin, call) if tag.of_time else ()
     for c in range(0 if tag.of_time else len(tag.values)):
@@ -754,11 +761,7 @@ def _act_on_whole_points(members, task, call, count):
         new = load_vector(kin, points.v, p)
         work = 0.5 * float(points.mass[p]) * dot(new - old, new + old)
         totals.add_to(control.totals, totals.WORK, 0.0 if is_rigid(members.laws) else float(work))
-        if hooks.table[h].slot >= 0:
-            for c in range(len(numbers)):
-                totals.add_to(control.totals, hooks.table[h].slot + c, float(numbers[c]))
-                if c < kin.dimension:
-                    _add_torque(call, q, c, hooks.table[h].slot, float(numbers[c]))
+        _add_numbers(call, q, kin, numbers)
         if len(members.heat):
             supply, capacity = members.heat
             if capacity[0, p] > 0:

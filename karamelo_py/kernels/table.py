@@ -462,9 +462,9 @@ def light_node(s):
     return nodes.UpdateToVelocity(real(masses, s.nodes.sums[0, arrays.MASS]))
 
 
-def seams(task: type, across: dict) -> Any:
+def seams(task: type, across: tuple) -> Any:
     """Return the rows that join images of nodes in periodic directions."""
-    further = tuple(NodeTask(kind, make=make) for kind, make in across.items())
+    further = tuple(NodeTask(kind, make=sheared.at_images(kind)) for kind in across)
 
     def rows(s):
         ranks = s.control.ranks
@@ -482,10 +482,7 @@ def sort_in_time(s: Setup) -> tuple:
 
 JOIN_MEANS, JOIN_STRESSES = seams(JoinMean, {}), seams(JoinMeanStress, {})
 SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
-SEAM_AGAIN = SceneTask(
-    seams(JoinVelocity, sheared.OF_VELOCITY),
-    "momentum of nodes a period apart",
-)
+SEAM_AGAIN = SceneTask(seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of nodes a period apart")
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
 FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
 LOSS = SceneTask(

@@ -145,21 +145,12 @@ class SpreadVelocity(NamedTuple):
             _spread(task.images, nodes, nodes.velocity, n, 0)
 
 
-def fold_sums(s):
-    return FoldSums(images_of(s))
+def at_images(task):
+    def make(s):
+        return task(images_of(s))
+
+    return make
 
 
-def spread_sums(s):
-    return SpreadSums(images_of(s))
-
-
-def fold_velocity(s):
-    return FoldVelocity(images_of(s))
-
-
-def spread_velocity(s):
-    return SpreadVelocity(images_of(s))
-
-
-OF_SUMS = {FoldSums: fold_sums, SpreadSums: spread_sums}
-OF_VELOCITY = {FoldVelocity: fold_velocity, SpreadVelocity: spread_velocity}
+OF_SUMS = FoldSums, SpreadSums
+OF_VELOCITY = FoldVelocity, SpreadVelocity

@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.compiler import any_lane, implements, round_off, shared, where
 from karamelo_py.compiler.powers import logarithm_near_one as log
 from karamelo_py.compiler.slopes import Dual, value_of
-from karamelo_py.language.arguments import Argument, look_up
+from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import (
@@ -40,7 +40,7 @@ from karamelo_py.points.laws.orthotropic import (
     warn_of_axes,
 )
 from karamelo_py.points.laws.orthotropic import axes as rotation
-from karamelo_py.points.laws.parameters import ByName
+from karamelo_py.points.laws.parameters import ByName, MaterialArgument
 from karamelo_py.points.laws.strengths import initial_memory
 from karamelo_py.points.laws.strengths.hardening import (
     LinearHardening,
@@ -55,21 +55,13 @@ COUPLED = 1e-9  # relative out-of-plane part that counts as none
 FACTORS = np.array([1.0, 1.0, 1.0, sqrt(2), sqrt(2), sqrt(2)])  # Mandel's notation
 
 
-class ElasticBase:
-    """Script argument: the elastic law of a solid with a yield surface."""
-
-    script_kind: ClassVar[str] = "the ID of a material linear, orthotropic or transverse"
+class ElasticBase(MaterialArgument):
+    script_kind = "the ID of a material linear, orthotropic or transverse"
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        material = look_up(hub.materials, argument)
-        if not isinstance(material.whole, LinearElastic | Directional):
-            raise ScriptError(
-                f"material '{material.id}' has no constant stiffness",
-                mark=argument.mark,
-                expected=cls.script_kind,
-            )
-        return material
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        fits = isinstance(law, LinearElastic | Directional)
+        return None if fits else ("has no constant stiffness", cls.script_kind)
 
 
 class Ratios:

@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 
 from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import exponential, power
-from karamelo_py.language.arguments import Argument
-from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, Space, dev, tensor
 from karamelo_py.points.laws import LawTraits
@@ -24,13 +22,11 @@ class HyperelasticMaterial(ElasticMaterial):
     order = "material(ID, mullins, ...) of the material without viscosity, then viscosity"
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        material = super().from_script(hub, argument)
-        if not laws.can(material.whole, laws.deformation):
-            message = f"material '{material.id}' has no energy that could soften"
-            expected = "a material such as neo-hookean, yeoh, ogden or hyperelastic"
-            raise ScriptError(message, mark=argument.mark, expected=expected)
-        return material
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        if (refusal := super().refusal(law)) or laws.can(law, laws.deformation):
+            return refusal
+        others = "a material such as neo-hookean, yeoh, ogden or hyperelastic"
+        return "has no energy that could soften", others
 
 
 class Mullins(NamedTuple):

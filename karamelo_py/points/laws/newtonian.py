@@ -1,38 +1,28 @@
 """Viscosity newtonian: a viscous stress added to a solid law."""
 
 from math import inf
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
-from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, LargeIncrement, dev, inner, inv, nothing, sym, tr
 from karamelo_py.points.laws import law_parts, law_traits
-from karamelo_py.points.laws.parameters import FromZero
+from karamelo_py.points.laws.parameters import FromZero, MaterialArgument
 from karamelo_py.points.laws.strengths.linear import Viscous
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.points.laws.viscosity import damped, inviscid
-from karamelo_py.script.errors import ScriptError
 
 
-class SolidMaterial:
-    script_kind: ClassVar[str] = "the ID of a material"
-
+class SolidMaterial(MaterialArgument):
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        material = look_up(hub.materials, argument)
-        parts = [*law_parts(material.whole)]
-        reason, expected = "", "a material that deforms"
-        if laws.is_rigid(material.whole):
-            reason = "is rigid"
-        elif any(isinstance(one, Newtonian) for one in parts):
-            reason, expected = "has this viscosity already", "one viscosity(newtonian, ...)"
-        elif any(isinstance(one, Viscous) or law_traits(one).any_speed for one in parts):
-            reason, expected = "is a fluid", "its viscosity in strength(ID, fluid, mu)"
-        if reason:
-            message = f"material '{material.id}' {reason}"
-            raise ScriptError(message, mark=argument.mark, expected=expected)
-        return material
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        parts = [*law_parts(law)]
+        if laws.is_rigid(law):
+            return "is rigid", "a material that deforms"
+        if any(isinstance(one, Newtonian) for one in parts):
+            return "has this viscosity already", "one viscosity(newtonian, ...)"
+        if any(isinstance(one, Viscous) or law_traits(one).any_speed for one in parts):
+            return "is a fluid", "its viscosity in strength(ID, fluid, mu)"
+        return None
 
 
 class Newtonian(NamedTuple):

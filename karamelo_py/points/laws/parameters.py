@@ -1,9 +1,11 @@
 """Checks and conversions of parameters."""
 
 from dataclasses import dataclass
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
+from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure
+from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import ByName as ByName
 from karamelo_py.language.signature import Keyword, NonNegative, Positive
 from karamelo_py.script.errors import ScriptError
@@ -12,6 +14,25 @@ AboveZero = Annotated[float, Positive]
 FromZero = Annotated[float, NonNegative]
 Type = TypeVar("Type")
 Temperature = Annotated[Type, Keyword("T")]  # of a field initial_temperature
+
+
+class MaterialArgument:
+    """Script argument: the ID of a material that fits."""
+
+    script_kind: ClassVar[str] = "the ID of a material"
+
+    @classmethod
+    def from_script(cls, hub: Scene, argument: Argument) -> Any:
+        material = look_up(hub.materials, argument)
+        if refusal := cls.refusal(material.whole):
+            message = f"material '{material.id}' {refusal[0]}"
+            raise ScriptError(message, mark=argument.mark, expected=refusal[1])
+        return material
+
+    @classmethod
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        """Return what is wrong with a law, and what is expected instead."""
+
 
 LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff
 

@@ -1,35 +1,25 @@
 """Material tsai-hill: failure of laminae and wood."""
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from karamelo_py.compiler import where
-from karamelo_py.language.arguments import Argument, look_up
-from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import I, total
 from karamelo_py.points.laws.elastic import OfDeformation
 from karamelo_py.points.laws.elastic import State as Deformed
 from karamelo_py.points.laws.oriented import with_axes_of, without_axes
 from karamelo_py.points.laws.orthotropic import Directional, axes, stress_of
-from karamelo_py.points.laws.parameters import AboveZero, ByName
+from karamelo_py.points.laws.parameters import AboveZero, ByName, MaterialArgument
 from karamelo_py.script.errors import ScriptError
 
 
-class DirectionalBase:
-    """Script argument: the elastic law of a solid that fails with directions."""
-
-    script_kind: ClassVar[str] = "the ID of a material orthotropic or transverse"
+class DirectionalBase(MaterialArgument):
+    script_kind = "the ID of a material orthotropic or transverse"
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        material = look_up(hub.materials, argument)
-        if not isinstance(without_axes(material.whole), Directional):
-            raise ScriptError(
-                f"material '{material.id}' has no directions",
-                mark=argument.mark,
-                expected=cls.script_kind,
-            )
-        return material
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        fits = isinstance(without_axes(law), Directional)
+        return None if fits else ("has no directions", cls.script_kind)
 
 
 class TsaiHill(NamedTuple):

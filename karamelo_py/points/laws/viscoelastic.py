@@ -8,7 +8,7 @@ import numpy as np
 from karamelo_py.compiler import round_off, where
 from karamelo_py.compiler.powers import exponential
 from karamelo_py.language import registry
-from karamelo_py.language.arguments import Argument, look_up
+from karamelo_py.language.arguments import Argument
 from karamelo_py.language.rules import known_failure
 from karamelo_py.language.scene import Scene
 from karamelo_py.points import laws
@@ -26,6 +26,7 @@ from karamelo_py.points.kinematics import (
     tr,
 )  # fmt: skip
 from karamelo_py.points.laws import Absent, LawTraits, law_parts, law_traits
+from karamelo_py.points.laws.parameters import MaterialArgument
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError, plural
 
@@ -34,26 +35,20 @@ LEAST = 0.01  # least stiffness, over that at rest, of a strain that counts
 SMALL = 0.01  # step over relaxation time below which a series is exact
 
 
-class ElasticMaterial:
-    script_kind: ClassVar[str] = "the ID of an elastic material"
+class ElasticMaterial(MaterialArgument):
+    script_kind = "the ID of an elastic material"
     purpose: ClassVar[str] = "relax"
     order: ClassVar[str] = "one viscosity(prony, ...), before viscosity(newtonian, ...)"
 
     @classmethod
-    def from_script(cls, hub: Scene, argument: Argument) -> Any:
-        material = look_up(hub.materials, argument)
-        named = [registry.name_of("viscosity", type(one)) for one in law_parts(material.whole)]
+    def refusal(cls, law: Any) -> tuple[str, str] | None:
+        named = [registry.name_of("viscosity", type(one)) for one in law_parts(law)]
         if viscous := [name for name in named if registry.knows("viscosity", name)]:
-            message = f"material '{material.id}' has viscosity {viscous[0]} already"
-            raise ScriptError(message, mark=argument.mark, expected=cls.order)
-        if not law_traits(material.whole).rebounds or not is_isotropic(material.whole):
-            raise ScriptError(
-                f"material '{material.id}' is no isotropic elastic solid, whose stress could "
-                f"{cls.purpose}",
-                mark=argument.mark,
-                expected="a material such as neo-hookean, ogden, hyperelastic, hencky or linear",
-            )
-        return material
+            return f"has viscosity {viscous[0]} already", cls.order
+        if law_traits(law).rebounds and is_isotropic(law):
+            return None
+        others = "a material such as neo-hookean, ogden, hyperelastic, hencky or linear"
+        return f"is no isotropic elastic solid, whose stress could {cls.purpose}", others
 
 
 def strained(law: Any, component: int) -> Any:
