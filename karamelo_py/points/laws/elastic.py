@@ -19,6 +19,23 @@ class ElasticLaw(NamedTuple):
 
 
 class IsotropicConstants(NamedTuple):
+    """Base of the constants of isotropic elastic laws.
+
+    Parameters
+    ----------
+    rho
+        Density before deformation.
+    E
+        Young's modulus at small strain.
+    nu
+        Poisson's ratio at small strain, above -1 and below 0.5.
+    cp, kappa
+        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
+        the solid's.
+    alpha
+        Coefficient of linear expansion.
+    """
+
     law = ElasticLaw
 
     rho: AboveZero

@@ -15,20 +15,6 @@ class Hencky(Hyperelastic):
 class HenckyConstants(IsotropicConstants):
     """Elastic solid with stress linear in logarithmic strain, for any strain and rotation.
 
-    Parameters
-    ----------
-    rho
-        Density before deformation.
-    E
-        Young's modulus.
-    nu
-        Poisson's ratio, above -1 and below 0.5.
-    cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
-        the solid's.
-    alpha
-        Coefficient of linear expansion.
-
     Example
     -------
     material(rubber, hencky, 1000, 1e6, 0.3)

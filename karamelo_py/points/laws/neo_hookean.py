@@ -16,20 +16,6 @@ class NeoHookean(Hyperelastic):
 class NeoHookeanConstants(IsotropicConstants):
     """Compressible neo-Hookean solid, valid for any strain and rotation.
 
-    Parameters
-    ----------
-    rho
-        Density before deformation.
-    E
-        Young's modulus at small strain.
-    nu
-        Poisson's ratio at small strain, above -1 and below 0.5.
-    cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
-        the solid's.
-    alpha
-        Coefficient of linear expansion.
-
     Example
     -------
     material(rubber, neo-hookean, 1000, 1e6, 0.3)
