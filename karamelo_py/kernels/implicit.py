@@ -272,39 +272,6 @@ def keep_stress(matter, stress):
 # Each node sums over its points in order; nodes are divided among threads.
 
 
-@kernel
-def list_points(seen):
-    starts, entries = seen.starts, seen.entries
-    m, count, width = starts.size - 1, seen.nodes.shape[0], seen.nodes.shape[1]
-    for p in range(count):
-        for k in range(seen.count[p]):
-            starts[seen.nodes[p, k] + 1] += 1
-    for a in range(m):
-        starts[a + 1] += starts[a]
-    for p in range(count):
-        for k in range(seen.count[p]):
-            node = seen.nodes[p, k]
-            entries[starts[node]] = p * width + k
-            starts[node] += 1
-    for a in range(m, 0, -1):
-        starts[a] = starts[a - 1]
-    starts[0] = 0
-
-
-@kernel
-def spread(seen, places):
-    """Return the largest distance, along an axis, between nodes (at `places`) of a stencil."""
-    most = 0
-    for p in range(seen.nodes.shape[0]):
-        for i in range(places.shape[1]):
-            low = high = places[seen.nodes[p, 0], i]
-            for k in range(1, seen.nodes.shape[1]):
-                at = places[seen.nodes[p, k], i]
-                low, high = min(low, at), max(high, at)
-            most = max(most, high - low)
-    return most
-
-
 @by_threads
 def mark_pairs(seen, pairs, chunk):
     seen, pairs = at_hand(seen), at_hand(pairs)
@@ -400,16 +367,6 @@ def add_conductance(kin, seen, conductance, pairs, C):
                 h = gradient_at(kin, seen, p, other).planar()
                 along = total([x * y for x, y in zip(g, h, strict=True)])
                 C[row_of(pairs, a, seen.nodes[p, other])] += conductance[0, p] * along
-
-
-@kernel
-def scatter(seen, mass, values, nodes):
-    """Add mass times point values (d, n) to nodes (m, d)."""
-    for p in range(seen.nodes.shape[0]):
-        for k in range(seen.count[p]):
-            share = mass[p] * seen.weights[p, k]
-            for i in range(nodes.shape[1]):
-                nodes[seen.nodes[p, k], i] += share * values[i, p]
 
 
 @kernel

@@ -154,28 +154,6 @@ def bring_mean(kin, response, averages, chunk):
 
 
 @by_threads
-def sum_at_nodes(seen, values, sums, chunk):
-    seen = at_hand(seen)
-    m, width = sums.size, seen.nodes.shape[1]
-    for a in range(m * chunk // PARTS, m * (chunk + 1) // PARTS):
-        for e in range(seen.starts[a], seen.starts[a + 1]):
-            p, k = seen.entries[e] // width, seen.entries[e] % width
-            sums[a] += seen.weights[p, k] * values[0, p]
-
-
-@by_threads
-def average(seen, nodes, values, chunk):
-    """Fill ``values`` (1, n) with point averages of nodal values (m,)."""
-    seen = at_hand(seen)
-    count = seen.nodes.shape[0]
-    for p in range(points_of(count, chunk), points_of(count, chunk + 1)):
-        sum_of = 0.0
-        for k in range(seen.count[p]):
-            sum_of += seen.weights[p, k] * nodes[seen.nodes[p, k]]
-        values[0, p] = sum_of
-
-
-@by_threads
 def add_slopes(kin, seen, tensors, blocks, chunk):
     """Add N_a T grad N_b of point tensors T (t, n) to pairs of nodes, d numbers each."""
     seen, (pairs, out) = at_hand(seen), at_hand(blocks)

@@ -480,7 +480,7 @@ def sort_in_time(s: Setup) -> tuple:
     return (Once(ask_to_sort),) if isinstance(s.control.ranks, Seam) else ()
 
 
-JOIN_MEANS, JOIN_STRESSES = seams(JoinMean, {}), seams(JoinMeanStress, {})
+JOIN_MEANS, JOIN_STRESSES = seams(JoinMean, ()), seams(JoinMeanStress, ())
 SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
 SEAM_AGAIN = SceneTask(seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of nodes a period apart")
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")

@@ -57,11 +57,15 @@ def inside(grid, kin, x):
     return within
 
 
-def node_position(grid, n):
+def node_places(grid, n):
+    """Return the indices of node `n` in its grid."""
     local = n - grid.first
-    x = grid.x0 + (local // grid.step_x) * grid.spacing
-    y = grid.y0 + (local % grid.step_x // grid.step_y) * grid.spacing
-    return x, y, grid.z0 + (local % grid.step_y) * grid.spacing
+    return local // grid.step_x, local % grid.step_x // grid.step_y, local % grid.step_y
+
+
+def node_position(grid, n):
+    i, j, k = node_places(grid, n)
+    return grid.x0 + i * grid.spacing, grid.y0 + j * grid.spacing, grid.z0 + k * grid.spacing
 
 
 class Bounces(Field):

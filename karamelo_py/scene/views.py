@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from karamelo_py.compiler.fields import Field, field, name_of
+from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations.heat import Supply, Temperature
 from karamelo_py.kernels.equations.internal_force import Force
@@ -33,6 +34,7 @@ from karamelo_py.output.point_table import (
     declared_columns,
     places_before,
 )
+from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws import can, elastic_law, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
 from karamelo_py.script.errors import Mark, NoItem, ScriptError, nearest
@@ -207,13 +209,8 @@ class NodesView(View):
     @Shown
     def position(self) -> np.ndarray:
         """Positions (n, 3); read only."""
-        grids = self._grids
-        g = np.searchsorted(grids.first, self.index, side="right") - 1
-        local = self.index - grids.first[g]
-        step_x, step_y = grids.step_x[g], grids.step_y[g]
-        places = np.stack([local // step_x, local % step_x // step_y, local % step_y], axis=1)
-        corners = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], axis=1)
-        return corners + places * grids.spacing[g][:, None]
+        g = np.searchsorted(self._grids.first, self.index, side="right") - 1
+        return np.stack(node_position(record(self._grids, g), self.index), axis=1)
 
     @Shown
     def mass(self) -> np.ndarray:

@@ -33,9 +33,7 @@ class Line(NamedTuple):
     per = ""  # unit of forces, masses and energies
     hoops = 0  # directions around an axis or centre, x being the distance
     dimension = 1
-    tensor_size = 1
     tensor_names = ("11",)
-    symmetric_names = ("11", "22", "33")
 
 
 class PlaneStrain(NamedTuple):
@@ -43,9 +41,7 @@ class PlaneStrain(NamedTuple):
     per = " per thickness"
     hoops = 0
     dimension = 2
-    tensor_size = 4
     tensor_names = ("11", "12", "21", "22")
-    symmetric_names = ("11", "22", "33", "12")
 
 
 class Axisymmetric(NamedTuple):
@@ -55,9 +51,7 @@ class Axisymmetric(NamedTuple):
     per = " per radian"
     hoops = 1
     dimension = 2
-    tensor_size = 5
     tensor_names = ("11", "12", "21", "22", "33")
-    symmetric_names = ("11", "22", "33", "12")
 
 
 class Cylindrical(NamedTuple):
@@ -67,9 +61,7 @@ class Cylindrical(NamedTuple):
     per = " per radian and length"
     hoops = 1
     dimension = 1
-    tensor_size = 2
     tensor_names = ("11", "22")
-    symmetric_names = ("11", "22", "33")
 
 
 class Spherical(NamedTuple):
@@ -77,9 +69,7 @@ class Spherical(NamedTuple):
     per = " per steradian"
     hoops = 2
     dimension = 1
-    tensor_size = 3
     tensor_names = ("11", "22", "33")
-    symmetric_names = ("11", "22", "33")
 
 
 class Space(NamedTuple):
@@ -87,9 +77,7 @@ class Space(NamedTuple):
     per = ""
     hoops = 0
     dimension = 3
-    tensor_size = 9
     tensor_names = ("11", "12", "13", "21", "22", "23", "31", "32", "33")
-    symmetric_names = ("11", "22", "33", "12", "13", "23")
 
 
 TAGS = (Line, PlaneStrain, Axisymmetric, Cylindrical, Spherical, Space)
@@ -492,8 +480,11 @@ def set_rows(one: type, whole: type) -> None:
 
 
 _WORDS = str.maketrans("123", "xyz")
+_SYMMETRIC = ("11", "22", "33", "12", "13", "23")
 for _tag in TAGS:
     _tag.plane = KINEMATICS[_tag.dimension]()
+    _tag.tensor_size = len(_tag.tensor_names)
+    _tag.symmetric_names = _SYMMETRIC[: {1: 3, 2: 4, 3: 6}[_tag.dimension]]
     _tag.Symmetric = tensor_class(SymmetricTensor, _tag, _tag.symmetric_names)
     _tag.Tensor = tensor_class(Tensor, _tag, _tag.tensor_names)
     _tag.Tensor.symmetric = _tag.Symmetric

@@ -25,7 +25,7 @@ class Twisted(Axisymmetric):
     word = "axisymmetric with twist"
     tensor_size = 9
     tensor_names = ("11", "12", "21", "22", "33", "31", "32", "13", "23")
-    symmetric_names = Space.symmetric_names
+    symmetric_names = ("11", "22", "33", "12", "13", "23")
 
 
 @algebra

@@ -26,10 +26,15 @@ class AveragedVolumes:
         )
 
     def _sums(self, name: str) -> np.ndarray:
-        sums = np.zeros(len(self.equations.nodes))
-        for _, seen, _, averages in self._parts():
-            loops.sum_at_nodes(self.mode, PARTS, seen, getattr(averages, name), sums)
-        return sums
+        rows = [getattr(averages, name)[0] for averages in self.averages]
+        return self.equations.weights.T @ np.concatenate(rows)
+
+    def _average(self, nodes: np.ndarray, name: str) -> None:
+        """Fill a row of `Averages` with point averages of nodal values (m,)."""
+        rows, begin = self.equations.weights @ nodes, 0
+        for averages in self.averages:
+            row = getattr(averages, name)[0]
+            row[:] = rows[begin : (begin := begin + len(row))]
 
     def _grow(self) -> None:
         for matter, _, response, averages in self._parts():
@@ -39,9 +44,8 @@ class AveragedVolumes:
 
     def respond(self, dt: float) -> None:
         self._grow()
-        ratios = self._sums("grown") / self.volume
-        for matter, seen, response, averages in self._parts():
-            loops.average(self.mode, PARTS, seen, ratios, averages.ratio)
+        self._average(self._sums("grown") / self.volume, "ratio")
+        for matter, _, response, averages in self._parts():
             loops.respond_averaged(self.mode, PARTS, matter, dt, response, averages)
         self._bring_mean()
 
@@ -52,9 +56,8 @@ class AveragedVolumes:
         self._bring_mean()
 
     def _bring_mean(self) -> None:
-        means = self._sums("pressure") / self.volume
-        for _, seen, response, averages in self._parts():
-            loops.average(self.mode, PARTS, seen, means, averages.mean)
+        self._average(self._sums("pressure") / self.volume, "mean")
+        for _, _, response, averages in self._parts():
             loops.bring_mean(self.mode, PARTS, self.equations.s.kin, response, averages)
 
     def _matrix(self, name: str) -> sp.csr_matrix:

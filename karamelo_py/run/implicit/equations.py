@@ -1,6 +1,6 @@
 """Equations of an implicit step: unknowns, sparse matrix, ghost stabilisation."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from karamelo_py.kernels.arrays import MASS, Block, Matter, OnGrids, Setup, Tag,
 from karamelo_py.kernels.equations.fbar import FBar
 from karamelo_py.kernels.equations.heat import Conductance
 from karamelo_py.kernels.equations.twist import RadiusAfterMove
+from karamelo_py.points.grid import node_places, node_position
 from karamelo_py.points.kinematics import free_from
 from karamelo_py.points.laws import can, constrained_velocity, initial_state, specific_volume
 from karamelo_py.run.implicit.averaging import AveragedVolumes
@@ -31,6 +32,29 @@ FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "di
 
 def valid(seen: loops.Seen) -> np.ndarray:
     return np.arange(seen.nodes.shape[1]) < seen.count[:, None]
+
+
+def interpolation(seen: Iterable[loops.Seen], nodes: int) -> sp.csr_matrix:
+    """Weights (n, nodes) of the nodes at all points of some blocks."""
+    counts, weights, numbers = [np.zeros(1, np.int32)], [np.zeros(0)], [np.zeros(0, np.int32)]
+    for one in seen:
+        some = valid(one)
+        counts.append(one.count)
+        weights.append(one.weights[some])
+        numbers.append(one.nodes[some])
+    starts = np.cumsum(np.concatenate(counts))
+    data = np.concatenate(weights), np.concatenate(numbers), starts
+    return sp.csr_matrix(data, (len(starts) - 1, nodes))
+
+
+def summed(
+    weights: sp.csr_matrix, blocks: Sequence[Block], values: Iterable[np.ndarray]
+) -> np.ndarray:
+    """Nodal sums (m, k) of mass times values (k, n) of the points of each block."""
+    if not blocks:
+        return np.zeros((weights.shape[1], 1))
+    mass = sp.diags(np.concatenate([block.points.mass for block in blocks]))
+    return (mass @ weights).T @ np.concatenate([*values], axis=1).T
 
 
 def distinct(numbers: list[np.ndarray]) -> np.ndarray:
@@ -77,7 +101,10 @@ class Equations:
         self.numbers = np.full(np.ptp(self.nodes) + 1, -1)
         self.numbers[self.nodes - self.nodes[0]] = np.arange(len(self.nodes))
         self.mass = s.nodes.sums[self.nodes, MASS].astype(float)
-        self.places = self._places()
+        self.grid = np.searchsorted(s.grids.first, self.nodes, side="right") - 1
+        self.steps = self._steps(self.grid)
+        self.grids_of_nodes = record(s.grids, self.grid)
+        self.places = np.stack(node_places(self.grids_of_nodes, self.nodes), 1)[:, : self.d]
         self.parts = [(self._numbered(seen), response) for seen, response in self.parts]
         tools = [(block, self._numbered(seen)) for block, seen in tools]
         self.deforming = np.isin(self.nodes, soft)
@@ -95,13 +122,6 @@ class Equations:
     def cached(self) -> dict[str, np.ndarray]:
         return {name: vars(self)[name] for name in (*FOLLOWED, *FOLLOWING) if name in vars(self)}
 
-    def _places(self) -> np.ndarray:
-        grids = self.s.grids
-        self.grid = g = np.searchsorted(grids.first, self.nodes, side="right") - 1
-        self.steps = self._steps(g)
-        local, x, y = self.nodes - grids.first[g], grids.step_x[g], grids.step_y[g]
-        return np.stack([local // x, local % x // y, local % y], 1)[:, : self.d]
-
     def _steps(self, g: np.ndarray) -> np.ndarray:
         x, y = self.s.grids.step_x[g], self.s.grids.step_y[g]
         return np.stack([x, y, np.ones_like(x)], 1)[:, : self.d]
@@ -117,10 +137,10 @@ class Equations:
         return seen, response
 
     def _led(self, tools: list[tuple[Block, loops.Seen]]) -> tuple[np.ndarray, np.ndarray]:
-        mass, momentum = np.zeros((len(self.nodes), 1)), np.zeros((len(self.nodes), self.per_node))
-        for block, seen in tools:
-            loops.scatter(seen, block.points.mass, np.ones((1, len(seen.nodes))), mass)
-            loops.scatter(seen, block.points.mass, block.points.v, momentum)
+        momentum = np.zeros((len(self.nodes), self.per_node))
+        blocks, weights = [b for b, _ in tools], interpolation((x for _, x in tools), len(momentum))
+        mass = summed(weights, blocks, (np.ones((1, b.points.mass.size)) for b in blocks))
+        momentum[:, : self.d] = summed(weights, blocks, (block.points.v for block in blocks))
         led = mass[:, 0] > 0
         return led, np.divide(momentum, mass, out=momentum, where=led[:, None])
 
@@ -130,15 +150,18 @@ class Equations:
         in_use = valid(seen)[:, :most] & (number >= 0)
         first = number[np.arange(len(number)), in_use.argmax(1)]
         small = np.int32 if number.size < 2**31 else np.int64
-        seen = seen._replace(
-            nodes=np.where(in_use, number, first[:, None]).astype(np.int32),
+        nodes = np.where(in_use, number, first[:, None]).astype(np.int32)
+        entries = np.flatnonzero(valid(seen)[:, :most]).astype(small)
+        starts = np.append(0, np.cumsum(seen.count))
+        by_point = entries, nodes.ravel()[entries], starts
+        by_node = sp.csr_matrix(by_point, (len(nodes), len(self.nodes))).tocsc()
+        return seen._replace(
+            nodes=nodes,
             weights=seen.weights[:, :most].copy(),
             gradients=seen.gradients[:, :most].copy(),
-            starts=np.zeros(len(self.nodes) + 1, np.int64),
-            entries=np.zeros(int(seen.count.sum()), small),
+            starts=by_node.indptr.astype(np.int64),
+            entries=by_node.data,
         )
-        loops.list_points(seen)
-        return seen
 
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
@@ -146,7 +169,8 @@ class Equations:
         Pairs of the ghost stabilisation, and of each node with itself, are included.
         """
         d, k, m = self.d, self.per_node, len(self.nodes)
-        reach = max((loops.spread(seen, self.places) for seen, _ in self.parts), default=0)
+        ways = (x[seen.nodes] for x in self.places.T for seen, _ in self.parts)
+        reach = max((int(np.ptp(way, axis=1).max(initial=0)) for way in ways), default=0)
         row = 2 * reach + 1
         weights = row ** np.arange(d)[::-1]
         rank = np.full((m, row**d), -1, np.int32)
@@ -242,10 +266,13 @@ class Equations:
         return mask, values
 
     @cached_property
+    def weights(self) -> sp.csr_matrix:
+        """Weights (n, m) of the nodes at the points of all blocks."""
+        return interpolation((seen for seen, _ in self.parts), len(self.nodes))
+
+    @cached_property
     def positions(self) -> np.ndarray:
-        grids, g = self.s.grids, self.grid
-        origin = np.stack([grids.x0[g], grids.y0[g], grids.z0[g]], 1)[:, : self.d]
-        return origin + grids.spacing[g][:, None] * self.places
+        return np.stack(node_position(self.grids_of_nodes, self.nodes), 1)[:, : self.d]
 
     @cached_property
     def rigid_motions(self) -> np.ndarray:
@@ -338,12 +365,10 @@ class Equations:
         lines, size, D = self.differences
         weights = size**self.d
         if not moduli.alike():
-            sums = np.zeros((len(self.nodes), 2))
-            for block, (seen, _), of_laws in zip(
-                self.blocks, self.parts, moduli.of_laws, strict=True
-            ):
-                young, volume = of_laws[:, block.points.material]
-                loops.scatter(seen, block.points.mass, np.stack([volume * young, volume]), sums)
+            tables = zip(self.blocks, moduli.of_laws, strict=True)
+            rows = (table[:, block.points.material] for block, table in tables)
+            values = (np.stack([volume * young, volume]) for young, volume in rows)
+            sums = summed(self.weights, self.blocks, values)
             none = np.full(len(sums), np.inf)
             means = np.divide(sums[:, 0], sums[:, 1], out=none, where=sums[:, 1] > 0)
             least = means[lines].min(1, initial=np.inf)

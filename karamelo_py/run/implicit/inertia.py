@@ -5,10 +5,10 @@ import numpy as np
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import Tag
 from karamelo_py.kernels.equations.twist import VelocityAround
-from karamelo_py.kernels.implicit import gather, scatter
+from karamelo_py.kernels.implicit import gather
 from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.implicit.contact import Contact
-from karamelo_py.run.implicit.equations import Equations
+from karamelo_py.run.implicit.equations import Equations, summed
 from karamelo_py.schemes.newmark import Surplus
 
 
@@ -78,10 +78,7 @@ class Motion:
 
     def _means(self, values: list[np.ndarray]) -> np.ndarray:
         equations = self.equations
-        total = np.zeros((len(equations.nodes), equations.d))
-        for block, (seen, _), terms in zip(equations.blocks, equations.parts, values, strict=True):
-            scatter(seen, block.points.mass, terms, total)
-        return total * self.inverse
+        return summed(equations.weights, equations.blocks, values) * self.inverse
 
     def acceleration(self, u: np.ndarray) -> np.ndarray:
         free = (u - self.dt * self.v) / (self.beta * self.dt**2) - self.rest * self.a

@@ -29,7 +29,7 @@ from karamelo_py.kernels.pore_water import AT_WATER
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import Saturated, State, drag_per_volume, porosity
-from karamelo_py.run.implicit.equations import Equations, valid
+from karamelo_py.run.implicit.equations import Equations, interpolation, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
@@ -108,16 +108,11 @@ class Seepage:
         self.compliance = np.maximum(0, 3 / M - 12 * self.mobility * self.dt / (h * h))
 
     def _read_stencils(self) -> None:
-        pieces = [(seen, valid(seen)) for _, seen in self.wet]
-        self.starts = np.cumsum(np.concatenate([[0], *(seen.count for seen, _ in pieces)]))
-        self.of = np.concatenate([seen.nodes[some] for seen, some in pieces])
-        slopes = [seen.gradients[some][:, : self.d] for seen, some in pieces]
+        self.N = interpolation((seen for _, seen in self.wet), self.m)
+        self.of, self.starts = self.N.indices, self.N.indptr
+        slopes = [seen.gradients[valid(seen)][:, : self.d] for _, seen in self.wet]
         self.slopes = np.concatenate(slopes)
-        self.N = self._of_nodes(np.concatenate([seen.weights[some] for seen, some in pieces]))
-        self.G = [self._of_nodes(g) for g in self.slopes.T]
-
-    def _of_nodes(self, data: np.ndarray) -> sp.csr_matrix:
-        return sp.csr_matrix((data, self.of, self.starts), (len(self.starts) - 1, self.m))
+        self.G = [sp.csr_matrix((g, self.of, self.starts), self.N.shape) for g in self.slopes.T]
 
     def _lay_out_flow(self) -> None:
         cells = np.concatenate([_cells(self.equations, block) for block, _ in self.wet])
