@@ -184,7 +184,9 @@ class NodeGroup(AnyGroup):
     def refuse_past_domain(self) -> None:
         """Refuse a group of nodes meant as a wall at an upper edge but outside the domain."""
         domain, method = self.hub.domain, self.hub.update.method
-        if self.all or method is None or method.own_grids or not len(self.nodes):
+        if domain.h is None or self.all or method is None or method.own_grids:
+            return
+        if not len(self.nodes):
             return
         lattice = self.hub.lattices[0]
         first = lattice.first + (self.nodes - lattice.first) % lattice.node_count

@@ -33,6 +33,7 @@ from karamelo_py.script.values import SUFFIXES
 __all__ = [
     "Compute",
     "Fix",
+    "InitialFix",
     "NodesView",
     "PointsView",
     "heat_hook",
@@ -213,6 +214,14 @@ class Fix(Publisher):
                 view.write_back()
 
         return call
+
+
+class InitialFix(Fix):
+    """Base of fixes that set something of each point or node once, in the next step."""
+
+    published = ()
+    first_step_only = True
+    point_by_point = True
 
 
 AROUND = (

@@ -32,8 +32,7 @@ class Support(Field):
 def absorb(mass, v, force, normal, support, values, dt):
     """Apply dashpots rho c A; only the component of `normal` (rho A) along the axis is used."""
     axis, along, across = values
-    chosen = [where(axis == k, abs(area), 0) for k, area in enumerate(normal)]
-    weight = chosen[0] if len(chosen) == 1 else total(chosen)
+    weight = along_axis(normal, axis)
     made = type(v)
     balance = made(*[where(a == a, a, -now) for a, now in zip(support, force, strict=True)])
     left = force + balance
@@ -41,6 +40,10 @@ def absorb(mass, v, force, normal, support, values, dt):
     damped = [dashpot(rates[k], mass, v[k], left[k], dt) for k in range(len(v))]
     reaction = balance + made(*damped)
     return force + reaction, balance, reaction
+
+
+def along_axis(normal, axis):
+    return total([where(axis == k, abs(area), 0) for k, area in enumerate(normal)])
 
 
 def dashpot(rate, mass, v, force, dt):

@@ -6,7 +6,7 @@ from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView
+from karamelo_py.scene.modify import InitialFix, PointsView
 
 
 class EarlierDisplacement(Field):
@@ -20,7 +20,7 @@ class EarlierDisplacement(Field):
         return table.position - table.reference_position - values
 
 
-class Displacement(Fix):
+class Displacement(InitialFix):
     """Measure displacements from the positions at the next step, such as the state under gravity.
 
     Example
@@ -38,10 +38,7 @@ class Displacement(Fix):
     fix geostatic_stress, deactivate, compute probe
     """
 
-    published = ()
     point_fields = (EarlierDisplacement,)
-    first_step_only = True
-    point_by_point = True
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)

@@ -25,7 +25,8 @@ from karamelo_py.points.laws import (
 from karamelo_py.points.laws.eos import ignited
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import LAST, Fix, PointsView, node_hook, per_direction, vector_hook
+from karamelo_py.scene.modify import LAST, Fix, InitialFix, node_hook, per_direction, vector_hook
+from karamelo_py.scene.views import PointsView
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression, applied
 from karamelo_py.styles.fixes.formulas import vector
@@ -324,7 +325,7 @@ class LocalDamping(Fix):
 NAMES = ("11", "22", "33", "23", "13", "12")
 
 
-class InitialStress(Fix):
+class InitialStress(InitialFix):
     """Set the Cauchy stress of points once, before the next step.
 
     Parameters
@@ -343,10 +344,6 @@ class InitialStress(Fix):
     and cannot be set. A warning is given for tension that a material cannot sustain, such as soil
     without cohesion.
     """
-
-    published = ()
-    first_step_only = True
-    point_by_point = True
 
     def __init__(
         self, hub: Hub, group: ParticleGroup,
@@ -376,7 +373,7 @@ def refuse_following(hub: Hub, group: ParticleGroup) -> None:
             )
 
 
-class Detonation(Fix):
+class Detonation(InitialFix):
     """Ignite the points of explosives, each at a given time.
 
     Parameters
@@ -399,9 +396,6 @@ class Detonation(Fix):
     eos jwl
     """
 
-    published = ()
-    first_step_only = True
-    point_by_point = True
     ignites = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, t: Expression):

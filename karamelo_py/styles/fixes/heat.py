@@ -96,8 +96,7 @@ class TemperatureNodes(HeatFix):
         self._compare(T)
 
     def defined(self) -> None:
-        if self.hub.domain.h is not None:
-            self.group.refuse_past_domain()
+        self.group.refuse_past_domain()
 
 
 def hold_point(pt):

@@ -9,7 +9,7 @@ from karamelo_py.points.kinematics import total
 from karamelo_py.points.laws.pore_water import Saturated
 from karamelo_py.scene.group import NodeGroup, ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView, vector_hook
+from karamelo_py.scene.modify import Fix, InitialFix, PointsView, vector_hook
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
@@ -73,8 +73,7 @@ class PorePressure(Fix):
         refuse_dry(hub)
 
     def defined(self) -> None:
-        if self.hub.domain.h is not None:
-            self.group.refuse_past_domain()
+        self.group.refuse_past_domain()
 
 
 class SeepageFace(PorePressure):
@@ -163,7 +162,7 @@ class WaterFlux(Fix):
     defined = PorePressure.defined
 
 
-class InitialPorePressure(Fix):
+class InitialPorePressure(InitialFix):
     """Set the pore pressure of points once, before the next step.
 
     Parameters
@@ -184,9 +183,7 @@ class InitialPorePressure(Fix):
     pore_pressure, initial_stress
     """
 
-    published = ()
-    first_step_only = True
-    point_by_point = water_only = True
+    water_only = True
 
     def __init__(self, hub: Hub, group: ParticleGroup, p: Expression):
         super().__init__(hub, group)

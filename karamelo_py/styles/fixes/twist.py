@@ -51,5 +51,4 @@ class AngularVelocityNodes(Fix):
         self.post_update_grid_rotation = node_hook(update, uses_before=True, holds=True)
 
     def defined(self) -> None:
-        if self.hub.domain.h is not None:
-            self.group.refuse_past_domain()
+        self.group.refuse_past_domain()

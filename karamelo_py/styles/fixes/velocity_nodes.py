@@ -9,7 +9,7 @@ from karamelo_py.language.signature import Argument, NonNegative
 from karamelo_py.output.units import FORCE
 from karamelo_py.scene.group import NodeGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Compute, Fix, NodesView, node_hook, per_direction
+from karamelo_py.scene.modify import Compute, Fix, InitialFix, NodesView, node_hook, per_direction
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import AXES, judge_friction, unlike
@@ -207,7 +207,7 @@ class VelocityNodes(Fix):
                 )
 
 
-class InitialVelocityNodes(Fix):
+class InitialVelocityNodes(InitialFix):
     """Set the velocity of nodes once, in the next step.
 
     Parameters
@@ -225,9 +225,6 @@ class InitialVelocityNodes(Fix):
     """
 
     syntax = "group, vx[, vy[, vz]]"
-    published = ()
-    first_step_only = True
-    point_by_point = True
 
     def __init__(self, hub: Hub, group: NodeGroup, *velocity: Expression | None):
         super().__init__(hub, group)

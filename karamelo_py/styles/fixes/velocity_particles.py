@@ -12,7 +12,7 @@ from karamelo_py.output.point_table import places_before
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
-from karamelo_py.scene.modify import Fix, PointsView, per_direction, point_hook
+from karamelo_py.scene.modify import Fix, InitialFix, PointsView, per_direction, point_hook
 from karamelo_py.script.errors import plural
 from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, unlike
@@ -77,7 +77,7 @@ class VelocityParticles(VelocityOfPoints):
     post_advance_particles = point_hook(carry, uses_before=True)
 
 
-class InitialVelocityParticles(VelocityOfPoints):
+class InitialVelocityParticles(InitialFix, VelocityOfPoints):
     """Set the velocity of points once, before the next step.
 
     Parameters
@@ -101,10 +101,6 @@ class InitialVelocityParticles(VelocityOfPoints):
     --------
     initial_velocity_nodes, velocity_particles
     """
-
-    published = ()
-    first_step_only = True
-    point_by_point = True
 
     def initial_integrate(self, points: PointsView) -> None:
         v = points.velocity
