@@ -137,7 +137,7 @@ def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None
         return f"write {name[:3]} directly before a bound, in fix velocity_nodes only", None
     makes = ("", "fix", "compute")
     later = {ID: line for _, kind, ID, line in _ahead(script) if kind in makes}
-    if below := nearest(name, later):
+    if len(name) > 1 and (below := nearest(name, later)):
         return f"did you mean '{below}', defined further down, in line {later[below]}?", None
     return energies.get(name) or f"set it first: {name} = ...", None
 

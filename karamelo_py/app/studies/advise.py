@@ -164,13 +164,14 @@ class Adviser:
     """Finds the cheapest variant whose error is at most `target`.
 
     `along` refines a scene, coarse values first; `accuracy` and `cost` are columns of the table.
+    `width` runs may go at once.
     """
 
     def __init__(
         self, study: Study, along: tuple[str, list[str]], choices: list[ChoiceRuns], *,
-        accuracy: str, cost: str, target: float,
+        accuracy: str, cost: str, target: float, width: int = 1,
     ):  # fmt: skip
-        self.study = study
+        self.study, self.width = study, width
         self.name, self.values = along
         self.xs = [float(value) for value in self.values]
         self.choices = choices
@@ -261,10 +262,11 @@ class Adviser:
                 c for c in self.candidates(hope=True)
                 if c.forecast and c.step > len(c.choice.rows) and c.cost <= limit
             ]  # fmt: skip
-            follow = next((c.choice for c in doubtful), None) or self._risen(limit)
-            if follow is None:
+            follow = [c.choice for c in doubtful[: self.width]]
+            follow = follow or [*filter(None, [self._risen(limit)])]
+            if not follow:
                 return best
-            self.go_on(follow)
+            self.go_on(*follow)
 
     def _doubted(self, limit: float) -> ChoiceRuns | None:
         for choice in self.choices:
@@ -361,7 +363,7 @@ def run(options: Namespace) -> int:
     if len(ordered) > 1:
         ordered = coarse_first(options.script, name, ordered, choices[0].values)
     goal = {"accuracy": items[0].word, "cost": options.cost, "target": options.target}
-    adviser = Adviser(study, (name, ordered), choices, **goal)
+    adviser = Adviser(study, (name, ordered), choices, width=study.place.size, **goal)
     adviser.pilot(options.pilot)
     best = adviser.best()
     tell(adviser)
