@@ -187,18 +187,13 @@ def curves(options: Namespace, table: Table, by: list[str]) -> int:
     out = out_file(options.o or Path("curves.png"), *pictures.SUFFIXES)
     differing = [name for name in by if len({row[name] for row in table.rows}) > 1]
     over = options.x or "Time"
-
-    def read(column: str) -> list[pictures.History]:
-        return pictures.histories(
-            table, differing, over, column, log=options.log, names=names(options.names)
-        )
-
+    settings = {"log": options.log, "names": names(options.names)}
     exact = None
     if options.exact:
-        whole = max(read(options.exact), key=lambda each: len(each.x))
-        exact = whole._replace(label=options.exact)
+        runs = pictures.histories(table, differing, over, options.exact, **settings)
+        exact = max(runs, key=lambda each: len(each.x))._replace(label=options.exact)
     title = table.title if options.title is None else options.title
-    histories = read(options.curve)
+    histories = pictures.histories(table, differing, over, options.curve, **settings)
     labels = along(options, table.label(over), table.label(options.curve))
     pictures.draw_histories(histories, pictures.Sheet(out, *labels, title), exact)
     for each in histories:
