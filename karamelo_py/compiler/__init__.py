@@ -1,4 +1,4 @@
-"""Tracing compiler from Python functions of points, numbers and arrays to kernels on LLVM.
+"""Tracing compiler: from Python functions of points, numbers and arrays to kernels by LLVM.
 
 The folders `trace`, `code` and `disk` are private.
 """

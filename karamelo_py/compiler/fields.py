@@ -65,7 +65,7 @@ def unknowns(kin: Any) -> int:
 
 
 def tensor(kin: Any) -> int:
-    """Count the hoop component too."""
+    """Return the number of components, including hoop components."""
     return kin.tensor_size
 
 
@@ -89,12 +89,12 @@ class Field(NamedTuple):
 
     @staticmethod
     def shown(values: np.ndarray, table: Any) -> np.ndarray:
-        """Return what the columns show (n, components), given values in a table of points."""
+        """Return the numbers (n, components) for the columns, from values in a table of points."""
         return values
 
     @staticmethod
     def needed(tag: Any) -> bool:
-        """Return True if points of a law, or nodes of a basis, have this field."""
+        """Return whether points of a law, or nodes of a basis, have this field."""
         return True
 
 
@@ -115,7 +115,7 @@ def name_of(kind: type) -> str:
 
 
 def _trait(kind: type, name: str) -> Any:
-    """Return a trait of a field, with `Field`'s defaults for one not derived from it."""
+    """Return a trait of a field class, with defaults of `Field` even if not derived from it."""
     return getattr(kind, name, getattr(Field, name))
 
 
@@ -148,10 +148,10 @@ def rows_of_points(
 ) -> np.ndarray:
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    So no vector load crosses a line, and the dozens of rows that a pass reads in parallel use
-    different cache sets (contiguous rows would collide for n = 512 or 512 000). Rows always have
-    gaps, since an array without them has another type and needs another compilation. `room` (k,) is
-    used if long enough (`length_of_rows`).
+    Thus no vector load crosses a line, and the dozens of rows that a pass reads in parallel are in
+    different cache sets (contiguous rows would be in the same for n = 512 or 512 000). Rows always
+    have gaps, since an array without them has another type and needs another compilation. `room`
+    (k,) is used if long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -214,7 +214,7 @@ def records(count: int, width: int, real: type) -> np.ndarray:
 def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
     """Make a field (count, components) with initial values."""
     width = kind.shape(kin)
-    # Three numbers are loaded and stored as four, one register.
+    # Three numbers are loaded and stored as four, which fill a register.
     array = records(count, width if width < 3 else -(-(width + 1) // 4) * 4, real)
     if (start := _start(kind, kin, real)).any():
         array[:, :width] = start

@@ -15,7 +15,7 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-# no links, no waiting for a pipe, where the system has these flags
+# Follow no links and do not wait for pipes, if the system has these flags.
 _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
@@ -33,7 +33,7 @@ def _refuse_of_others(about: os.stat_result) -> None:
 
 
 def _guard(directory: Path) -> None:
-    """Refuse a folder that others can write to; close this user's folders to them."""
+    """Raise an error for a folder that others can write to; make the user's folders private."""
     for one in (directory, directory.parent):
         about = one.stat()
         if about.st_mode & stat.S_ISVTX:  # others may not delete files there

@@ -65,7 +65,7 @@ def _counted(array, i, step):
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
         at = llvm.item_pointer(builder, array, table, (i,))
-        # bits of non-negative floats are ordered like the floats
+        # Bits of non-negative floats have the order of the floats.
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
 
@@ -73,7 +73,7 @@ def _largest(array, i, value):
 
 
 def raise_to(array: np.ndarray, i: int, value: float) -> None:
-    """Raise a non-negative double to `value` if larger, atomically."""
+    """Set a non-negative double to `value` if this is larger, atomically."""
     array[i] = max(array[i], value)
 
 
@@ -138,7 +138,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# functions of the C library that NVIDIA's has too
+# Functions of the C library that NVIDIA's library has, too.
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -214,7 +214,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 class Code(NamedTuple):
     name: str
-    code: bytes  # empty if to be read from disk
+    code: bytes  # empty if it is to be read from disk
     file: str
     needs: tuple
     modules: frozenset[str]
@@ -262,7 +262,7 @@ class _Coded:
 class Emulator(_Coded):
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
-    copies = 1  # of the totals that threads add to
+    copies = 1  # copies of the totals to which threads add
 
     def __init__(self) -> None:
         super().__init__()
@@ -317,7 +317,7 @@ class Emulator(_Coded):
 
 
 class Counted(Emulator):
-    """Counts allocated bytes (never freed); runs nothing."""
+    """An emulator that counts allocated bytes (never freed) and runs nothing."""
 
     name, taken, copies = "counted", 0, 64
 
@@ -448,7 +448,7 @@ class Card(_Coded):
 
 
 def card() -> Card | Emulator:
-    """Return the GPU, or its substitute if KARAMELO_PY_GPU=emulated."""
+    """Return the GPU, or with KARAMELO_PY_GPU=emulated the emulator."""
     return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
 
 

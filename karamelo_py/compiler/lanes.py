@@ -5,7 +5,7 @@ for each of 4 or 8 consecutive points. Node numbers in lanes gather from node ar
 components). Functions in ``scalarised`` of a class are called lane by lane. Each lane has the bits
 of the scalar operation; only sums at nodes differ by round-off.
 
-In a tile's last group, missing lanes load the first point, and contribute nothing.
+In the last group of a tile, lanes without a point load the first point and contribute nothing.
 """
 
 import operator
@@ -41,7 +41,7 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM splits wider vectors, for which narrow registers do not suffice.
+# LLVM splits wider vectors, for which there would not be enough registers.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays to prefetch ahead
 
@@ -92,7 +92,7 @@ def added(total: float, value: float) -> float:
 def beside(first: int, steps: int) -> int:
     """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored, to address neighbours relative to the first nodes.
+    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
     """
     return first + steps
 
@@ -233,7 +233,7 @@ def _all_or_masked(
     whole: Callable,
     partly: Callable,
 ) -> ir.Value:
-    """Access all lanes if all have a point, as in nearly all groups; else masked.
+    """Access all lanes if all have a point, as in nearly all groups; otherwise with a mask.
 
     `partly` gets LLVM's name of the vectors, address, alignment and mask.
     """
@@ -255,7 +255,7 @@ def _points_at(
     """Return address of an item whose last index is a group, and the group."""
     kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
-    # Points are contiguous in a row, at any distance between rows.
+    # Points in a row are contiguous; rows may have any distance.
     size = I64(array.dtype.bitwidth // 8)
     indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
     return llvm.item_pointer(builder, array, value, indices, size), values[-1]
@@ -280,7 +280,7 @@ def _load_points(array, at):
         pointer, p = _points_at(builder, array, value, at, index)
 
         def partly(name, here, align, mask):
-            """Give lanes without a point the first point's number."""
+            """Give lanes without a point the number of the first point."""
             kinds = [here.type, I32, mask.type, vector]
             load = llvm.external(builder, f"llvm.masked.load.{name}", vector, kinds)
             loaded = builder.call(load, [here, align, mask, ir.Constant(vector, None)])
@@ -344,7 +344,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return pointer
-    # relative to the first node, so that neighbours need one address
+    # Relative to the first node, so that neighbours need a single address.
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
     return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 
@@ -365,7 +365,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # parameters: a group mostly has one material
+        # For parameters, as a group mostly has a single material.
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

@@ -1,4 +1,4 @@
-"""LLVM types of kernels, in registers and memory, and code that takes values apart."""
+"""LLVM types of kernels in registers and in memory, and access to parts of values."""
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
@@ -30,7 +30,7 @@ class Lanes(LaneType):
 
 
 def per_type(function: Callable) -> Callable:
-    """Cache results by Numba's type numbers; hashes of types take long."""
+    """Cache results by Numba's type numbers, as hashing types is slow."""
     known: dict[int, Any] = {}
 
     def found(kind: types.Type) -> Any:
@@ -129,7 +129,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
     conversion = _conversion(kind, wanted)
     if conversion is not None:
         if conversion == "sitofp" and isinstance(of, Lanes) and kind.bitwidth > 32:
-            value = builder.trunc(value, ir.VectorType(I32, of.width))  # always convertible
+            value = builder.trunc(value, ir.VectorType(I32, of.width))  # can be converted
         return getattr(builder, conversion)(value, to)
     if register_type(of) != to:
         raise TypeError(f"{of} is no {wanted}")
@@ -190,7 +190,7 @@ def overloaded(kind: ir.Type) -> str:
 
 
 def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
-    """Allocate stack memory, once for all iterations."""
+    """Allocate stack memory at the entry of the function, once for all iterations."""
     with builder.goto_entry_block():
         return builder.alloca(kind)
 

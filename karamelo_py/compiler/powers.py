@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
-They are series after range reduction (Muller 2016, "Elementary Functions", chapter 11) with a
-relative error of about two round-off errors; powers, times |y ln x| if above 1. Interpreted code
-uses Python's.
+They are series after range reduction (Muller 2016, "Elementary Functions", chapter 11). Relative
+errors are about twice the round-off, for powers times |y ln x| if this is above 1. Interpreted code
+uses Python's functions.
 """
 
 import math
@@ -45,7 +45,7 @@ class _Bits(NamedTuple):
 
     number: ir.Type
     whole: ir.Type  # the same bits
-    short: ir.Type  # 32-bit, which every processor converts to reals
+    short: ir.Type  # 32-bit integers, which every processor converts to reals
     mantissa: int
     bias: int
 
@@ -91,7 +91,7 @@ def _scaled(x, n):
         n = builder.fptosi(n, short)
         half = builder.ashr(n, _constant(short, 1))
         for exponent in (half, builder.sub(n, half)):
-            # in two steps, as results may be infinite or denormal
+            # In two steps, as results may be infinite or denormal.
             e = builder.add(exponent, _constant(short, bias))
             if mantissa == 52:
                 e = builder.sext(e, whole)
@@ -144,7 +144,7 @@ def _logarithm_near_one(x):
 
 @implements(exponential, by_type=True)
 def _exponential(x):
-    # Adding a number with spacing 1 rounds; not all targets have rounding.
+    # Adding a number with a spacing of 1 rounds; not all targets have an instruction for it.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):

@@ -1,6 +1,6 @@
 """Call of the formula evaluator (`karamelo_py.script.formula`) by address, outside kernels.
 
-It gets whole tables, as slices are slow to compile.
+Whole tables are passed, as slices are slow to compile.
 """
 
 from numba import types

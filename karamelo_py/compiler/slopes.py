@@ -1,8 +1,8 @@
 """Dual numbers: a value and its derivatives, in forward mode.
 
-Point functions of dual numbers return exact derivatives; for the stress of a law, its consistent
-tangent (Griewank & Walther 2008, "Evaluating Derivatives", chapter 3). Values have the same bits as
-without derivatives. A slope that is the literal 0 writes no code.
+Point functions of dual numbers return exact derivatives (Griewank & Walther 2008, "Evaluating
+Derivatives", chapter 3); for the stress of a law this is the consistent tangent. Values have the
+same bits as without derivatives. There is no code for slopes that are the literal 0.
 """
 
 import math
@@ -68,7 +68,7 @@ class Dual(namedtuple("Dual", "value slopes")):
         return self.chain(quotient, -quotient / self.value)
 
     def __pow__(self, other):
-        if type(other) is int and 1 <= other <= 4:  # for negative numbers too
+        if type(other) is int and 1 <= other <= 4:  # also for negative numbers
             square = self * self
             return (self, square, square * self, square * square)[other - 1]
         return _raised(self, other, self.value ** value_of(other))
@@ -141,7 +141,7 @@ def times(factor: Any, slope: Any) -> Any:
 
 
 def combined(value: Any, a: Any, x: Any, b: Any, y: Any) -> Dual:
-    """Return the number with slopes a x' + b y'."""
+    """Return the number with this `value` and the slopes a x' + b y'."""
     n = len(x.slopes) if isinstance(x, Dual) else len(y.slopes)
     slopes = []
     for s, t in zip(slopes_of(x, n), slopes_of(y, n), strict=True):
@@ -163,7 +163,7 @@ def size_of(*things: Any) -> int:
 def _sqrt(x):
     root = math.sqrt(x.value)
     some = root > 0
-    # At 0 the slope is infinite; 0 is right for norms.
+    # At 0 the slope is infinite; 0 is correct for norms.
     return x.chain(root, where(some, 0.5 / where(some, root, 1), 0))
 
 
@@ -248,7 +248,7 @@ def _pow(x, y):
     return _raised(x, y, math.pow(value_of(x), value_of(y)))
 
 
-# functions with slope 0, or without a real result
+# Functions with slope 0, or without a real result.
 for _one in (math.floor, math.ceil, math.trunc, math.isnan, math.isinf, math.isfinite):
     implements(_one, Dual)(lambda x, do=_one: do(x.value))
 

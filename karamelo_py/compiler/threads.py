@@ -1,9 +1,9 @@
 """Parallel loops: one implementation for all kernels, which calls the loop body by address.
 
-The body is a function of the address of the loop's arguments, and an index. As waking threads takes
-as long as a small loop, a kernel with many loops is run by a *team* (`by_team`): its first thread
-executes the kernel, the others wait for its loops. Each thread has a fixed range of indices, and
-steals work from threads that make no progress.
+The body is a function of the address of the arguments of the loop, and of an index. As waking
+threads takes as long as a small loop, a kernel with many loops is run by a *team* (`by_team`): the
+first thread executes the kernel, and the other threads wait for its loops. Each thread has a fixed
+range of indices, and takes indices from threads that make no progress.
 """
 
 import ctypes
@@ -53,7 +53,7 @@ class Threaded(NamedTuple):
 
 
 def many_threads() -> bool:
-    """Return True if many threads may write to one number, as on a GPU."""
+    """Return True if several threads may write to the same number, as on a GPU."""
     return False
 
 
@@ -170,7 +170,7 @@ def _share_out(
         for pair in pairs:
             others.append(_pools.of(threads - 1).submit(do, task, arguments, *pair, failure))
         do(task, arguments, *ends[:2], failure)
-    except BaseException as error:  # such as Ctrl-C; threads still use these arguments
+    except BaseException as error:  # also Ctrl-C, as threads still use these arguments
         note(error, failure)
     while others:
         try:
@@ -247,20 +247,21 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 
 # --- teams ------------------------------------------------------------------------------------
 
-# Only the leader writes _STATE: it waits, leads, has ended. Every index is processed once: 1. A
-# ticket has the loop's number and the indices left in a range. Indices are taken by
+# Only the leader writes _STATE: it waits, leads, or has ended. Every index is processed once: 1. A
+# ticket contains the number of the loop and the indices left in a range. Indices are taken by
 # compare-and-swap of the ticket, so by one thread; tickets of different loops are never equal. 2.
 # The leader releases task, arguments and count before the tickets, and every swap continues that
-# release, so a thread that takes an index has acquired its loop's words. 3. _DONE counts finished
-# indices, and the leader stays in the loop until these and its own are all: the words do not change
-# meanwhile, and by acquiring _DONE it sees all stores of the others. 4. The leader takes the
-# remaining indices itself: it waits only for taken indices, never for a thread that was preempted,
-# woke late or left. Words, each in a separate cache line:
+# release, so a thread that takes an index has acquired the words of its loop. 3. _DONE counts
+# indices that other threads have finished, and the leader remains in the loop until these and its
+# own are all. Meanwhile the words do not change, and by acquiring _DONE the leader sees all stores
+# of other threads. 4. The leader takes the remaining indices itself: it waits only for indices that
+# were taken, never for a thread that was preempted, woke late or left. Words, each in a separate
+# cache line:
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses, about 0.3 ms; then sleep, as cores may be needed
-_APART, _LOOKS = 10, 64  # pauses between looks at another range; looks, 30 us
+_SHORT = 8000  # pauses before a thread sleeps, about 0.3 ms, as cores may be needed
+_APART, _LOOKS = 10, 64  # pauses between looks at another range; number of looks; together 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
 _LEFT = (1 << 32) - 1  # mask of a ticket for the remaining indices; the upper bits are the loop
 
@@ -275,8 +276,8 @@ def new_team(threads: int) -> np.ndarray:
 def _take_part(team, k):
     """Process indices of the present loop, first from thread `k`'s range; return their number.
 
-    A thread's data is in its caches, so others take from its range only if it does not shrink for a
-    while.
+    The data of a thread are in its caches, so other threads take from its range only if the range
+    has not become smaller for a while.
     """
     size = read(team + _SIZE)
     epoch = read(team + _TICKETS + 64 * k) >> 32
@@ -298,7 +299,7 @@ def _take_part(team, k):
             for _ in range(_APART):
                 pause(False)
         elif replaced(team + _TICKETS + 64 * owner, word, word - 1):
-            # The loop stays the present one while an index is unfinished.
+            # The loop does not end while an index is unfinished.
             end = read(team + _COUNT) * (owner + 1) // size
             task, arguments = read(team + _TASK_AT), read(team + _ARGUMENTS)
             _call(task, arguments, end - left)
@@ -375,7 +376,7 @@ def by_threads(share: Callable) -> Callable:
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
-    @functools.wraps(share, updated=())  # retains marks of the function
+    @functools.wraps(share, updated=())  # marks of the function are retained
     def all_shares(*arguments):
         loop(*arguments)
 

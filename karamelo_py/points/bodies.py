@@ -7,7 +7,7 @@ from karamelo_py.compiler import point_function
 from karamelo_py.compiler.powers import power
 from karamelo_py.points.kinematics import dot, product
 
-NEW = 0.05  # weight of the latest step in the mean load
+NEW = 0.05  # weight of the last step in the mean load
 
 
 class Hertz(NamedTuple):
@@ -23,7 +23,7 @@ class MinimizePenetration(NamedTuple):
 
 
 def face(kin, volume, x):
-    """Return a cubic point's face area: per thickness in 2D, per angle around an axis or centre."""
+    """Return the face area of a cubic point, per thickness in 2D, per angle in axisymmetry."""
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:
@@ -75,19 +75,19 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 
 class FrictionMemory(NamedTuple):
-    hold: Any  # spring force along the surface
-    mean: Any  # of the load
+    hold: Any  # force of the friction spring along the surface
+    mean: Any  # mean load
     unused: Any  # friction left from earlier steps
 
 
 def rub(mu, load, memory, stop):
     """Return the force of Coulomb friction with memory, and the memory after the step.
 
-    `stop` = m v/dt would stop a free point, but lets loaded points creep. So slip also stretches a
-    spring as stiff as the normal contact, whose force `hold` is returned to the friction cone
-    (Wriggers 2006, "Computational Contact Mechanics", chapter 5). As points bounce on a stiff
-    contact, a step may spend friction `unused` earlier, up to mu times the `mean` load. A point
-    that always slides has mu times the load of each step.
+    The force `stop` = m v/dt would stop a free point, but loaded points would creep. Therefore slip
+    also stretches a spring as stiff as the normal contact, whose force `hold` is returned to the
+    friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). As points bounce on
+    a stiff contact, a step may use friction that was `unused` before, up to mu times the `mean`
+    load. A point that always slides has mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

@@ -1,7 +1,7 @@
 """Frames: present (``Updated``) or reference positions (``Total``).
 
-``Updated`` uses spatial gradients and Kirchhoff stress, ``Total`` reference gradients, the first
-Piola-Kirchhoff stress and the deformation gradient F.
+``Updated`` uses spatial gradients and the Kirchhoff stress; ``Total`` uses reference gradients, the
+first Piola-Kirchhoff stress and the deformation gradient F.
 """
 
 from typing import Any, NamedTuple
@@ -34,14 +34,14 @@ class Total(NamedTuple):
 
 
 def spatial_increment(frame, kin, dl, f):
-    """Convert the frame's `dl` to the spatial increment dt grad v; F is from before the step."""
+    """Convert `dl` of a frame to the spatial increment dt grad v; `f` is F before the step."""
     # F + dt Fdot = (I + dt Fdot F^-1) F, exactly
     return dl if frame.moves else dl @ inv(f)
 
 
 def of_places_before(frame, kin, dl):
     """Convert `dl` after a move to the positions before it."""
-    # grad v changes by (I - dl)^-1, so F grows by (I - dl)^-1 exactly.
+    # The gradient at old positions is dl (I - dl)^-1, so F is multiplied by (I - dl)^-1.
     return dl @ inv(I - dl) if frame.moves else dl
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
-Length = Any  # of one grid, or an array over all
+Length = Any  # a number for one grid, or an array over all grids
 Count = Any
 
 
@@ -21,10 +21,10 @@ class Grid(NamedTuple):
     nx: Count  # cells
     ny: Count
     nz: Count
-    lx: Length  # in cells, may be fractional
+    lx: Length  # length in cells, may be fractional
     ly: Length
     lz: Length
-    slack: Length  # cells by which points outside count as inside
+    slack: Length  # distance in cells up to which points outside count as inside
     step_x: Count  # stride of node numbers
     step_y: Count
     first: Count  # node number

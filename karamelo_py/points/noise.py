@@ -1,7 +1,7 @@
 """Limits of drift and rotation through the grid, which amplify null-space noise.
 
-Measured on rubber and metal disks, 4 to 16 cells across the radius, vibrating with 0.01 to 2 % of
-strain (docs/energy-measurements.md).
+They were measured with disks of rubber and metal, with 4 to 16 cells in the radius, that vibrate
+with strains of 0.01 to 2 % (docs/energy-measurements.md).
 """
 
 from math import inf
@@ -11,15 +11,15 @@ from karamelo_py.language.rules import known_failure
 
 
 class DriftLimits(NamedTuple):
-    """Limits of (cells crossed) x c dt/h that conserve energy, with (two points per cell, one)."""
+    """Limits of (cells crossed) x c dt/h that conserve energy, for 2 and 1 points per cell."""
 
     drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
     line: float  # 1D
     averaged: tuple[float, float]  # as `drift`, with usavg
     rim: tuple[float, float]  # rotating body, musl and usf
     rim_averaged: tuple[float, float]  # usavg
-    fastest: float = inf  # wave speeds; a faster drift adds no noise
-    damps: bool = False  # a faster drift damps vibrations in 3D
+    fastest: float = inf  # drift over wave speed above which no noise is added
+    damps: bool = False  # in 3D, a faster drift damps vibrations
 
 
 JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # for bases with gradient jumps

@@ -1,4 +1,4 @@
-"""Arguments of kernels, as words in memory passed by one address."""
+"""Arguments of kernels: words in memory, of which the address is passed."""
 
 import ctypes
 import functools
@@ -18,12 +18,12 @@ from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
-    """A living array; NumPy does not resize referenced ones."""
+    """An array that is in use; NumPy does not resize arrays with references."""
 
-    alive: weakref.ref  # ids are reused after deletion
+    alive: weakref.ref  # as ids are reused after deletion
     shape: tuple[int, ...]
     writeable: bool
-    kind: int  # equal for arrays of one type
+    kind: int  # equal for arrays of the same type
     words: tuple[int, ...]  # as in kernels
 
 
@@ -68,7 +68,7 @@ class Address(int):
 
 class Plan(NamedTuple):
     text: struct.Struct
-    tuples: tuple[tuple[int, int], ...]  # index of each word that is a nested tuple, and its start
+    tuples: tuple[tuple[int, int], ...]  # index of each nested tuple's word, and its start
     first: int  # start of the arguments themselves
     types: tuple[types.Type, ...]  # of the arguments
 
@@ -79,7 +79,7 @@ class ArgumentBuffer:
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []  # determine the argument types
+        self.kinds: list = []  # these determine the argument types
         self.words: list = []  # numbers in the tuples; 0 for a nested tuple
         words, _ = self._of(arguments)
         self.words += words

@@ -63,7 +63,7 @@ def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
             return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
         raise TypeError("lanes of several types")
     lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
-    # Integer lanes would truncate a real operand; `real(i, x)` converts them.
+    # Integer lanes would truncate a real operand; convert them by `real(i, x)`.
     if isinstance(other, types.Float) and _is_whole(lanes):
         raise TypeError("whole lanes and a real number")
     return lanes
@@ -175,7 +175,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
     bad = None
     if not safe:
         bad = builder.icmp_signed("==", y, zero)
-        if kind.signed:  # smallest number divided by -1
+        if kind.signed:  # for the smallest number divided by -1
             least = builder.icmp_signed("==", x, x.type(kind.minval))
             bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
         y = builder.select(bad, one, y)
@@ -396,7 +396,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma, as the C library's bits vary."""
+    """Call Python's gamma, as bits differ between C libraries."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
@@ -413,7 +413,7 @@ _IN_C = (
 
 for _name, (_real, _ending) in product(
     _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
-):  # missing in this C library
+):  # functions that this C library does not have
     if not machine.is_known(_name + _ending):
         _kind, _plain = ctypes.CFUNCTYPE(_real, _real), getattr(math, _name)
         machine.publish_python(_name + _ending, _kind, exceptions.never_raising(_plain))

@@ -1,4 +1,4 @@
-"""Exceptions in kernels, raised by Python after the kernel.
+"""Exceptions in kernels, which are raised in Python after the kernel.
 
 Each call from Python has a `Failure`, whose address is the last argument of LLVM functions.
 """
@@ -18,7 +18,7 @@ from karamelo_py.compiler.code import machine
 
 
 class Failure(ctypes.Structure):
-    """First exception of a kernel call; kernels read only the first word."""
+    """First exception in a kernel call, of which kernels read only the first word."""
 
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 
@@ -67,7 +67,7 @@ def never_raising(function: Callable) -> Callable:
     def call(*arguments: Any) -> Any:
         try:
             return function(*arguments)
-        except BaseException:  # Python would drop it with a message
+        except BaseException:  # Python would ignore it and print a message
             return math.nan
 
     return call
@@ -97,7 +97,7 @@ def passed_to(builder: ir.IRBuilder, called: Any) -> list:
 
 
 def returning(function: ir.Function, kind: ir.Type) -> None:
-    """Set the result type of a function whose code so far returns after exceptions only."""
+    """Set the result type of a function that so far returns only after exceptions."""
     function.ftype = ir.FunctionType(kind, function.ftype.args)
     function.type, function.return_value.type = function.ftype.as_pointer(), kind
     for block in function.blocks:

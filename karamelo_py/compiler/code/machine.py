@@ -1,6 +1,6 @@
 """LLVM: target processor, optimisation, loading of code.
 
-Fast math is off: contraction depends on inlining, and so would results on threads and restarts.
+Fast math is off: as contraction depends on inlining, results would depend on threads and restarts.
 """
 
 import contextlib
@@ -15,7 +15,7 @@ from llvmlite import binding as llvm
 # Loops over up to 27 stencil nodes must be unrolled to have weights in registers: quadratic splines
 # in 3D run 1.7 times as fast. In long loops, a counter per array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
-# 0 halves compile time, slows steps up to fourfold; bits are equal.
+# With 0, compilation takes half the time and steps up to four times as long; bits are equal.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 
@@ -45,7 +45,7 @@ def _target() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     _set_options()
     triple = llvm.get_process_triple()
-    # Code does not move after loading, so x86 needs no tables.
+    # Code is not moved after loading, so x86 needs no relocation tables.
     where = "static" if triple.startswith(("x86", "i386", "i686")) else "default"
     return llvm.Target.from_triple(triple).create_target_machine(
         opt=LEVEL, cpu=llvm.get_host_cpu_name(), features=features(), reloc=where,

@@ -1,11 +1,11 @@
 """Compiled kernels on disk, in two levels.
 
-A file ``.kernel`` has a kernel's name, result and callees. Its key hashes the function, the
-argument types and the sources of everything that writes kernels. If it is missing, the kernel is
-traced, and its machine code looked up in a file ``.code`` by the hash of the LLVM text.
+A file ``.kernel`` contains the name, result and callees of a kernel. Its key is a hash of the
+function, the argument types and the sources of all that writes kernels. If it is missing, the
+kernel is traced, and its machine code looked up in a file ``.code`` by the hash of the LLVM text.
 
-As files become code, only those with a correct checksum that no other user can write are read.
-Otherwise the kernel is compiled, with one warning.
+As files become code, only files with a correct checksum that no other user can write are read.
+Otherwise the kernel is compiled, with a warning.
 """
 
 import contextlib
@@ -55,7 +55,7 @@ def short_hash(*words: str) -> str:
 
 @functools.cache
 def _source(path: Path) -> str:
-    """Hash a source as Python read it; raise `Unknown` if it is newer."""
+    """Return the hash of an imported source; raise `Unknown` if the file is newer."""
     with contextlib.suppress(OSError):
         about = path.stat()
         if max(about.st_mtime, about.st_ctime) < _began:
@@ -102,7 +102,7 @@ def _is_own(module: str, top: str) -> bool:
 
 
 def _words(thing: Any) -> str:
-    """Describe a function's parts, equally in every process."""
+    """Describe what determines a function, in the same words in every process."""
     if isinstance(thing, _PLAIN):
         return f"{type(thing).__name__} {thing!r}"
     if isinstance(thing, dict):
@@ -215,7 +215,7 @@ class KernelFiles:
             if any(_stamp(name) != stamp for name, stamp in stamps.items()):
                 return None
             self._load(unit)
-        except (Unknown, FileNotFoundError):  # code or a module is missing
+        except (Unknown, FileNotFoundError):  # machine code or a module is missing
             return None
         except Exception:
             _damaged(path)

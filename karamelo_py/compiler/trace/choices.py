@@ -1,6 +1,6 @@
-"""Implementations selected by type, and their modules.
+"""Implementations that are selected by type, and the modules that define them.
 
-Keys of kernels on disk contain the sources of these modules (`cache`).
+Keys of kernels on disk include the sources of these modules (`cache`).
 """
 
 import contextvars
@@ -20,7 +20,7 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-# folders whose sources are in all keys
+# Folders whose sources are part of all keys.
 ROOMS = "compiler", "script", "points", "kernels", "schemes", "styles"
 
 # modules outside `ROOMS` of functions being compiled, innermost last
@@ -34,7 +34,7 @@ def is_elsewhere(module: str) -> bool:
 
 
 def modules_of(*things: Any) -> set[str]:
-    """List modules elsewhere that define functions or classes."""
+    """Return modules outside `ROOMS` that define functions or classes."""
     names = [one.__name__ if isinstance(one, python.ModuleType) else "" for one in things]
     names += [one.__module__ for one in things if hasattr(one, "__module__")]
     functions = (one for one in things if isinstance(one, python.FunctionType))
@@ -43,7 +43,7 @@ def modules_of(*things: Any) -> set[str]:
 
 
 def register(made: Callable) -> None:
-    """Put an implementation into all keys, unless the sources of `ROOMS` determine it."""
+    """Make an implementation part of all keys, unless it is in the sources of `ROOMS`."""
     is_function = isinstance(made, python.FunctionType)
     has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
     if has_values or modules_of(made):

@@ -20,7 +20,7 @@ from karamelo_py.compiler.trace.values import (
 )
 
 _PLAIN = (bool, int, float, str, np.generic, type(None))
-_MERGED = (Value, HeldValue, *_PLAIN)  # may differ between branches
+_MERGED = (Value, HeldValue, *_PLAIN)  # these may differ between branches
 _DROPPED = object()
 IN_A_LOOP = " between iterations of a loop"
 
@@ -74,10 +74,7 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """Numbers change their type during a loop.
-
-    `grown` maps name and indices in tuples to the new type, or a number of it.
-    """
+    """Numbers change type in a loop; `grown` maps name and tuple indices to type or number."""
 
     def __init__(self, grown: dict[tuple, Any]):
         super().__init__(f"a number becomes one of another type{IN_A_LOOP}")
@@ -170,7 +167,7 @@ class Flow:
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
         real = {k for t, k in zip(things, kinds, strict=True) if is_real(t)}
         if len(real) == 1 and all(is_real(t) or is_literal(t) for t in things):
-            (kind,) = real  # literals adapt to the precision of others
+            (kind,) = real  # literals take the precision of the others
         else:
             kind = self.lowering.unify(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):

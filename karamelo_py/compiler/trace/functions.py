@@ -1,7 +1,7 @@
 """Select functions by argument types, and compile them where they are called.
 
-Each number is a `Value`, whose operations are lowered at once into the calling function. Tuples and
-classes are Python's and leave no code. `statements` compiles a function's text.
+Each number is a `Value`, whose operations become code of the calling function at once. Tuples and
+classes are Python's and make no code. The text of a function is compiled by `statements`.
 """
 
 import functools
@@ -155,7 +155,7 @@ def _copied(function: Callable) -> AstFunction:
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
-    """Trace a method or point function called from plain Python."""
+    """Trace a method or point function that is called from plain Python."""
     return _seen(dispatch)(*arguments)
 
 
@@ -185,7 +185,7 @@ class Selected(NamedTuple):
             lowering.operations = before
 
 
-MOST_FUNCTIONS = 4000  # cached: about 12 kB each, 800 for a scene with contact
+MOST_FUNCTIONS = 4000  # number of cached functions, of about 12 kB; a scene with contact has 800
 not_inlined: set[Callable] = set()
 
 
@@ -299,7 +299,7 @@ def _call(function: Callable, arguments: tuple) -> Any:
         return NotImplemented
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
-    if function in not_inlined:  # one serves all numbers
+    if function in not_inlined:  # the same function is for all numbers
         return call_own(lowering, function, tuple(map(types.unliteral, kinds)), arguments)
     run = chosen(function, kinds)
     return NotImplemented if run is None else run(*arguments)

@@ -1,8 +1,8 @@
-"""Tuples of arrays stored in memory and passed as one pointer.
+"""Tuples of arrays that are stored in memory and passed as a pointer.
 
 A setup has about forty arrays of seven to nine numbers: three hundred arguments, and half of the
-code to compile. So kernels hold their setup: a (nested) tuple with arrays becomes a pointer to its
-items. Its type is still a tuple type.
+code to compile. So a (nested) tuple with arrays is stored in memory, and kernels get a pointer to
+its items. Its type is still a tuple type.
 """
 
 import hashlib
@@ -36,7 +36,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
-        # short, as part of function names
+        # a short text, as it is part of function names
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -73,7 +73,7 @@ def held_type(kind: Any) -> Any:
 def hold(value: Any) -> Any:
     """Make a held tuple of `value` in kernels, if it has arrays.
 
-    It lives until the calling function returns: pass it on, but do not return it.
+    It exists until the calling function returns, so it may be passed on, but not returned.
     """
     return value
 

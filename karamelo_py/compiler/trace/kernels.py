@@ -1,7 +1,7 @@
 """Kernels: loops called by Python and other kernels, traced as a whole and cached on disk.
 
-A kernel is one LLVM function for argument types, named by the hash of its text. Python calls its
-entry with the arguments' address.
+A kernel is one LLVM function for argument types, named by the hash of its text. Python calls an
+entry of it with the address of the arguments.
 """
 
 import contextvars
@@ -40,12 +40,12 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 
 
 class Unit(NamedTuple):
-    name: str  # the entry for Python adds ENTRY
+    name: str  # the entry for Python has ENTRY added
     result: types.Type
     code: bytes  # object file; empty if to be read from disk
     needs: tuple  # units that it calls
-    modules: frozenset[str]  # modules elsewhere in it and its needs
-    raises: bool  # something in it raises exceptions
+    modules: frozenset[str]  # modules outside of `ROOMS` in it and its needs
+    raises: bool  # whether a part of it raises exceptions
 
 
 def load(unit: Unit) -> list[int]:
@@ -62,7 +62,7 @@ def load(unit: Unit) -> list[int]:
 
 
 class Compilation:
-    """Reports compilation in this Python thread, and waiting for another process."""
+    """Reports compilation in this Python thread, and times of waiting for another process."""
 
     def __init__(self) -> None:
         self._listeners = contextvars.ContextVar[tuple]("listeners", default=())
@@ -196,7 +196,7 @@ class Kernel:
         at = ctypes.addressof(ctypes.c_char.from_buffer(result))
         try:
             entry(address, at, ctypes.addressof(failure))
-        finally:  # even if Ctrl-C comes at the end of a failure
+        finally:  # also if Ctrl-C arrives at the end of a failed call
             failure.raise_first()
         return read(result)
 
@@ -246,7 +246,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain it, so another function does not recompile them.
+    Callers do not contain the function, so they need not be compiled again for another function.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -265,11 +265,11 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
     an int made from it.
     """
     if choices.INTERPRETED:
-        callback: Any = functools.partial(function)  # a bound method would be freed at once
+        callback: Any = functools.partial(function)  # as a bound method would be freed at once
         address = Address(next(session.numbers))
         session.interpreted[int(address)] = callback
     else:
-        count = len(signature.args) + 1  # the last is for exceptions
+        count = len(signature.args) + 1  # the last argument is for exceptions
         callback = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(noting(function))
         address = Address(ctypes.cast(callback, ctypes.c_void_p).value or 0)
     address.callback = callback

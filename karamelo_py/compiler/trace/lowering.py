@@ -18,7 +18,7 @@ from karamelo_py.compiler.trace.choices import tag_class
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
-MOST_OPERATIONS = 100_000  # limit for a function; more need a loop
+MOST_OPERATIONS = 100_000  # largest number in a function; more operations should be a loop
 _tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
@@ -34,7 +34,7 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Replace Numba's abstract classes, which are slow."""
+    """Return whether a class is of values, without Numba's abstract classes, which are slow."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 
@@ -46,9 +46,9 @@ class Lowering:
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder):
         self.seen, self.builder = seen, builder
-        self.operations = 0  # of the function that is being traced
+        self.operations = 0  # number of operations in the function that is being traced
         self.begun: set[tuple] = set()  # functions that are being traced
-        self.regardless = False  # continues when a called function raises
+        self.regardless = False  # whether code continues after a called function has raised
         self.read: dict[tuple, Any] = {}  # items read from held tuples in this branch
 
     def wrapped(self, kind: types.Type, value: Any) -> Any:
@@ -196,7 +196,7 @@ class Lowering:
         return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
-        """Write a function; return its result type, which the code determines if it is None."""
+        """Write a function and return its result type; the code determines it for `result` None."""
         passed = iter(values)
         with traced.writing(self):
             value = run(

@@ -32,7 +32,7 @@ def implements(function: Callable, *numbers: type, by_type: bool = False) -> Cal
 
     A number type is a NamedTuple with operators (`algebra`), or lanes; it is also found inside
     tuples. The implementation is traced, or an `intrinsic`. With `by_type` it is a Python function
-    that returns the implementation for argument types; None selects the previous one.
+    that returns the implementation for argument types, or None for the previous one.
     """
 
     def register(made: Callable) -> Callable:
@@ -121,7 +121,7 @@ def _real(value, template):
 def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
-    whole = Lanes(types.int32, a.width)  # supported by every processor, and large enough for cells
+    whole = Lanes(types.int32, a.width)  # every processor has them; enough for cells
     return whole(a), lambda builder, number: llvm.cast(builder, number, a, whole)
 
 
@@ -144,7 +144,7 @@ def _round_off(template):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index, which saves a test per access (10 % of a sweep)."""
+    """Return `i` as a non-negative array index, without a test per access (10 % of a sweep)."""
     return i
 
 
@@ -296,7 +296,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
-            if single and scalar == types.float64:  # it follows from literals alone
+            if single and scalar == types.float64:  # it depends on literals only
                 scalar = types.float32
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))
@@ -311,7 +311,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
 
     count = I64(width)
     if not unrolled:
-        # Hides the count from LLVM, so that the loop remains, with one copy of the function.
+        # LLVM must not know the count, so that the loop remains, with one copy of the function.
         count = builder.asm(ir.FunctionType(I64, [I64]), "", "=r,0", [count], False)
     with llvm.counted(builder, count) as k:
         result = run(k)

@@ -1,6 +1,6 @@
 """Memory of the compiler: implementations, functions, types, arrays and machine code.
 
-There is one per process, like LLVM's engine and the names in machine code.
+There is one memory per process, like LLVM's engine and the names in machine code.
 """
 
 import itertools
@@ -15,7 +15,7 @@ class Session:
     """Caches; one Python thread at a time compiles (`one_at_a_time`)."""
 
     def __init__(self) -> None:
-        # filled by decorators on import
+        # Filled by decorators on import.
         self.choosers: dict[Callable, list[Callable]] = {}  # implementations by argument types
         self.builtins: dict[Callable, Callable] = {}  # code of functions (`values.builtin`)
         self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)

@@ -1,8 +1,8 @@
 """Compiles a function's text, statement by statement.
 
-Python values are computed at once. Conditions known only at run time have both branches written,
-with variables merged as phis of SSA form. A loop over a known range is unrolled if short or
-necessary; others remain loops.
+Python values are computed at once. If a condition is known only at run time, both branches are
+written, and variables are merged as phis of SSA form. A loop over a known range is unrolled if it
+is short or must be; other loops remain loops.
 """
 
 import ast
@@ -82,7 +82,7 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start again")
     candidates = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
-    if code.co_name == "<lambda>":  # perhaps one of several in a line, or nested
+    if code.co_name == "<lambda>":  # it may be one of several in a line, or nested
         candidates = sorted(
             (n for n in candidates if _has(n.body, code)), key=lambda n: -n.body.col_offset
         )
@@ -105,8 +105,8 @@ class AstFunction:
         self.__code__ = code = function.__code__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
-        # Types of initial literals by name, for each loop and all that determines its code; None:
-        # unrolled
+        # For each loop and everything that determines its code: types of initial literals by name,
+        # or None if it is unrolled.
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
@@ -116,7 +116,7 @@ class AstFunction:
         others = code.co_kwonlyargcount or code.co_flags & (
             inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
         )
-        self.plain = -1 if others else code.co_argcount  # parameters if positional
+        self.plain = -1 if others else code.co_argcount  # parameters, if all are positional
 
     def free(self) -> dict[str, Any]:
         cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
@@ -198,7 +198,7 @@ class AstCompiler:
 
     def result(self) -> Any:
         self.block(self.walked.body)
-        if self.walked.generates:  # evaluated at once
+        if self.walked.generates:  # a generator is evaluated at once
             return self.yielded
         if self.goes:
             self.names = {"": None}
@@ -362,7 +362,7 @@ class AstCompiler:
         return self.chain(node.values, isinstance(node.op, ast.And))
 
     def chain(self, nodes: list[ast.expr], every: bool) -> Any:
-        """Compile `and` or `or`: the first deciding value, or the last."""
+        """Compile `and` or `or`, with the first value that decides as result, or the last value."""
         value = self.do(nodes[0])
         if len(nodes) == 1:
             return value
@@ -570,7 +570,7 @@ class AstCompiler:
             things[index] = operation(things[index], self.do(node.value))
         else:
             before = self.name(target.id)
-            if is_value(before) and isinstance(before._kind, types.Array):  # changes in place
+            if is_value(before) and isinstance(before._kind, types.Array):  # changed in place
                 raise Untraceable("an array as a whole is changed: change its items")
             self.names[target.id] = operation(before, self.do(node.value))
 
@@ -697,4 +697,4 @@ class AstCompiler:
 
 _COMPILED = {getattr(ast, n): f for n, f in vars(AstCompiler).items() if n in vars(ast)}
 LONGEST = 1000  # range in a comprehension
-_COUNT = "for"  # not a valid function name
+_COUNT = "for"  # no function can have this name

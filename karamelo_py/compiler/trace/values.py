@@ -1,4 +1,4 @@
-"""Traced values: numbers, lanes, arrays and held tuples; every operation on one becomes code."""
+"""Traced values: numbers, lanes, arrays and held tuples, on which every operation becomes code."""
 
 import contextvars
 import functools
@@ -48,7 +48,7 @@ def _only_at_run_time(use: str) -> Callable:
     return ask
 
 
-# active lowerings, innermost last; separate for each Python thread
+# Active lowerings of each Python thread, innermost last.
 _lowerings: contextvars.ContextVar[tuple] = contextvars.ContextVar("lowerings", default=())
 
 
@@ -100,7 +100,7 @@ def _in_type_of(model: Any, kind: Any, thing: Any) -> Any:
     return thing
 
 
-# replacements of functions called by address, in modules containing all they call
+# Replacements of functions called by address, in modules that contain all they call.
 _replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
@@ -212,7 +212,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
-        if isinstance(a._kind, types.Array):  # it would change in place
+        if isinstance(a._kind, types.Array):  # the array would change in place
             raise Untraceable("an array as a whole is changed: change its items")
         return _operated(operation, a, b)
 
@@ -300,7 +300,7 @@ def is_literal(thing: Any) -> bool:
 
 
 class Emitted:
-    """Calls a function that has another version in kernels."""
+    """A function that has another version in kernels."""
 
     def __init__(self, function: Callable):
         self.seen = function
@@ -325,7 +325,7 @@ class Emitted:
 
 
 OF_WHOLE = {min, max, abs, int, bool}
-# functions whose literals adapt to the other operands; more are added by name
+# Functions whose literals take the type of other operands; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONG = 8  # iterations up to which a known range is unrolled without need
+LONG = 8  # iterations up to which a known range is unrolled even if it could be a loop

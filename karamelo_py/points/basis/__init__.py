@@ -2,9 +2,9 @@
 
 A basis is a NamedTuple of parameters with `traits` and the point functions declared here. `grid` is
 the point's :class:`~karamelo_py.points.grid.Grid`, `location` a flat tuple of position and stored
-domain shape, `stencil` the result of `locate`. A product of one function per direction needs only
-`along` and :func:`karamelo_py.points.basis.product.register`; a basis with corners needs an
-`element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
+domain shape, `stencil` the result of `locate`. A basis that is a product of one function per
+direction needs only `along` and :func:`karamelo_py.points.basis.product.register`. A basis with
+corners needs an `element` (:class:`~karamelo_py.points.basis.cpdi.Element`).
 """
 
 from math import inf
@@ -15,22 +15,22 @@ from karamelo_py.points.noise import DriftLimits
 
 
 class BasisTraits(NamedTuple):
-    cells: int  # spanned by the nodes of points in one cell
+    cells: int  # number of cells between the outermost nodes of points in one cell
     least_nodes: int  # per direction
     steady_moment: bool  # D of affine transfers never vanishes
     # |grad N|^2 / N exceeds 2 / h^2 as the weight vanishes: usl limits the strain of light nodes.
     steep_edge: bool
     nodes_per_cell: int = 1  # 2 with mid-nodes
-    # at cell faces; crossing points add energy, less with smaller steps
+    # gradients jump at cell faces; points that cross add energy, less with smaller steps
     gradient_jumps: bool = False
     # Stable step / (h/c) at low speed: updated frame, with usf, total frame
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # h^2 / D and max h^2 sum_I |grad N_I|^2 / N_I per direction, away from walls: stiffness of an
-    # isolated point; then from the eigenvalues of a usl step with D.
+    # For the stiffness of an isolated point: h^2 / D and max h^2 sum_I |grad N_I|^2 / N_I per
+    # direction, away from walls; then a number from the eigenvalues of a usl step with D.
     lone: tuple[float, float, float] | None = None
-    # D / h^2 if constant: mapping to the nodes and back damps waves by it.
+    # D / h^2 if constant, by which mapping to the nodes and back damps waves.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations (updated frame)
     corrected_share: float = 0.8
@@ -55,8 +55,8 @@ def support(basis, kin):
 def entry(basis, kin, grid, stencil, k):
     """Return (node number, weight N, gradient of N) of a stencil's k-th node.
 
-    Around an axis or centre the gradient is followed by N / r. Contributions of repeated nodes add
-    up.
+    Around an axis or centre the gradient is followed by N / r. If a node occurs more than once, its
+    entries must be added.
     """
 
 
@@ -85,14 +85,14 @@ def mapped_again(basis, grid, moment):
 def without_moment(basis, grid, moment):
     """Return no moment for MUSL's second mapping, as B D^-1 is unbounded where D vanishes.
 
-    Points retain B, but their deformation omits it.
+    Points retain B, but their deformation does not include it.
     """
     return (grid.h - grid.h) * moment
 
 
 @point_function(otherwise=True)
 def first_node(basis, template):
-    """Return the offset that makes the integer part of a position in cells the first node."""
+    """Return the offset in cells: the first node is the integer part of position plus offset."""
     return 0
 
 

@@ -28,9 +28,9 @@ class _Box(NamedTuple):
 class UGIMP(_Box):
     """Uniform GIMP: each point has a box of constant size (Bardenhagen & Kober 2004).
 
-    Weights average the linear basis over [x - l, x + l] per direction, l the initial half size. At
-    large stretch gaps open between boxes, unlike with cpgimp. A wall cuts the box; the point then
-    acts from the centre of the rest.
+    Weights are means of the linear basis over [x - l, x + l] per direction, where l is the initial
+    half size. At large stretch, gaps open between boxes, unlike with cpgimp. Walls cut boxes; the
+    point then acts from the centre of the remaining part.
 
     Example
     -------
@@ -45,7 +45,7 @@ class _Following(_Box):
 class CPGIMPDet(_Following):
     """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
 
-    Rotation does not change them; a stretch in one direction is spread over all.
+    Rotation does not change the boxes. Stretch in one direction is distributed to all directions.
 
     Example
     -------
@@ -58,7 +58,7 @@ class CPGIMPDet(_Following):
 class CPGIMPDiagonal(_Following):
     """Boxes with half sizes l0 |F_ii|, for bodies that do not rotate.
 
-    Rotated by 90 degrees they vanish, which leaves the linear basis.
+    After a rotation by 90 degrees the boxes vanish, and the basis is linear.
 
     Example
     -------
@@ -81,10 +81,10 @@ known_failure(
 
 
 class CPGIMPStretch(_Following):
-    """Boxes with half sizes l0 U_ii, U = sqrt(F^T F) the right stretch.
+    """Boxes with half sizes l0 U_ii, where U = sqrt(F^T F) is the right stretch.
 
-    Rotation does not change them (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit generalised
-    interpolation material point method for large deformations").
+    Rotation does not change the boxes (Charlton, Coombs & Augarde 2017, "iGIMP: An implicit
+    generalised interpolation material point method for large deformations").
 
     Example
     -------
@@ -96,7 +96,7 @@ class CPGIMPStretch(_Following):
 
 
 class CPGIMPCorners(_Following):
-    """Boxes as wide as the mean distance of their corners, which the grid moves.
+    """Boxes whose size is the mean distance between corners that move with the grid.
 
     l_i <- l_i + sum_c s_ci u_ci / 2^d, with displacements u of the 2^d corners c and sides s_ci =
     -1 or 1 (after Coombs et al. 2020, "On Lagrangian mechanics and the implicit material point
@@ -114,12 +114,12 @@ class CPGIMPCorners(_Following):
 class CPGIMP(_Box):
     """Contiguous-particle GIMP: ugimp boxes that deform (Bardenhagen & Kober 2004).
 
-    The box follows ``det`` (the volume), ``diagonal`` (F_ii; vanishes when rotated by 90 degrees),
-    ``stretch`` (U_ii of the right stretch, the default) or ``corners`` (moved by the grid). Boxes
-    stay aligned with the axes; for large shear use a cpdi method.
+    The size of the box follows ``det`` (the volume), ``diagonal`` (F_ii, which vanishes after a
+    rotation by 90 degrees), ``stretch`` (U_ii of the right stretch, the default) or ``corners``
+    (which move with the grid). Boxes remain aligned with the axes; for large shear use CPDI.
 
-    Half sizes stay between 0.001 and 1 cell; more stretch causes numerical fracture. In total
-    Lagrangian methods cpgimp equals ugimp.
+    Half sizes are limited to between 0.001 and 1 cell; more stretch causes numerical fracture. In
+    total Lagrangian methods, cpgimp is the same as ugimp.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, location, direction, halves):
-    """Return an uncut box along one direction, centre and ends in cells; `halves` bound it."""
+    """Return centre and ends in cells of an uncut box along one direction, limited by `halves`."""
     a = in_cells(grid, direction, location[direction])
     half = location[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -152,7 +152,7 @@ def box(grid, kin, location, direction, halves):
 
 
 def in_cell(lo, hi, j):
-    """Integrate 1 and the hat of node j + 1 over [lo, hi] within the cell after node j."""
+    """Integrate 1 and the function of node j + 1 over [lo, hi] within the cell after node j."""
     p = max(lo - j, 0)
     q = min(hi - j, 1)
     length = max(q - p, 0)
@@ -207,11 +207,11 @@ def _end(at, first, top):
     return i, b - i
 
 
-# as for the linear basis, the limit of a vanishing box
+# As for the linear basis, the limit for small boxes.
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
-# F in 2D suffices for axisymmetric points
+# For axisymmetric points, F in 2D is enough.
 
 
 @bases.deformed.on(CPGIMPDet)

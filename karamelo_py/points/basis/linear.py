@@ -10,17 +10,17 @@ from karamelo_py.points.basis.product import Along, along, register
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.transfers import flip_coefficient
 
-STRETCH = 0.3  # strain at which points a cell apart separate
-SMALL = 0.3  # fraction of the stable step at which impacts conserve energy
-PER_CELL = 0.17  # stress falls by about exp(-0.17 N) if stressed material crosses N cells
-TOLD = 0.03  # loss of stress that gives a warning
+STRETCH = 0.3  # strain above which points at distances of a cell separate
+SMALL = 0.3  # fraction of the stable step up to which impacts conserve energy
+PER_CELL = 0.17  # stress decreases by about exp(-0.17 N) if stressed material crosses N cells
+TOLD = 0.03  # loss of stress for a warning
 
 
 class Linear(NamedTuple):
     """Linear hat functions on the nodes: the basis of the original MPM (Sulsky et al. 1994).
 
-    The cheapest basis. Its gradient jumps at cell faces: when a stressed point crosses one, nodal
-    forces jump too (cell-crossing error).
+    This is the cheapest basis. Its gradient jumps at cell faces: when a stressed point crosses a
+    face, nodal forces jump, too (cell-crossing error).
 
     Example
     -------
@@ -33,7 +33,7 @@ class Linear(NamedTuple):
     )
 
 
-WIDEST = 1.5  # cells between points with common nodes
+WIDEST = 1.5  # distance in cells up to which points have common nodes
 
 
 def _apart(scene: Any) -> dict[str, Any] | None:

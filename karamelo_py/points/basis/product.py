@@ -16,7 +16,7 @@ class Along(NamedTuple):
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
     affine: tuple[float, ...]  # N D^-1 (X_I - x), D = sum N (X_I - x)^2
-    ends: tuple[tuple[int, float], ...] = ()  # of a box: cell from `first`, position in it
+    ends: tuple[tuple[int, float], ...] = ()  # of a box: cell from `first`, position in the cell
 
 
 class Stencil(NamedTuple):
@@ -43,7 +43,7 @@ def along(basis, kin, grid, location, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """Return N D^-1 (X_I - x) of a line's nodes, if `along` omits it."""
+    """Return N D^-1 (X_I - x) of the nodes of a line, for bases whose `along` does not give it."""
     return line.affine
 
 
@@ -82,7 +82,7 @@ def inverse_radius(r):
 
 
 def radius(basis, grid, line):
-    """Return the radius that the weights reproduce: the point's, unless a wall cuts its domain."""
+    """Return sum N r: the radius of the point, unless a wall cuts its domain."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)

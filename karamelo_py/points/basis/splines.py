@@ -44,8 +44,9 @@ def hats(grid, a, cell, first, count):
 class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    Continuous gradients: no cell-crossing error. Nine nodes in 2D (linear: four). Extrapolation
-    beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives linear hats within half a cell of it.
+    Gradients are continuous: no cell-crossing error. A point has nine nodes in 2D (linear: four).
+    Linear extrapolation beyond a wall, phi(-1) = 2 phi(0) - phi(1), makes functions linear within
+    half a cell.
 
     Example
     -------
@@ -96,7 +97,7 @@ def in_bulk(basis, grid, line, direction):
 
 @product.affine_along.on(QuadraticSpline)
 def _affine_along_quadratic_spline(basis, grid, line, direction):
-    # D = h^2 / 4. For hats, N D^-1 (X - x) is the gradient.
+    # D = h^2 / 4. For a linear basis, N D^-1 (X - x) is the gradient.
     four = 4 * grid.inv_h
     affine = tuple([four * (k - line.r) * weight for k, weight in enumerate(line.weights)])
     return where(in_bulk(basis, grid, line, direction), affine, line.gradients)
@@ -117,10 +118,10 @@ def _evenly_quadratic_spline(basis, grid, stencil):
 
 @product.retained.on(QuadraticSpline)
 def _retained_spline(basis, stencil):
-    """Fade out velocity gradients towards a wall nearer than NARROW allows.
+    """Return the retained fraction of velocity gradients, below 1 where D / h^2 < NARROW at a wall.
 
-    With the spread D -> 0, the pressure of an isolated point drives its node of vanishing mass with
-    the frequency c / sqrt(D), which is unstable at any step.
+    As D goes to 0, the pressure of an isolated point accelerates a node of vanishing mass with the
+    frequency c / sqrt(D), which is unstable for any step.
     """
     kept = []
     for line in stencil.lines:
@@ -172,8 +173,8 @@ of_splines(
 class CubicSpline(NamedTuple):
     """Cubic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
-    The smoothest and most costly spline: 16 nodes in 2D, 64 in 3D. Extrapolation beyond a wall,
-    phi(-1) = 2 phi(0) - phi(1), gives the boundary functions.
+    The smoothest and most costly spline, with 16 nodes in 2D and 64 in 3D. Linear extrapolation
+    beyond a wall, phi(-1) = 2 phi(0) - phi(1), gives the boundary functions.
 
     Example
     -------
@@ -181,7 +182,7 @@ class CubicSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_total: the shortest waves nearly average out; a shaken block is stable up to 2.1 to
+    # courant_total: the shortest waves nearly average out; a vibrating block is stable up to 2.1 to
     # 2.4 h/c in 1D (tests/test_stability.py), 1.8 to 2.4 in 2D, 1.4 to 2.3 in 3D (Poisson's ratio
     # 0.45 and 0). courant_still, as for quadratic splines: 1.9 to 2.7, 1.84 to 2.6, 1.46 to 2.7.
     # courant_strained_first: when strains lacked (dt grad v)^2, a ball of 3 cells radius gained 46

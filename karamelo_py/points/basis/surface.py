@@ -9,7 +9,7 @@ from karamelo_py.points.basis import entry, locate, support
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.kinematics import Line
 
-CELLS = 16  # samples along a line
+CELLS = 16  # samples per cell along a line
 ENTRIES = 256  # table entries per cell
 
 
@@ -42,7 +42,7 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:
-        # Functions differ between nodes, so the gap is unknown, and fields touch on contact.
+        # Functions differ from node to node, so the gap is unknown: contact at a common node.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)

@@ -13,8 +13,8 @@ tag               vector          velocity gradient, F           symmetric tenso
 ================  ==============  =============================  =================================
 
 Gradients of basis functions end with N/r for each direction around an axis or centre (hoop strain
-and force). Kernels are traced for each tag, so loops, classes and operators here cost nothing at
-run time. a + dt * b of tensors rounds once (`fma`).
+and force). Kernels are traced for each tag, so loops, classes and operators of this module cost
+nothing at run time. a + dt * b of tensors is rounded once (`fma`).
 """
 
 from collections import namedtuple
@@ -31,7 +31,7 @@ COMPILED = not config.DISABLE_JIT  # interpreted code rounds `fma` twice
 class Line(NamedTuple):
     word = "1D"
     per = ""  # unit of forces, masses and energies
-    hoops = 0  # directions around an axis or centre, x being the distance
+    hoops = 0  # number of hoop directions, in which case x is the distance from axis or centre
     dimension = 1
     tensor_names = ("11",)
 
@@ -93,7 +93,7 @@ def planar(kin):
 
 
 def total(terms):
-    """Sum left to right; `sum` rounds differently from Python 3.12 on."""
+    """Sum from left to right; since Python 3.12, `sum` rounds differently."""
     made = terms[0]
     for term in terms[1:]:
         made = made + term
@@ -114,14 +114,14 @@ def dot(*vectors):
 class Elements(tuple):
     """Components that exist in a kinematics.
 
-    `places` are their (row, column) from 0, twice the direction for vectors; `axes` the row
-    indices. Tensors have `acting`, `places` with the direction that a row acts in (radial for hoop
-    components), and `rows`, the index and column of the components per direction, last first.
+    `places` are (row, column) from 0, for vectors twice the direction; `axes` are the row indices.
+    Tensors also have `acting`, which is `places` with the direction in which a row acts (radial for
+    hoop components), and `rows`, index and column of the components by direction, last first.
     """
 
     __slots__ = ()
-    __array_ufunc__ = None  # leaves products with NumPy numbers to these classes
-    origin = None  # of a product: function to add it with one rounding, and factors
+    __array_ufunc__ = None  # products with NumPy numbers are made by these classes
+    origin = None  # for a product: the function that adds it with one rounding, and the factors
 
     def __add__(self, other):
         if type(other) is Isotropic:
@@ -268,11 +268,11 @@ class Tensor(Matrix):
         return self
 
     def strain_at_end(self):
-        """Return the strain of a small increment, whose stress adds to the rotated old stress."""
+        """Return the strain of a small increment; its stress is added to the rotated old stress."""
         return sym(self)
 
     def after(self, dl):
-        """Return (I + dl) F as F + dl F, which preserves the digits of small increments."""
+        """Return (I + dl) F as F + dl F, in which small increments retain their digits."""
         a, b = dl.at(), self.at()
         return self._make(
             [
@@ -334,7 +334,7 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.logarithm
 
     def strain_at_end(self):
-        """Return the strain in the axes at the end: the added stress rotates by half the angle."""
+        """Return the strain in the axes at the end; its stress is rotated by half the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 
@@ -386,8 +386,8 @@ class SymmetricTensor(Matrix):
         scale = 1 / (1 + tt)
         cosine = (1 - tt) * scale
         sine = (t + t) * scale
-        # The in-plane deviator rotates by twice the angle; adding the change makes zero rotation
-        # exact.
+        # The in-plane deviator rotates by twice the angle. The change is added, so that zero
+        # rotation is exact.
         double_sine = 2 * sine * cosine
         double_versine = -2 * sine * sine
         apart = 0.5 * (xx - yy)
@@ -436,7 +436,7 @@ class SymmetricTensor(Matrix):
         return max(*[total([abs(a[pair]) for pair in row if pair in a]) for row in rows])
 
     def smallest_row_difference(self):
-        """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest one."""
+        """Return min_i (s_ii - sum_j |s_ij|), j != i, a bound of the smallest eigenvalue."""
         a = self.at()
         rows = [[abs(a[i, j]) for j in range(3) if j != i and (i, j) in a] for i in range(3)]
         return min(*[a[i, i] - total([0, *row]) for i, row in enumerate(rows)])
@@ -495,7 +495,7 @@ for _tag in TAGS:
     else:
         _tag.Vector = _tag.Gradient = tensor_class(Vector, _tag, _names)
     _tag.Gradient.tensor = _tag.Tensor
-    _tag.Unknown = _tag.Vector  # of a node, in implicit steps
+    _tag.Unknown = _tag.Vector  # unknowns of a node in implicit steps
     for _one in (_tag.Tensor, _tag.Symmetric):
         set_rows(_one, _tag.Tensor)
     for _one in (_tag.Vector, _tag.Gradient, _tag.Tensor, _tag.Symmetric):
@@ -552,8 +552,8 @@ def stretch(f):
 
     2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|) (Hoger & Carlson 1984, J. Elasticity 14). 3D: U
     = (C + i2 I)^-1 (i1 C + i3 I) with the invariants of U, i1^2 = tr C + 2 i2 and i2^2 = c2 + 2 i1
-    i3. Newton's method for i1 starts from the bound sqrt(3 tr C), which strains change in second
-    order only.
+    i3. Newton's method for i1 starts from the upper bound sqrt(3 tr C), from which i1 differs in
+    second order of the strains.
     """
     if f.kin.dimension == 3:
         return stretch_in_space(f)

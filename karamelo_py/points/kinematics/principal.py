@@ -29,7 +29,7 @@ def from_principal(s, values, directions, slopes=None):
         a, b, c = values
         mean = 0.5 * (a + b)
         radius = 0.5 * (a - b)
-        cosine, sine = directions  # of twice the angle of the first direction
+        cosine, sine = directions  # cosine and sine of twice the angle of the first direction
         change = radius * cosine
         return s._make([mean + change, mean - change, c, radius * sine])
 
@@ -59,7 +59,7 @@ def jacobi_rotation(a, b, c):
     return cosine, t * cosine, t
 
 
-# Each sweep squares the off-diagonal remainder.
+# Each sweep squares the off-diagonal part.
 _SWEEPS = 8
 
 
@@ -88,7 +88,7 @@ def principal_in_space(s):
 
 
 def rotated(k, g, u, v):
-    return k * u - g * v, k * v - (-g) * u  # differences, as a sum would round once
+    return k * u - g * v, k * v - (-g) * u  # differences, as a sum is rounded once
 
 
 def real_principal(s):
@@ -108,7 +108,7 @@ def exponential_of(s):
     return from_principal(s, exponentials, directions, exponentials)
 
 
-# Jacobi rotations stop at a diagonal tensor, whose derivative may not be diagonal. With S' in the
+# Jacobi rotations end with a diagonal tensor, whose derivative may not be diagonal. With S' in the
 # frame of principal directions n, f(S)' = sum_a f_a' n_a n_a + sum_ab (f_a - f_b) / (s_a - s_b)
 # (n_a . S' n_b) (n_a n_b + n_b n_a), a < b (Ogden 1997, "Non-linear elastic deformations", section
 # 6.1).
@@ -175,7 +175,7 @@ class PairLimits(NamedTuple):
     third: Any
 
 
-# relative difference below which mean slopes beat difference quotients
+# Relative difference below which mean slopes are more accurate than difference quotients.
 ALIKE = 1e-5
 
 
@@ -185,7 +185,7 @@ def turning_ratios(values, directions, slopes):
         if isinstance(slopes, PairLimits):
             limit = slopes[k]
             alike = abs(apart) < ALIKE
-        elif slopes is None:  # at an edge or the apex, equal principal values stay equal
+        elif slopes is None:  # at an edge or the apex, equal principal values remain equal
             alike, limit = apart == 0, 0
         else:
             limit = 0.5 * (slopes[a] + slopes[b])

@@ -1,9 +1,9 @@
 """Axisymmetric bodies that twist: a velocity around the axis, and its shears.
 
-Axes 1, 2, 3 are along the radius, along the axis, and around it. They rotate with each point around
-the axis, so rigid rotations strain nothing. Tensors have the components of 3D in another order; 13
-and 23 of velocity gradient and F are 0. With a point's angular velocity w and rotation phi, the
-gradient has r dw/dr in 31 and r dw/dz in 32, F has r dphi/dR and r dphi/dZ.
+Axes 1, 2, 3 are along the radius, along the axis, and around it. They rotate around the axis with
+each point, so that rigid rotation causes no strain. Tensors have the components of 3D in another
+order. In velocity gradient and F, components 13 and 23 are 0; with angular velocity w and rotation
+phi, 31 and 32 are r dw/dr and r dw/dz in the gradient, r dphi/dR and r dphi/dZ in F.
 """
 
 from karamelo_py.compiler import algebra, real
@@ -33,9 +33,9 @@ class TwistedStress(SymmetricTensor):
     __slots__ = ()
 
     def nominal(self, F):
-        """Return P = s F^-T, but s_33 / F_33 in 33: what acts on the radius.
+        """Return P = s F^-T, but with s_33 / F_33 in 33, which acts on the radius.
 
-        A radial displacement also stretches 31 and 32 of F, in proportion to r.
+        A radial displacement also changes 31 and 32 of F, in proportion to r.
         """
         made = SymmetricTensor.nominal(self, F)
         hoop = self[2] / F[4]
@@ -65,7 +65,7 @@ def gradient_around(v, omega, slopes):
 def times_radius(gradient, r, F):
     """Make an increment of a sum of `gradient_around`; F is () in the updated frame.
 
-    The radius r at the end of the step makes F follow from the positions.
+    With the radius r at the end of the step, F is a function of the positions.
     """
     around = tuple([r * slope for slope in gradient[5:7]])
     if len(F):

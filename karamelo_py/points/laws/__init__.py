@@ -1,12 +1,12 @@
 """Constitutive laws of a point, one file each: the script style and its point functions.
 
-A law is a NamedTuple of parameters, some of them NamedTuples (parts, as in `eos_strength`). Its
-state is a NamedTuple of numbers and tensors in the kinematics `kin`; `j` = det F.
+A law is a NamedTuple of parameters, some of which may be NamedTuples (parts, as in `eos_strength`).
+The state is a NamedTuple of numbers and tensors in the kinematics `kin`; `j` = det F.
 
 The class docstring is the manual. A style's arguments are the annotated fields, or the parameters
-of a classmethod `given` that returns the law. `checked` refuses values that annotations cannot, and
-returns the law or an equivalent simpler one. ``traits`` (:class:`LawTraits`) is a class attribute;
-`column` declares output columns.
+of a classmethod `given` that returns the law. `checked` refuses values that annotations cannot
+exclude, and returns the law or an equivalent simpler law. ``traits`` (:class:`LawTraits`) is a
+class attribute; `column` declares output columns.
 
 If a law and all its parts have ``in_lanes``, several points are computed at once; point functions
 then branch only with `where`, except those in ``scalarised``.
@@ -24,11 +24,11 @@ from karamelo_py.compiler import point_function, real
 
 class LawTraits(NamedTuple):
     rebounds: bool = False  # sustains tension and returns all work done on it
-    flows: bool = False  # holds no shape: liquids, soils
-    rings: bool = True  # vibrates if it has a shear modulus
-    any_speed: bool = False  # may move many times faster than its waves: gases
-    hypoelastic: bool = False  # never yields, but does not return all work
-    of_solids: bool = False  # eos that holds solids together
+    flows: bool = False  # has no permanent shape: liquids, soils
+    rings: bool = True  # bodies vibrate if it has a shear modulus
+    any_speed: bool = False  # speeds may be far above its wave speed: gases
+    hypoelastic: bool = False  # never yields, but returns not all work
+    of_solids: bool = False  # eos that sustains tension
     burns: bool = False  # products of an explosive
     fluid: bool = False  # eos of a liquid or gas
     by_temperature: bool = False  # needs a temperature from its solid
@@ -61,13 +61,13 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the law or a part has the point function itself, not by a wrapped law."""
+    """Return True if the law or a part defines the point function itself, not by a wrapped law."""
     kinds = (kind for kind in law_kind(law) if function.defined(kind))
     return any(function.find((kind,)) not in _handing_on for kind in kinds)
 
 
 def answered(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the law answers the point function, alone or by the law that it wraps."""
+    """Return True if the law defines the point function, itself or by the law that it wraps."""
     kind = type(law)
     if not function.defined(kind):
         return False
@@ -90,8 +90,7 @@ def _elastic_law_within(law):
 
 
 def answers(law: type, values: dict[Callable, Any]) -> None:
-    """Answer point functions of a law by a field of their last argument, its state, or by a
-    constant.
+    """Define point functions of a law by a field of the state, their last argument, or a constant.
 
     A string names the field: ``answers(CamClay, {elastic_strain: "e", by_rates: False})``.
     """
@@ -124,7 +123,7 @@ def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
 
 
 def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Let the law in field `component` of `outer`, with the state `kept`, answer `functions`.
+    """Define `functions` of `outer` by the law in field `component`, with the state in `kept`.
 
     These take (law), (law, template), or law, kinematics (replaced by `kin`), state and more.
     """
@@ -173,7 +172,7 @@ def column(component: type, name: str, source: Callable | NamedTuple | None = No
 
 
 def no_columns(component: type) -> None:
-    """Declare that a class has no columns, whatever its bases have."""
+    """Declare that a class has no columns, even if its bases have."""
     _columns[component] = None
 
 
@@ -196,7 +195,7 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def law_here(law, within, state):
-    """Return the inner law with the numbers of this point."""
+    """Return the inner law with the numbers of the point."""
     return within
 
 
@@ -249,7 +248,7 @@ def advance(law, kin, state, dl, dt):
 class FbarStep(NamedTuple):
     dl: Any
     dt: Any
-    extra: Any  # pressure in the nodal forces minus the point's (F-bar)
+    extra: Any  # pressure in the nodal forces minus pressure of the point (F-bar)
 
 
 @point_function(otherwise=True)
@@ -259,7 +258,7 @@ def advance_fbar(law, kin, state, step):
 
 @point_function()
 def kirchhoff_stress(law, kin, state):
-    """Return det F times the Cauchy stress; forces take it times the reference volume."""
+    """Return det F times the Cauchy stress, which forces multiply by the reference volume."""
 
 
 @point_function(otherwise=True)
@@ -308,7 +307,7 @@ def is_round(law):
 
 @point_function(otherwise=True)
 def shear_part(law, kin, state):
-    """Return the part 2 G / rho of `wave_speed_squared`, or more; thin bodies have slower waves."""
+    """Return the part 2 G / rho of `wave_speed_squared`, or more, for waves in thin bodies."""
     return wave_speed_squared(law, kin, state)
 
 

@@ -1,6 +1,6 @@
 """Laws of generalised plane strain, with a prescribed stretch F_zz across the plane.
 
-Before each step `impose_stretch` sets the stretch at its end. The inner law has tensors of
+Before each step, `impose_stretch` sets the stretch at its end. The inner law has the tensors of
 `Axisymmetric`.
 """
 
@@ -17,10 +17,10 @@ class Across(Thin):
 
 
 class State(NamedTuple):
-    whole: Any  # of the inner law
+    whole: Any  # state of the inner law
     across: Any  # present F_zz
     target: Any  # F_zz at the end of the step
-    work: Any  # done across per reference volume, since last counted
+    work: Any  # work across per reference volume, since it was last summed
 
 
 @laws.initial_state.on(Across)

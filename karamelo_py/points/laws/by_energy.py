@@ -1,7 +1,7 @@
 """Hyperelastic laws from a stored energy, differentiated when the law is defined.
 
-Formulas of invariants are computed in lanes; of principal stretches, or with `ONE_BY_ONE`, point by
-point (`karamelo_py.points.laws.formulas`).
+Formulas of invariants are computed in lanes. Formulas of principal stretches, or with functions in
+`ONE_BY_ONE`, are computed point by point (`karamelo_py.points.laws.formulas`).
 """
 
 from collections.abc import Callable, Sequence
@@ -72,7 +72,7 @@ IN_STRETCHES = {
     "I1": plus(plus(_A, _B), _C),
     "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
     "J": times(times(_L[0], _L[1]), _L[2]),
-    **dict.fromkeys(FIBRES, Expression(1.0)),  # matrix only
+    **dict.fromkeys(FIBRES, Expression(1.0)),  # for the matrix without fibres
 }
 
 
@@ -86,9 +86,9 @@ def law_of(
     """Build the law with this stored energy per reference volume.
 
     `directions` are :class:`~karamelo_py.points.laws.fibres.Fibres` if the formula has I4 or I6,
-    `T` is the temperature at rest, `kind` the class of a law of invariants. Raise ScriptError for
-    operations without a derivative, for stress or no stiffness at rest, and for anisotropic
-    formulas.
+    `T` is the temperature at rest, `kind` the class of a law of invariants. Raises ScriptError for
+    operations without a derivative, for stress at rest, for no stiffness at rest, and for
+    anisotropic formulas.
     """
     term = replaced(energy, {"I3": to_power(Expression.seed("J"), 2)})
     check_operations(term, "energy", KNOWN - {*COMPARED, "if"})
@@ -267,7 +267,7 @@ def stiffness_along_fibre(
 
 
 def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
-    """Return the least stiffness along a principal direction or a path at constant volume."""
+    """Return the smallest stiffness along a principal direction or a path at constant volume."""
     at = PATHS[path](x)
     stiffness = [directional_stiffness(law, at, a) for a in {*map(at.index, at)}]
     if path in ISOCHORIC:
@@ -279,8 +279,8 @@ def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
 def first_instability(law: NamedTuple, turning: bool = False) -> tuple[str, float] | None:
     """Return path and stretch nearest to rest where a direction or path loses its stiffness.
 
-    A path ends where the energy does, as at the limit of chains. Fibres whose directions are
-    `turning` from point to point may enclose any angle.
+    A path ends where the energy is not defined, as at the limit of chains. Fibres whose directions
+    differ from point to point (`turning`) may enclose any angle.
     """
     unstable = []
     judged = [(path, partial(least_stiffness, law, path), x) for path in PATHS for x in (0.5, 3.0)]
@@ -416,7 +416,7 @@ def _kirchhoff_stress_of_stretches(law, kin, state):
 
 
 PAIRS = tuple(combinations(range(3), 2))
-CLOSE = 1e-5  # squared stretches this close count as equal
+CLOSE = 1e-5  # relative difference of squared stretches that count as equal
 
 
 def limits_of(law, at, slopes):

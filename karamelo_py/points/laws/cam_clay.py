@@ -40,7 +40,7 @@ class CamClayConstants(NamedTuple):
     kappa
         The same slope in swelling, below lam.
     p0
-        Initial pressure.
+        Initial effective pressure.
     pc
         Initial preconsolidation pressure, at least p0; default p0.
 
@@ -61,10 +61,10 @@ class CamClayConstants(NamedTuple):
     q/p. At the critical state: p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic strain ep,
     and pc. There is no tension. A stress of fix initial_stress outside the surface raises pc.
 
-    At a free surface a load must balance p0, or the first step releases it: ``fix(cover,
-    edge_traction, all, b, yhi, 0, -100e3)`` at the top of the solid's region b with the other sides
-    held, or ``fix(cell, edge_pressure, all, b, 100e3)`` all around. With fix initial_stress, the
-    load is its normal component.
+    At a free surface, a load must balance p0, which otherwise is released in the first step:
+    ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top of the solid's region b with
+    the other sides held, or ``fix(cell, edge_pressure, all, b, 100e3)`` all around. With fix
+    initial_stress, the load must be its normal component.
 
     With anti_volumetric_locking, overconsolidated clay has the same peak strength but softens more:
     by 4 % with an overconsolidation ratio of 8, by 13 % with 16 (biaxial tests).
@@ -148,8 +148,8 @@ def _advance_cam_clay(law, kin, state, dl, dt):
     )
 
 
-# Returns to the surface with plastic compression y and w = 6 G / M^2 times the plastic multiplier:
-# q becomes q / (1 + w), p p exp(-y / kappa), pc pc exp(y / (lam - kappa)).
+# The return to the surface has the plastic compression y and w = 6 G / M^2 times the plastic
+# multiplier: q becomes q / (1 + w), p gets the factor exp(-y / kappa), pc exp(y / (lam - kappa)).
 
 
 class ClayStress(NamedTuple):
@@ -182,7 +182,7 @@ def newton_step(law, trial, y, w, errors):
     return k * (fw * g - gw * f), k * (gy * f - fy * g)
 
 
-_BISECTIONS = 14  # then Newton's method squares the error
+_BISECTIONS = 14  # after these, Newton's method squares the error in each iteration
 _NEWTON = 4
 
 
@@ -190,8 +190,8 @@ _NEWTON = 4
 def plastic_flow(law, q, p, pc):
     """Return the y and w that return a trial with q and p to the surface; 0 inside it.
 
-    With (1 + w) = q / q_s, q_s on the surface, one equation for y remains. Its solution lies
-    between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
+    With (1 + w) = q / q_s, where q_s is on the surface, one equation for y remains. Its solution
+    lies between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
     q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
@@ -222,7 +222,7 @@ def plastic_flow(law, q, p, pc):
 
 @implements(plastic_flow, Dual)
 def _plastic_flow_slopes(law, q, p, pc):
-    # one Newton correction carries the residual's derivatives
+    # One Newton correction at the solution has the derivatives of the residual.
     q0, p0, pc0 = value_of((q, p, pc))
     y, w = plastic_flow(law, q0, p0, pc0)
     yields = w > 0

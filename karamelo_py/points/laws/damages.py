@@ -1,7 +1,7 @@
-"""Damages: the lost fraction D of a point's strength, a part of `eos_strength`.
+"""Damages: the lost fraction D of the strength of a point, a part of `eos_strength`.
 
-A damage is a NamedTuple of parameters; its memory is a tuple. Stress, except pressure, is scaled by
-1 - D; equation of state and strength do not depend on it.
+A damage is a NamedTuple; its memory is a tuple. Stress, except pressure, is scaled by 1 - D;
+equation of state and strength do not depend on it.
 """
 
 from typing import Any, NamedTuple
@@ -43,7 +43,7 @@ def initiation(damage, memory):
     """Return the damage initiation, growing from 0; damage begins at 1."""
 
 
-# lowest triaxiality: below it most metals have no finite failure strain
+# triaxiality below which most metals do not fail
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
 # Damage grows from 0 to 1 while sum(strain over failure strain) grows from 1 to 1 + 1/this.
@@ -76,10 +76,11 @@ class JohnsonCookDamage(NamedTuple):
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
     Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate, the
     third without a temperature. w (dump column damage_init) sums plastic strain over failure
-    strain. From w = 1, D (dump column damage) grows to 1 as 10 (w - 1). Nothing fails for t below
-    -3. d1 may be negative; failure strains are at least 1e-6.
+    strain. Beyond w = 1, D (dump column damage) is 10 (w - 1), up to 1. There is no failure for t
+    below -3. d1 may be negative; failure strains are at least 1e-6.
 
-    sigma = (1 - D) s - p I, with p times 1 - D in tension. Lost stored energy counts as dissipated.
+    sigma = (1 - D) s - p I, with p times 1 - D in tension. Stored energy that is lost by damage
+    counts as dissipated.
 
     See Also
     --------

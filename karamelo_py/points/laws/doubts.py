@@ -23,9 +23,9 @@ from karamelo_py.points.laws.thermoelastic import Thermoelastic
 
 SLOW = 0.01  # wave speed in m/s or mm/ms, if density and modulus are exchanged
 SMALL = 2.0  # degrees; smaller friction angles are likely in radians
-EXPANSION = 1e-10, 1e-3  # per kelvin, far beyond quartz and polymers
-TOUGH = 50.0  # failure strain in shear; larger is likely in percent
-APART = 100.0  # kelvin between reference temperatures on one scale
+EXPANSION = 1e-10, 1e-3  # per kelvin; the range of quartz to polymers is far inside
+TOUGH = 50.0  # failure strain in shear; larger ones are likely in percent
+APART = 100.0  # K, largest difference of reference temperatures in the same unit
 MELTS = 0.1  # plastic strain whose heat melts no real metal
 COEFFICIENT = 2.0  # friction between grains; real values are far smaller
 STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; likewise
@@ -36,7 +36,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if parameter(parameter(law, "strength"), "cell_size", None) is not None:
-        # Set later; viscosity damps waves by it.
+        # The cell size, by which viscosity damps waves, is not known yet.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

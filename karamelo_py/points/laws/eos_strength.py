@@ -1,7 +1,7 @@
 """Material eos-strength: a law composed of parts named in the script.
 
-An equation of state gives pressure, a strength deviatoric stress; viscosity, damage and temperature
-are optional (`Absent`, without numbers in the state). Plug-ins may chain further parts
+An equation of state gives the pressure, a strength the deviatoric stress. Viscosity, damage and
+temperature are optional (`Absent`, without numbers in the state). Plug-ins may chain further parts
 (`karamelo_py.points.laws.further`).
 """
 
@@ -53,7 +53,7 @@ from karamelo_py.points.laws.thermoelastic import is_warm
 from karamelo_py.points.laws.viscosity import damped, inviscid, viscous_pressure, viscous_speed
 from karamelo_py.script.errors import ScriptError, unknown
 
-WARMER = 1.0, 100.0, 1000.0  # kelvin above a test point
+WARMER = 1.0, 100.0, 1000.0  # temperatures in kelvin above the present one, for a test
 
 
 class Eos:
@@ -106,8 +106,9 @@ class EosStrength(NamedTuple):
     parts
         ID of a damage, ID of a temperature, in either order; both optional.
     strain
-        ``rate``: the symmetric part of dt grad v strains, the skew part rotates s. ``logarithmic``:
-        s follows from the logarithmic elastic stretch, exact for steps of any size.
+        ``rate`` (default): the symmetric part of dt grad v is the strain increment, the skew part
+        rotates s. ``logarithmic``: s is computed from the logarithmic elastic strain, which is
+        exact for steps of any size.
 
     Example
     -------
@@ -119,10 +120,10 @@ class EosStrength(NamedTuple):
     Notes
     -----
     sigma = s - p I. The deviatoric stress s rotates with the point (Jaumann rate; Hughes & Winget
-    1980), or is 2 G dev of the logarithmic elastic strain (Simo 1992); in small steps they differ
-    only at large elastic shear. The elastic strain is the strain of s plus ln J / 3 (for soils, of
-    the elastic part of J). The strain energy excludes plastic work (compute dissipated_energy). Fix
-    initial_stress changes the volume of points by its pressure.
+    1980), or is 2 G dev of the logarithmic elastic strain (Simo 1992); in small steps, both differ
+    only at large elastic shear. The elastic strain is the strain due to s plus ln J / 3 (for soils,
+    with the elastic part of J). The strain energy does not include plastic work (see compute
+    dissipated_energy). Fix initial_stress changes the volume of points by its pressure.
 
     See Also
     --------
@@ -246,13 +247,13 @@ FAST = 0.02  # fraction of the wave speed above which impacts make metals yield
 
 
 def _locks(law, scene):
-    """Isochoric flow in load steps locks linear cells."""
+    """Return whether isochoric flow in load steps locks cells of a linear basis."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _locks_at_impact(law, scene):
-    """At impact in the total frame, points stay in their linear cells, which lock."""
+    """Return whether cells lock at impact in the total frame, where points stay in them."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"mark": scene.method.mark}
 
@@ -306,7 +307,7 @@ def _initial_state_eos_strength(law, kin, template):
         viscous,
         initial_damage(law.damage, template),
         initial_heat(law.temperature, template),
-        # (0,) where a part dissipates
+        # (0,) if a part dissipates energy
         strengths.initial_loss(law.strength, template)
         or viscous
         or eos.initial_loss(law.eos, template),
@@ -363,7 +364,7 @@ def present(law, m):
 def rotated_with_point(law, kin, state, dl):
     s = state.s
     if isinstance(law.strain, Absent):
-        # Flow is in equilibrium with the strain at the end of the step, which is not rotated.
+        # Fluids have the stress of the strain at the end of the step, which is not rotated.
         elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
     e = symmetric_tensor(kin, strengths.shear_strain(present(law, state.m), kin, s))
@@ -397,7 +398,7 @@ def volume_energy(law, j, m):
 
 
 def energy_to_unload(law, elastic, m):
-    """Return the energy per elastic volume released with the pressure."""
+    """Return the energy per elastic volume that is released with the pressure."""
     energy = energy_of_elastic_volume(law, elastic, m)
     if len(m.heat):
         # without pressure, a warm point is larger than at rest
@@ -437,8 +438,8 @@ def sound(law, j, m):
 def sound_lost_to_damage(law, j, m):
     """Return the squared wave speed lost to damage.
 
-    A broken point in tension has no waves, but may soon close, so waves of rubble at its initial
-    volume always count.
+    A broken point in tension has no waves, but its cracks may soon close, so the wave speed of
+    rubble at its initial volume is a lower bound.
     """
     if isinstance(law.damage, Absent):
         return 0

@@ -35,7 +35,7 @@ class Fibres(NamedTuple):
 
 
 class OfFibres(OfInvariants):
-    """Adds I4 = a0.C a0 and I6 = b0.C b0 of two families; has a field `directions`."""
+    """A law that also depends on I4 = a0.C a0 and I6 = b0.C b0; has a field `directions`."""
 
     __slots__ = ()
     twice_along: ClassVar[tuple[Code, ...]]  # derivatives by I4 I4, I6 I6, I4 I6
@@ -85,7 +85,7 @@ def _kirchhoff_stress_of_fibres(law, kin, state):
 
 def stiffness_of_fibres(law, b, at):
     """Return bounds of the fibres' stiffness; |a n|^2 <= I4 for a unit vector n."""
-    # Slack fibres count with their stiffness at rest, as the next step may stretch them.
+    # Slack fibres are included with their stiffness at rest, as the next step may stretch them.
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at
     high = b.largest_row_sum()

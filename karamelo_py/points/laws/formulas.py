@@ -1,8 +1,8 @@
-"""Formulas in laws: read from a script, differentiated, and code of a class.
+"""Formulas in laws, which are read from a script, differentiated, and made code of a class.
 
-The structure of a formula is in the law's class, so kernels contain it as code; its numbers are
-parameters. Laws that differ only in numbers have common kernels, unless some are equal or small
-whole exponents.
+The structure of a formula is in the class of the law, so kernels contain it as code; its numbers
+are parameters. Laws that differ only in numbers have the same kernels, unless numbers are equal, or
+are exponents that are small integers.
 """
 
 from collections import namedtuple
@@ -26,8 +26,8 @@ from karamelo_py.script.expressions import applied as of_operands
 from karamelo_py.script.parser import parse_text
 from karamelo_py.script.terms import Term
 
-WHOLE = {*range(-8, 9)} - {0}  # exponents that are code, not parameters
-ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not in lanes
+WHOLE = {*range(-8, 9)} - {0}  # exponents that are part of the code, not parameters
+ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not computed in lanes
 COMPARED = ("<", "<=", ">", ">=")
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min")
 KNOWN = {*OF_ONE, *OF_TWO, *COMPARED, "number", "name", "if"}
@@ -73,7 +73,7 @@ class Constants:
 
 
 def with_numbers(formula: str, **numbers: float) -> Expression:
-    """Return a formula with its constants; other names stay names."""
+    """Return a formula with its constants; other names remain names."""
     raw, node = parse_text(formula)
     return Expression(evaluation.evaluate(node, raw, Constants(numbers)))
 
@@ -111,7 +111,7 @@ PLAIN: dict[str, Callable] = {
 
 
 def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -> Expression:
-    """Return the formula in operations known to laws; raise ScriptError for others."""
+    """Return the formula in operations that laws support; raise ScriptError for others."""
     results: dict[int, Expression] = {}
     for one in terms.in_order(formula):
         operands = [results[id(operand)] for operand in one.operands]

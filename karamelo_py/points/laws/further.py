@@ -1,7 +1,7 @@
 """Further parts of a composed law, whose kinds plug-ins may define.
 
-A part is a NamedTuple of parameters, with an optional memory and added pressure. The plastic strain
-rate is one, added if an output requests it.
+A part is a NamedTuple of parameters, with an optional memory and an added pressure. The plastic
+strain rate is such a part, which is added if an output requests it.
 """
 
 from functools import reduce
@@ -33,7 +33,7 @@ def initial_part(component, template):
 
 @point_function(otherwise=True)
 def part_after(component, memory, law, step, memories):
-    """Return the memory after a `StrainStep` with new s; `memories` are the other parts'."""
+    """Return the memory after a `StrainStep` with new s; `memories` belong to other parts."""
     return memory
 
 
@@ -64,7 +64,7 @@ def further_pressure(parts, memory, p):
     return further_pressure(parts.rest, rest, p + sum(part_pressure(parts.component, first)))
 
 
-# Karamelo smooths the rate over the time of sound through this many cells.
+# As in Karamelo, the rate is smoothed over the time in which sound crosses this number of cells.
 CELLS = 1000
 
 

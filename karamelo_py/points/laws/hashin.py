@@ -30,7 +30,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 class Hashin(NamedTuple):
-    """Elastic solid with fibres, of which fibres and matrix break at different stresses.
+    """Elastic solid with fibres, in which fibres and matrix fail by different criteria.
 
     Parameters
     ----------
@@ -39,15 +39,15 @@ class Hashin(NamedTuple):
     X, Xc
         Strengths along axis 1, the fibres, in tension and compression.
     Y, Yc
-        Strengths across the fibres in tension and compression.
+        Strengths normal to the fibres in tension and compression.
     S
-        Shear strength of planes with the fibres.
+        Shear strength along the fibres (of planes that contain them).
     St
-        Shear strength across the fibres, above Y/2.
+        Shear strength in planes normal to the fibres, above Y/2.
     angle, tilt, spin
         Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own;
-        its `axes` hold for both.
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has separate
+        angles; its `axes` apply to both.
     residual
         Remaining fraction of the stiffness, above 0 and below 1.
 
@@ -63,12 +63,12 @@ class Hashin(NamedTuple):
     fibres in tension, T11^2/Xc^2 = 1 for fibres in compression; s^2/Y^2 + (T23^2 - T22 T33)/St^2 +
     t = 1 for the matrix in tension, s > 0, and (Yc^2/(4 St^2) - 1) s/Yc + s^2/(4 St^2) + (T23^2 -
     T22 T33)/St^2 + t = 1 in compression. T is the second Piola-Kirchhoff stress. Broken fibres
-    leave the fraction `residual` of the stress. A broken matrix leaves that fraction of E2, E3,
-    G12, G13 and G23, and the fibres with E1 and nu12; cracks do not close. Stiffness
-    falls at the beginning of the next step, and the lost energy is dissipated. Dump columns: the
-    largest values of the criteria so far, `fibre_t`, `fibre_c`, `matrix_t` and `matrix_c` (tension,
-    compression), their maximum `damage_init`, and `damage`, 0 or 1. Where points break one after
-    the other, the energy of a crack depends on the cell size.
+    leave the fraction `residual` of the stress. A broken matrix leaves this fraction of E2, E3,
+    G12, G13 and G23; the fibres retain E1 and nu12. Cracks do not close. Stiffness is reduced at
+    the beginning of the next step, and the lost energy is dissipated. Dump columns: the largest
+    values of the criteria so far, `fibre_t`, `fibre_c`, `matrix_t` and `matrix_c` (tension,
+    compression), their maximum `damage_init`, and `damage`, 0 or 1. If points break one after the
+    other, the energy of a crack depends on the cell size.
 
     See Also
     --------
@@ -105,7 +105,7 @@ class Hashin(NamedTuple):
 
 
 def with_cracks(law: Directional, R: np.ndarray, residual: float) -> Directional:
-    """Return the law with a fraction of all moduli but those along axis 1 of R."""
+    """Return the law with the fraction `residual` of all moduli, except E1 along axis 1 of R."""
     C = np.array([[law[STIFFNESS[a][b]] for b in range(6)] for a in range(6)])
     full = rotated(C, R.T)
     compliance = np.linalg.inv([[full[a + b] for b in VOIGT] for a in VOIGT])
@@ -150,7 +150,7 @@ def _initial_state_hashin(law, kin, template):
 
 
 def matrix_criteria(law, T):
-    """Return the criteria in tension and compression; the sign of the stress chooses."""
+    """Return the criteria in tension and compression; the sign of the stress selects one."""
     _, t22, t33, t12, t13, t23 = in_axes(law.turn, T)
     s, shear = t22 + t33, (t12 * t12 + t13 * t13) / (law.S * law.S)
     across = 1 / (law.St * law.St)
@@ -174,7 +174,7 @@ def piola_stress(law, kin, state):
 
 @laws.advance.on(BreakingApart)
 def _advance_hashin(law, kin, state, dl, dt):
-    # Broken parts lose their stress in the next step; a load step in which stress jumps has no
+    # Broken parts lose their stress in the next step, as load steps in which stress jumps have no
     # equilibrium.
     new = state._replace(
         fibres=where(max(state.fibre_t, state.fibre_c) < 1, 1, law.residual),

@@ -23,8 +23,8 @@ class HenckyConstants(IsotropicConstants):
     -----
     Kirchhoff stress tau = 2 G ln V + lambda ln(det F) I, with ln V = 1/2 ln F F^T of the left
     stretch V. Stored energy W = G ln V : ln V + lambda/2 (ln J)^2 (Hencky 1928; Anand 1979, "On H.
-    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). Its
-    strains are additive, hence the elastic part of most soil plasticity at large strain.
+    Hencky's approximate strain-energy function for moderate deformations", J. Appl. Mech. 46). As
+    its strains are additive, this law is the elastic part of most soil plasticity at large strain.
 
     A temperature T adds the stress -3 K alpha (T - T0) (bulk modulus K, initial temperature T0).
     The elastic strain excludes alpha (T - T0).

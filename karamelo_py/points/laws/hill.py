@@ -51,7 +51,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.script.errors import ScriptError
 
-COUPLED = 1e-9  # relative out-of-plane part that counts as none
+COUPLED = 1e-9  # relative out-of-plane part that counts as 0
 FACTORS = np.array([1.0, 1.0, 1.0, sqrt(2), sqrt(2), sqrt(2)])  # Mandel's notation
 
 
@@ -168,7 +168,7 @@ class YieldingByHill(OfDeformation, _Fields):
 
 
 class Hill(NamedTuple):
-    """Metal sheet or other solid with a yield surface that has directions (Hill 1948).
+    """Metal sheet or other solid with an anisotropic yield surface (Hill 1948).
 
     Parameters
     ----------
@@ -176,17 +176,17 @@ class Hill(NamedTuple):
         ID of a material linear, orthotropic or transverse, with the density.
     strength
         ID of a strength with a flow stress: plastic, swift, tabulated, johnson_cook, formula and
-        others. It gives the yield stress along axis 1, or the reference of `yields`. Its shear
-        modulus is not used.
+        others. This is the yield stress along axis 1, or the reference stress of `yields`. The
+        shear modulus of the strength is not used.
     angle, tilt, spin
         Rotation of the axes of yielding from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own.
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has others.
     R
         R-values (R0, R45, R90): strain across over strain through a sheet that is pulled at 0, 45
         and 90 degrees to axis 1, the rolling direction; axis 3 is through the sheet.
     yields
-        Instead of R, yield stresses (r11, r22, r33, r12, r13, r23) over the reference; all 1 for an
-        isotropic body. In shear they are over the reference divided by sqrt(3).
+        Instead of R: yield stresses (r11, r22, r33, r12, r13, r23) over the reference stress, in
+        shear over the reference stress divided by sqrt(3). All are 1 for an isotropic body.
     axes
         As for orthotropic; the elastic material also rotates with them.
 
@@ -202,10 +202,10 @@ class Hill(NamedTuple):
     q^2 = F (T22 - T33)^2 + G (T33 - T11)^2 + H (T11 - T22)^2 + 2 L T23^2 + 2 M T13^2 + 2 N T12^2,
     with q at most the flow stress (Hill 1948, "A theory of the yielding and plastic flow of
     anisotropic metals", Proc. R. Soc. Lond. A 193). T is the Kirchhoff stress R^T tau R in axes
-    that rotate by the polar part R of F, and T = C:e with the elastic strain e, which is small. The
-    stretch U alone strains, exactly in volume, so rotations of any size cause no stress. Flow is
-    associated; ep is the plastic strain conjugate to q (dump column), and hardening is isotropic.
-    R-values leave shears through the sheet isotropic (L = M = 3/2).
+    that rotate by the polar part R of F, and T = C:e with the elastic strain e, which must be
+    small. Strain is computed from the stretch U, with exact volume, so rotations of any size cause
+    no stress. Flow is associated; ep is the plastic strain conjugate to q (dump column), and
+    hardening is isotropic. With R, shear through the sheet is isotropic (L = M = 3/2).
 
     In 2D, one axis should be z (`tilt` 0 or 90 with `spin` 0).
 
@@ -399,8 +399,8 @@ class Residual(NamedTuple):
 def residual(law, squares, before, x, dt):
     """Return the residual at the increment x, linear in x for an isotropic body.
 
-    For constant or concave flow stress Y it is convex and falls with x, so Newton's method from 0
-    never passes the solution.
+    For a constant or concave flow stress Y, the residual is convex and falls with x, so Newton's
+    method from 0 never goes beyond the solution.
     """
     rates = law[RATES:TO]
     limit, hardening = flow(law.strength, before, x, dt)

@@ -1,4 +1,4 @@
-"""Materials given by a stored energy: hyperelastic, and ready formulas for rubber and tissue."""
+"""Materials with a stored energy: hyperelastic, and built-in formulas for rubber and tissue."""
 
 from collections import namedtuple
 from collections.abc import Sequence
@@ -56,18 +56,18 @@ class HyperelasticFormula(OfInvariants, Fields):
     rho
         Density before deformation.
     energy
-        Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, I3 =
-        det C, J = det F, with C = F^T F, and of I4 and I6, the squared stretches of two families of
-        fibres; or of the principal stretches l1, l2, l3 and J; and of the temperature T. Numbers
-        are variables of the script, or named in the same line (mu=4e5). At rest I1 = I2 = 3; all
-        other variables are 1.
+        Stored energy per reference volume: a formula of I1 = tr C, I2 = (I1^2 - tr C^2)/2, I3 = det
+        C, J = det F, with C = F^T F, and of I4 and I6, the squared stretches of two families of
+        fibres; or a formula of the principal stretches l1, l2, l3 and J. Both may contain the
+        temperature T, variables of the script, and numbers that are named in the same line
+        (mu=4e5). At rest I1 = I2 = 3; all other variables are 1.
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6: numbers, or formulas of x0, y0, z0.
     cp, kappa, alpha
         Heat capacity per mass, conductivity and coefficient of linear expansion of a material with
         a temperature, as for neo-hookean.
     T
-        Temperature at which the formula is checked, and initial one unless the solid sets it.
+        Temperature at which the formula is checked; initial one unless the solid sets it.
 
     Example
     -------
@@ -82,9 +82,9 @@ class HyperelasticFormula(OfInvariants, Fields):
     -----
     The stress is the exact derivative of the formula: tau = 2 (W_1 + I1 W_2) b - 2 W_2 b^2 + J W_J
     I (Holzapfel 2000, section 6.2), or tau_a = l_a dW/dl_a. Tangent and wave speed are second
-    derivatives. The stored energy is 0 at rest; stress or no stiffness at rest is refused. A
-    warning names the stretch beyond which the energy is not convex along a principal direction, so
-    that the body would localize. Formulas of stretches cost more.
+    derivatives. The stored energy is measured from rest. Formulas with stress at rest, or without
+    stiffness, are refused. A warning names the stretch beyond which the energy is not convex along
+    a principal direction, so that deformation would localise. Formulas of stretches are slower.
 
     See Also
     --------
@@ -143,7 +143,7 @@ def of_energy(
 
 
 def ready(formula: str, argument: str | None = None, *, rho: float, **constants: Any) -> Any:
-    """Return the law of a built-in formula; errors blame `argument` for unstable constants."""
+    """Return the law of a built-in formula; errors of unstable constants name `argument`."""
     fibres = [constants.pop(name) for name in ("fibre", "fibre2") if name in constants]
     try:
         return of_energy(rho, with_numbers(formula, **constants), fibres)
@@ -164,7 +164,7 @@ class MooneyRivlin(NamedTuple):
     rho
         Density before deformation.
     C10, C01
-        Shear modulus G = 2 (C10 + C01).
+        Constants of the terms; the shear modulus is G = 2 (C10 + C01).
     K
         Bulk modulus.
 
@@ -402,7 +402,7 @@ class Holzapfel(NamedTuple):
     k1
         Stiffness of the fibres, a stress.
     k2
-        Exponent of their stiffening.
+        Exponent of the stiffening of the fibres.
     K
         Bulk modulus.
     fibre, fibre2

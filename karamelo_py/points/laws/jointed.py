@@ -33,7 +33,7 @@ from karamelo_py.points.laws.strengths.mohr_coulomb import MohrCoulomb
 from karamelo_py.points.laws.thin import has_short_trials
 from karamelo_py.script.errors import ScriptError
 
-ALIGNED = 1e-9  # component of the normal that counts as none
+ALIGNED = 1e-9  # component of the normal that counts as 0
 PASSES = 2  # iterations of the return to two yield surfaces
 
 
@@ -42,7 +42,7 @@ class RockBetweenJoints(MohrCoulomb):
 
 
 class JointedConstants(NamedTuple):
-    """Rock with one set of parallel joints, on which it slips and opens.
+    """Rock with one set of parallel joints, which can slip and open.
 
     Parameters
     ----------
@@ -77,10 +77,10 @@ class JointedConstants(NamedTuple):
     whose normal is at an angle b to the load fails at s1 - s3 = 2 (c + s3 tan(phi)) / ((1 -
     tan(phi) cot(b)) sin(2 b)) or, if that is more, at the strength of the rock (Jaeger 1960, "Shear
     failure of anisotropic rocks", Geol. Mag. 97). The stress rotates with the point (Jaumann rate).
-    The joints are planes of the body, and their normal follows its deformation. A joint that has
-    opened sustains pressure as soon as it is pressed. Dump columns: `slip` and `opening` sum up
-    plastic shear and plastic extension on the joints, `ep` is the equivalent plastic strain of rock
-    with a strength.
+    The joints are material planes, whose normal follows the deformation. A joint that has opened
+    sustains pressure again at once, without closing first. Dump columns: `slip` and `opening`, the
+    sums of plastic shear and plastic extension on the joints, and `ep`, the equivalent plastic
+    strain of rock with a strength.
 
     In 2D the normal should be in the xy plane or along z, in 1D along an axis; otherwise the body
     shears out of plane.
@@ -239,11 +239,10 @@ class OnJoints(NamedTuple):
 
 
 def slipped(law, kin, trial, n):
-    """Return the stress on slipping joints, rotated only by the rest of the spin.
+    """Return the stress with slip on joints, rotated only by the spin of the rock.
 
-    The velocity gradient of a slip rate g along m is g m n, whose skew part does not rotate the
-    rock (as in crystals: Asaro 1983, "Micromechanics of crystals and polycrystals", Adv. Appl.
-    Mech. 23).
+    The velocity gradient of a slip rate g along m is g m n; its skew part does not rotate the rock
+    (as in crystals: Asaro 1983, "Micromechanics of crystals and polycrystals").
     """
     along = returned_to_joints(law, trial, n).along
     back = kin.Tensor._make([-along[i] * n[j] for i, j in kin.Tensor.places])
@@ -253,8 +252,8 @@ def slipped(law, kin, trial, n):
 def returned_to_joints(law, sigma, n):
     """Return the stress that the joints sustain, with slip and opening of the step.
 
-    If both limits are exceeded, the traction goes to their corner. There no multiplier is negative
-    if the return to the slip limit alone leaves too much tension.
+    If both limits are exceeded, the traction is returned to their corner. Neither multiplier is
+    negative there if the return to the slip limit alone leaves too much tension.
     """
     a, places = sigma.at(), sigma.places
     t = [total([a[i, j] * n[j] for j in range(3) if (i, j) in a]) for i in range(3)]

@@ -113,7 +113,7 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho: constant moduli; the volume per mass has grown by det F
+    # (lam + 2 G) / rho with constant moduli; the volume per mass is multiplied by det F.
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 

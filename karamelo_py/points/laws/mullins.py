@@ -30,14 +30,14 @@ class HyperelasticMaterial(ElasticMaterial):
 
 
 class Mullins(NamedTuple):
-    """Filled rubber that softens below its largest strain (Mullins effect, Ogden and Roxburgh).
+    """Filled rubber that is softer below its largest strain so far (Mullins effect).
 
     Parameters
     ----------
     elastic
         ID of an isotropic hyperelastic material: the response to the first loading.
     r
-        Limit of the softening: at least 1 - 1/r of the first loading's stress remains.
+        Limit of the softening: at least 1 - 1/r of the stress in first loading remains.
     m
         Energy per volume that scales the softening.
     beta
@@ -52,7 +52,7 @@ class Mullins(NamedTuple):
     -----
     dev tau = eta dev tau_e, eta = 1 - erf((Wm - W)/(m + beta Wm))/r, with the distortional energy W
     of the elastic material, W(F) - W(J^(1/3) I), and the largest W so far, Wm (Ogden & Roxburgh
-    1999, Proc. R. Soc. Lond. A 455, 2861-2877; beta: Bose et al. 2003). On loading beyond Wm, eta
+    1999, Proc. R. Soc. Lond. A 455, 2861-2877; beta: Bose et al. 2003). In loading beyond Wm, eta
     is 1. The work that unloading does not return counts as dissipated, and heats a material with a
     temperature. Relaxation may be added: ``viscosity(prony, tyre, g=0.2, tau=1)``.
 
@@ -155,7 +155,7 @@ def _energy_density_mullins(law, kin, state):
 
 
 def _stiffening(law, kin, state):
-    # unloading from the peak also changes eta
+    # In unloading from the peak, eta changes, too.
     s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic)).largest_row_sum()
     _, slope, _ = softened(law, state.peak, state.peak)
     return slope * s * s * laws.specific_volume(law)

@@ -54,7 +54,7 @@ def _wave_speed_squared_neo_hookean(law, kin, state):
 
 @laws.wave_speed_bound.on(NeoHookean)
 def _wave_speed_bound_neo_hookean(law, kin, state):
-    # Avoids the logarithm: 1/J > 1 - ln J (by 2 % at J = 0.8), and J / e^2 > -(1 - ln J).
+    # Without a logarithm: 1/J > 1 - ln J (by 2 % at J = 0.8), and J / e^2 > -(1 - ln J).
     J = det(state.F)
     return speed_squared(law, state.F, max(law.lam / J, -law.lam * J * exp(-2)))
 

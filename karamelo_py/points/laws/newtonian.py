@@ -46,8 +46,8 @@ class Newtonian(NamedTuple):
     -----
     sigma = sigma_s + 2 mu dev(D) + bulk tr(D) I, with the strain rate D in the middle of the step,
     which is 0 in a rotation (Kelvin-Voigt solid). The viscous work is dissipated, and heats a
-    material with a temperature. The stable step shortens: with a = (4/3 mu + bulk)/(rho h) and the
-    wave speed c, waves count as if they moved at sqrt(c^2 + a^2) + a.
+    material with a temperature. The stable step is shorter, as for the wave speed sqrt(c^2 + a^2) +
+    a, where c is the elastic wave speed and a = (4/3 mu + bulk)/(rho h).
 
     See Also
     --------

@@ -1,6 +1,6 @@
-"""Axes of a law by formulas of position: a point's deformation gradient starts as a rotation R.
+"""Axes of a law by formulas of position: F of a point starts as a rotation R.
 
-A law that depends on the deformation through F alone is rotated by R if F R replaces F, and its
+If F is replaced by F R, a law that depends on the deformation by F only is rotated by R, and its
 axes then rotate with the body.
 """
 
@@ -29,7 +29,7 @@ from karamelo_py.script.expressions import Expression
 from karamelo_py.script.values import Values
 
 LEANS = 1e-9
-LEAST = 1e-6  # sine of the least angle between two vectors that are not parallel
+LEAST = 1e-6  # sine of the angle below which two vectors are parallel
 
 
 class Axes:
@@ -105,7 +105,7 @@ def _axes_lean(law: Any, scene: Any) -> bool:
     return any(inclined(law.place.rotations(scene.hub.values, x0), F) for x0 in at)
 
 
-LEANING[Oriented] = _axes_lean  # the run refuses them
+LEANING[Oriented] = _axes_lean  # a run refuses them
 
 
 def oriented(law: Any, axes: Axes | None) -> Any:
@@ -125,7 +125,7 @@ def _initial_state_oriented(law, kin, template):
     return State(laws.initial_state(law.elastic, kin, template), ())
 
 
-# Not laws.deformation: the inner law's F is another one.
+# Without laws.deformation, as F of the inner law is different.
 laws.wraps(Oriented, "elastic", "elastic", (*ELASTIC, laws.with_stress))
 laws.answers(Oriented, {has_short_trials: True, laws.is_round: False})
 

@@ -38,7 +38,7 @@ class Directional(OfDeformation, _Fields):
 
 
 class Orthotropic(NamedTuple):
-    """Elastic solid with three perpendicular directions, for small strains.
+    """Elastic solid with three perpendicular axes of different stiffness, for small strains.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ class Orthotropic(NamedTuple):
         Rotation of the axes from x, y, z in degrees: by `angle` about z, by `tilt` about the new
         axis 1, by `spin` about the new axis 3.
     axes
-        Axes that differ from point to point: an angle about z in degrees, or two vectors, along
-        axis 1 and towards axis 2; numbers, or formulas of x0, y0, z0. `angle`, `tilt`
-        and `spin` rotate the law within them.
+        Axes that may differ from point to point: an angle about z in degrees, or two vectors, along
+        axis 1 and towards axis 2; numbers, or formulas of x0, y0, z0. `angle`, `tilt` and `spin`
+        are then relative to these axes.
 
     Example
     -------
@@ -92,7 +92,7 @@ class Orthotropic(NamedTuple):
     axes: ByName[Axes | None] = None
 
     def checked(self):
-        """Refuse constants with which some strain would release energy."""
+        """Refuse constants for which a strain would have negative energy."""
         moduli = (self.E1, self.E2, self.E3, self.G23, self.G13, self.G12)
         compliance = np.diag([1 / modulus for modulus in moduli])
         compliance[0, 1] = compliance[1, 0] = -self.nu12 / self.E1
@@ -131,16 +131,16 @@ class Transverse(NamedTuple):
     rho
         Density before deformation.
     E, nu
-        Young's modulus and Poisson's ratio across the direction.
+        Young's modulus and Poisson's ratio in planes normal to the direction.
     E3, nu3
-        Young's modulus along the direction, and contraction across over stretch along it.
+        Young's modulus along the direction, and lateral contraction over stretch along it.
     G3
-        Shear modulus of planes with the direction.
+        Shear modulus of planes that contain the direction.
     angle, tilt
         Rotation of the direction from z, in degrees: by `tilt` about x, then by `angle` about z.
         The normal of bedding that dips by 30 degrees about z has angle 30 and tilt 90.
     axes
-        As for orthotropic; the direction is rotated from axis 3.
+        As for orthotropic; `angle` and `tilt` rotate the direction from axis 3.
 
     Example
     -------

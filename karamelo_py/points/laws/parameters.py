@@ -13,7 +13,7 @@ from karamelo_py.script.errors import ScriptError
 AboveZero = Annotated[float, Positive]
 FromZero = Annotated[float, NonNegative]
 Type = TypeVar("Type")
-Temperature = Annotated[Type, Keyword("T")]  # of a field initial_temperature
+Temperature = Annotated[Type, Keyword("T")]  # annotation of a field initial_temperature
 
 
 class MaterialArgument:
@@ -76,7 +76,7 @@ def check_temperatures(Tr: float, Tm: float, name: str = "Tr") -> None:
 
 
 def reference_rate(epsdot0: float, factor: float, name: str) -> float:
-    """Return the epsdot0 of 1 + `factor` ln(rate/epsdot0); it may be 0 if `factor` is."""
+    """Return the epsdot0 of 1 + `factor` ln(rate/epsdot0), which may be 0 if `factor` is 0."""
     if epsdot0 > 0:
         return epsdot0
     if factor:
@@ -92,7 +92,7 @@ def reference_rate(epsdot0: float, factor: float, name: str) -> float:
 class Numbers:
     """Constant sequence of numbers (a curve or a formula), an array in kernels.
 
-    Tables of several laws pad it with its last number, so laws that need the length store it.
+    Tables of several laws pad it with its last number; laws that need the length store it.
     """
 
     values: tuple[float, ...]

@@ -1,8 +1,8 @@
 """Directions of a law by formulas of position, stored as numbers in each point's state.
 
-A law that allows it has a field ``directions``, a NamedTuple of numbers; `Placed` wraps it and
-replaces them by the point's. Its :class:`Place` has the formulas. States start with nominal
-directions; `with_directions` sets each point's when a scene is lowered.
+A law that supports this has a field ``directions``, a NamedTuple of numbers. `Placed` wraps the law
+and replaces these numbers by the numbers of the point; its :class:`Place` has the formulas. States
+start with nominal directions; `with_directions` sets them when a scene is lowered.
 """
 
 from collections.abc import Iterator, Sequence
@@ -71,7 +71,7 @@ def words_of(x0: np.ndarray) -> str:
 
 
 def refuse_absent(formulas: Sequence[Expression], d: int, mark: Mark | None) -> None:
-    """Refuse formulas of coordinates that a scene in `d` dimensions does not have."""
+    """Raise ScriptError for formulas of coordinates that scenes in `d` dimensions do not have."""
     if absent := names_in(formulas) & {"x0", "y0", "z0"} - {*("x0", "y0", "z0")[:d]}:
         message = f"a direction depends on {min(absent)}, which a scene in {d}D does not have"
         raise ScriptError(message, mark=mark, expected="a formula of x0" + " and y0" * (d > 1))

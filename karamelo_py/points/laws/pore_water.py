@@ -1,9 +1,10 @@
-"""Saturated soil: any law for the skeleton's effective stress, and water in its pores.
+"""Saturated soil: a law for the effective stress of the skeleton, and water in the pores.
 
-The state adds the volume of the water at zero pressure and of the pores, per initial volume: p = K
-ln(content / pores). With a suction a < K, p = a ln S where the saturation S = content / pores is
-below 1, and the relative permeability is S (Gardner 1958). `advance` alone is undrained; in a run
-the flux through the nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
+The state also has the volume of the water at zero pressure and the pore volume, per initial volume:
+p = K ln(content / pores). With a suction a < K, p = a ln S where the saturation S = content / pores
+is below 1, and the relative permeability is S (Gardner 1958). `advance` alone is undrained; in a
+run the flux through the nodes changes the content
+(:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from typing import Any, NamedTuple
@@ -19,10 +20,10 @@ class Saturated(NamedTuple):
     law: Any
     n: float  # initial porosity
     drag: float  # force per pore volume and water velocity: rho g / permeability
-    K: float  # of the water
-    rho: float  # of the water at zero pressure
+    K: float  # bulk modulus of the water
+    rho: float  # density of the water at zero pressure
     kozeny: float  # 1: permeability follows porosity; 0: constant
-    suction: float  # at which pores hold 1/e of their water; K: they stay full
+    suction: float  # suction at which the saturation is 1/e; K: pores remain full
 
     in_lanes = True
 
@@ -62,7 +63,7 @@ laws.wraps(
 
 @laws.energy_density.on(Saturated)
 def _energy_density_saturated(law, kin, state):
-    """Return the energy of skeleton and water; the latter's slope by pores is -p."""
+    """Return the energy of skeleton and water; derivative by pore volume: -p."""
     x = state.content / state.pores - 1
     series = x * x * (0.5 - x * (1 / 3 - x * (0.25 - 0.2 * x)))
     compressed = where(abs(x) < 0.01, series, x - logarithm(1 + x))
@@ -81,7 +82,7 @@ def _terms(law, kin, state, of_skeleton):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # Just above the larger eigenvalue of the two phases, without a root; drag only slows waves.
+    # Slightly above the larger eigenvalue of the two phases, without a root; drag slows waves down.
     trace, product = _terms(law, kin, state, laws.wave_speed_squared)
     return trace - product / trace
 

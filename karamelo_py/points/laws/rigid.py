@@ -21,16 +21,16 @@ class Rigid(NamedTuple):
 
     Notes
     -----
-    Whatever forces act, points retain the velocity set by fix initial_velocity_particles or fix
-    velocity_particles, unless fix rigid_body moves them. They have no stress and limit the step
-    only to a cell of travel.
+    Forces do not change the velocity of points, which is set by fix initial_velocity_particles or
+    fix velocity_particles, unless fix rigid_body moves the body. The points have no stress; they
+    limit the step only by their speed, to less than a cell per step.
 
-    In ulmpm and ulcpdi, nodes around its points have its velocity at any density; in
-    ulmpm/contacts, contact does not move it. These methods publish the force on the solid ID as
-    ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and the torque about the origin as
-    ContactTorque_ID_x and so on.
+    In ulmpm and ulcpdi, nodes around the points have the velocity of the rigid body, for any
+    density; in ulmpm/contacts, contact does not move it. These methods publish the force on the
+    solid ID as ContactForce_ID_x, ContactForce_ID_y, ContactForce_ID_z, and the torque about the
+    origin as ContactTorque_ID_x and so on.
 
-    Domains that deform with the grid (CPDI, cpgimp) are refused.
+    Bases with domains that deform with the grid (CPDI, cpgimp) are refused.
 
     See Also
     --------

@@ -29,11 +29,11 @@ class TulerButcher(NamedTuple):
     Parameters
     ----------
     sigma0
-        Principal tension below which nothing fails.
+        Principal tension below which there is no failure.
     exponent
-        Exponent of the tension beyond sigma0; 1: an impulse, 0: a duration.
+        Exponent of the tension beyond sigma0. With 1, K is an impulse per area; with 0, a duration.
     K
-        Integral at which a point fails.
+        Value of the integral (see notes) at which a point fails.
 
     Example
     -------
@@ -41,7 +41,7 @@ class TulerButcher(NamedTuple):
 
     Notes
     -----
-    Fails when the integral of (s1 - sigma0)^exponent over time reaches K, with the largest
+    A point fails when the integral of (s1 - sigma0)^exponent over time reaches K, with the largest
     principal stress s1 of intact material (Tuler & Butcher 1968, Int. J. Fract. Mech. 4, 431-437).
     It then sustains pressure only. Dump columns: damage, and damage_init, the integral over K.
 
@@ -96,7 +96,7 @@ class CochranBanner(NamedTuple):
     sigma0
         Tension, as a pressure, at which cracks begin to open.
     D0
-        Opening at which no tension is left, a length: 50e-6 m for copper.
+        Crack opening, a length, at which no tension is left: 50e-6 m for copper.
 
     Example
     -------
@@ -105,8 +105,8 @@ class CochranBanner(NamedTuple):
     Notes
     -----
     Tension is at most sigma0 (1 - (w/D0)^(2/3)) (Cochran & Banner 1977, J. Appl. Phys. 48,
-    2729-2737). At that bound the opening w grows by the volume strain times the cell size. The
-    fraction D of the stress of intact material is lost, and never heals. Dump columns: damage, and
+    2729-2737). At that bound the opening w grows by the volume strain times the cell size. The lost
+    fraction D of the stress of intact material never decreases. Dump columns: damage, and
     damage_init, w over D0.
 
     See Also
@@ -180,7 +180,7 @@ DamageFields = namedtuple("DamageFields", ("brittleness", "initial_temperature")
 
 
 class DamageFormula(ByRate, DamageFields):
-    """Failure whose growth is a formula of stress, flow rate and temperature.
+    """Failure by a growth rate that is a formula of stress, plastic strain rate and temperature.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """Temperature of a point as changed by its law, a part of `eos_strength`.
 
-A temperature is a NamedTuple of parameters; its memory is `Warm`, the `heat` of other parts, or ().
+A temperature is a NamedTuple of parameters. Its memory is `Warm`, which other parts get as `heat`;
+without a temperature they get ().
 """
 
 from typing import Annotated, NamedTuple
@@ -58,9 +59,9 @@ class PlasticWork(NamedTuple):
     alpha
         Pressure per kelvin: 3 K times the linear expansion coefficient, with the bulk modulus K.
     T0
-        Temperature without thermal pressure; also the initial one unless the solid sets it.
+        Temperature without thermal pressure, and initial one unless the solid sets it.
     Tm
-        Melting temperature; no heating above.
+        Melting temperature, above which there is no heating.
 
     Example
     -------
@@ -68,8 +69,8 @@ class PlasticWork(NamedTuple):
 
     Notes
     -----
-    T grows by chi/(rho0 cp) times the plastic work per reference volume. The pressure grows by
-    alpha (T - T0). Dump column: T.
+    T increases by chi/(rho0 cp) times the plastic work per reference volume. The thermal pressure
+    is alpha (T - T0). Dump column: T.
 
     See Also
     --------

@@ -1,9 +1,9 @@
 """Laws of thin bodies: plane stress in 2D, uniaxial stress in 1D.
 
-The inner law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (no
-branches in lanes) finds the strain increment q across the body (in 1D in y and z) without stress
-across; the rest goes to the next step (de Borst 1991; Klinkel & Govindjee 2002). Each point records
-the largest rest.
+The inner law has tensors of `Axisymmetric`. A secant method with a fixed number of trials (without
+branches in lanes) finds the strain increment q across the body (in 1D in y and z) for which the
+stress across vanishes. The remaining stress is reduced in the next step (de Borst 1991; Klinkel &
+Govindjee 2002); each point records the largest one.
 """
 
 from typing import Any, NamedTuple
@@ -13,9 +13,9 @@ from karamelo_py.points import laws
 from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, nothing
 
 WHOLE = Axisymmetric()
-ENOUGH = 10  # trials of q for increments of any size
-UNROLLED = 9  # up to here trials are code without a loop
-FURTHEST = 0.3  # largest change of the stretch across in a trial
+ENOUGH = 10  # number of trials for increments of any size
+UNROLLED = 9  # number of trials up to which there is no loop
+FURTHEST = 0.3  # largest change of the stretch across, in a trial
 FLATTEST, STEEPEST = 1e-6, 4.0  # accepted slopes of the stress across, over rho c^2
 
 
@@ -102,7 +102,7 @@ laws.wraps(
 
 @laws.by_rates.on(Thin)
 def _by_rates_thin(law):
-    return True  # the logarithm in load steps, which need more trials anyway
+    return True  # load steps use logarithmic strain, and need more trials anyway
 
 
 @laws.wave_speed_squared.on(Thin)
@@ -116,7 +116,7 @@ def _wave_speed_bound_thin(law, kin, state):
 
 
 def _slower(law, kin, state, squared):
-    """Return the squared wave speed of a body that is free across.
+    """Return the squared wave speed of a thin body.
 
     Without strain across, Hooke's law has 2 G + lambda; a plate has 2 G + 2 G lambda / (2 G +
     lambda) = E / (1 - nu^2), a bar 2 G + 2 G lambda / (2 G + 2 lambda) = E.

@@ -23,7 +23,7 @@ class DirectionalBase(MaterialArgument):
 
 
 class TsaiHill(NamedTuple):
-    """Elastic solid with directions that breaks where the stress reaches its strength.
+    """Anisotropic elastic solid that breaks where the stress reaches the strength.
 
     Parameters
     ----------
@@ -32,13 +32,13 @@ class TsaiHill(NamedTuple):
     X
         Strength along axis 1, the fibres.
     Y
-        Strength across.
+        Strength normal to axis 1.
     S
-        Shear strength of planes with axis 1.
+        Shear strength of planes that contain axis 1.
     angle, tilt, spin
         Rotation of the axes of strength from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has its own;
-        its `axes` hold for both.
+        about the new axis 1, by `spin` about the new axis 3. The elastic material has separate
+        angles; its `axes` apply to both.
     Xc, Yc
         Strengths in compression; default: as in tension.
     residual
@@ -54,11 +54,11 @@ class TsaiHill(NamedTuple):
     A point breaks when T11 (T11 - T22 - T33)/X^2 + (T22^2 + T33^2)/Y^2 + (1/X^2 - 2/Y^2) T22 T33 +
     (T12^2 + T13^2)/S^2 + (4/Y^2 - 1/X^2) T23^2 exceeds 1, the criterion of Tsai (1968) and Hill
     (1948) for a solid that is isotropic across axis 1 (Jones 1999, "Mechanics of composite
-    materials", section 2.9.3). T is the second Piola-Kirchhoff stress; the signs of T11 and T22 +
-    T33 choose the strengths. From then on the stress is the fraction `residual` of the elastic
-    stress; the energy lost at once is dissipated. Dump columns: `damage`, 0 or 1, and
-    `damage_init`, the largest value of the criterion so far. Where points break one after the
-    other, the energy of a crack depends on the cell size.
+    materials", section 2.9.3). T is the second Piola-Kirchhoff stress; the strengths in tension or
+    compression are chosen by the signs of T11 and T22 + T33. After failure, the stress is the
+    fraction `residual` of the elastic stress; the energy lost is dissipated. Dump columns:
+    `damage`, 0 or 1, and `damage_init`, the largest value of the criterion so far. If points break
+    one after the other, the energy of a crack depends on the cell size.
 
     See Also
     --------
@@ -131,7 +131,7 @@ class _Fields(NamedTuple):
 
 
 class Ply(OfDeformation):
-    """Elastic solid with directions, in the field `elastic`, that breaks."""
+    """Base of anisotropic solids that break, with the elastic law in the field `elastic`."""
 
     __slots__ = ()
     in_lanes = True

@@ -30,8 +30,8 @@ from karamelo_py.points.laws.parameters import MaterialArgument
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError, plural
 
-ENOUGH = 1e3  # strain increments over round-off whose stiffness is known
-LEAST = 0.01  # least stiffness, over that at rest, of a strain that counts
+ENOUGH = 1e3  # strain increment over round-off above which its stiffness is known
+LEAST = 0.01  # smallest stiffness over stiffness at rest that is used
 SMALL = 0.01  # step over relaxation time below which a series is exact
 
 
@@ -93,7 +93,7 @@ class Wlf(NamedTuple):
 
 
 class Positives(tuple):
-    """Script argument: positive numbers (0.2, 0.1), and where they are in the script."""
+    """Script argument: positive numbers (0.2, 0.1), with their marks in the script."""
 
     script_kind = "a number above 0, or several such as (0.2, 0.1)"
     marks: tuple[Mark, ...]
@@ -111,7 +111,7 @@ class Positives(tuple):
         return made
 
 
-DECADES = 30.0  # largest shift; the formula ends at T = Tr - C2
+DECADES = 30.0  # largest shift, as the formula has a pole at T = Tr - C2
 
 
 def shifted(shift, dt, T):
@@ -140,12 +140,12 @@ class Viscoelastic(NamedTuple):
     material
         ID of an isotropic elastic material: the instantaneous response.
     g
-        Relaxing fraction of the instantaneous shear stiffness, in each term.
+        Fraction of the instantaneous shear stiffness that relaxes, for each term.
     tau
         Relaxation time of each term.
     wlf
-        C1, C2, Tr: a material with a temperature T relaxes in tau a, log10 a = -C1 (T - Tr)/(C2 + T
-        - Tr) (Williams, Landel & Ferry 1955).
+        C1, C2, Tr: in a material with a temperature T, relaxation times are multiplied by a, with
+        log10 a = -C1 (T - Tr)/(C2 + T - Tr) (Williams, Landel & Ferry 1955).
 
     Example
     -------
@@ -250,7 +250,7 @@ def mean_decay(x):
 
 
 def weight_before(x):
-    """Return the weight a of the old |h|^2 in its integral over dt/tau; the new one has x - a."""
+    """Return the weight a of the old |h|^2 in the integral over dt/tau; the new one has x - a."""
     few = x * (1 / 2 + x * (-1 / 6 + x * x * (1 / 90)))
     left = exponential(-2 * max(x, SMALL))
     return where(x < SMALL, few, 0.5 - x * left / (1 - left))
@@ -273,7 +273,7 @@ def decayed(branches, memory, dl, added, dt):
 
 
 def stiffness_along(branches, added, strain, last):
-    """Return the shear stiffness along a strain increment over that at rest; else the `last`."""
+    """Return shear stiffness along a strain increment over stiffness at rest, or the `last` one."""
     square = inner(strain, strain)
     known = square > (ENOUGH * round_off(square)) ** 2
     # 1/(2 G) at rest is 2 g softness
@@ -305,7 +305,7 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     stiffness = stiffness_along(law.branches, added, dev(strain), state.stiffness)
     branches, loss = decayed(law.branches, state.branches, plain, added, dt)
     loss /= stiffness
-    # work that the relaxed stress does not do
+    # work that is not done because of relaxation
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
     gone = state.gone + loss + 0.5 * inner(lost, strain)

@@ -1,6 +1,6 @@
 """Artificial viscosity, which spreads shocks over a few cells.
 
-A part of `eos_strength` added by an equation of state; its memory is (q,), the viscous pressure.
+It is a part of `eos_strength` that an equation of state adds, with the memory (q,), a pressure.
 """
 
 from math import sqrt
@@ -36,7 +36,7 @@ def viscous_pressure(viscosity, rate, density, sound):
 
 
 def viscous_speed(viscosity, q, density, sound):
-    """Return nu / h = Q1 h |d| + Q2 c, nu being the viscosity, from q / rho >= Q1 (h d)^2."""
+    """Return nu / h = Q1 h |d| + Q2 c, where nu is the viscosity, from q / rho >= Q1 (h d)^2."""
     return sqrt(viscosity.Q1 * q / density) + viscosity.Q2 * sound
 
 

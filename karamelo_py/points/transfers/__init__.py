@@ -4,7 +4,7 @@ A transfer is a NamedTuple of parameters. It declares what a point stores beside
 (`point_fields`: nothing, or a tensor such as the affine moment B), and updates the velocity from
 v_pic = sum_I N_I v*_I and dv = sum_I N_I (v*_I - v_I). Functions of a node get a view with N,
 grad_N, arm = X_i - x, affine_N = N_i D^-1 (X_i - x) and `kin` (:mod:`karamelo_py.kernels.views`).
-Defaults are PIC.
+The default functions are for PIC.
 """
 
 from typing import NamedTuple
@@ -16,13 +16,12 @@ from karamelo_py.points import noise
 
 
 class TransferTraits(NamedTuple):
-    inverts_spread: bool = False  # inverts D = sum_I N_I (X_I - x)(X_I - x)^T, which vanishes for
-    #      some bases
+    inverts_spread: bool = False  # uses the inverse of D = sum_I N_I (X_I - x)(X_I - x)^T
     retains: bool = False  # points retain the fraction `alpha` of their velocity
-    per_time: bool = False  # alpha is per stable step
+    per_time: bool = False  # alpha is for a stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
-    series: bool = False  # the new velocity is a series, summed in further passes over the points
-    # fraction of the stable step that remains with musl in the total frame
+    series: bool = False  # the new velocity is a series, which needs further passes over the points
+    # fraction of the stable step with musl in the total frame
     share_in_total: float = 1.0
     restrictions: Restrictions | None = None
 
@@ -55,9 +54,9 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, template):
-    """Return the lost fractions (2,) of the energy removed by mapping to the nodes and back.
+    """Return which fractions (2,) of the energy removed by mapping to the nodes and back are lost.
 
-    Stored moments return the rest. If undefined, the loss is not recorded.
+    Stored moments return the rest. If this is not defined, the loss is not recorded.
     """
 
 
@@ -127,7 +126,7 @@ def terms(transfer):
 
 
 def _inside_out(moment, scene):
-    # strains from moments, as in MLS
+    # strain computed from moments, as in MLS
     by_moments = gradient_weight.defined(type(scene.transfer))
     growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing
@@ -139,7 +138,7 @@ def _left_out(moment, scene):
 
 
 WITH = "{scene.transfer_name} with the basis {scene.basis_name}"
-TURNS = 1.5  # revolutions with a relevant energy gain
+TURNS = 1.5  # revolutions after which the energy gain is relevant
 SMOOTH = "quadratic-spline, or method tlmpm"
 known_failure(
     Moment,

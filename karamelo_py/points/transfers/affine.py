@@ -16,19 +16,19 @@ from karamelo_py.points.laws import jacobian
 from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity, warn_of_vibrations
 
-COMPRESSED = 1e-3  # volume fraction lost by a point that moves with the grid
+COMPRESSED = 1e-3  # volume strain above which a compressed point moves with the grid
 SEPARATE = 0.1  # tolerable separation of elastic bodies
 
 
 class APIC(NamedTuple):
     """APIC: v_p = v_pic, and the point stores B_p = sum N_I v*_I (X_I - x_p)^T.
 
-    Conserves linear and angular momentum to round-off; damps motion below the cell size (Jiang et
-    al. 2015).
+    APIC conserves linear and angular momentum to round-off, and damps motion below the cell size
+    (Jiang et al. 2015).
 
-    In the updated frame, with bases whose D vanishes at nodes (linear, Bernstein-quadratic), the
-    velocity that deforms points omits the moments, which needs musl. With splines, points nearer
-    than h/6 to a wall of the grid lose part of the velocity gradient across it.
+    In the updated frame, with bases whose D vanishes at nodes (linear, Bernstein-quadratic),
+    moments are omitted from the velocity that strains points, which requires musl. With splines,
+    points at less than h/6 from a wall lose a part of the velocity gradient normal to it.
 
     Example
     -------
@@ -43,8 +43,8 @@ class APIC(NamedTuple):
 class AFLIP(NamedTuple):
     """FLIP's mean velocity with APIC's moment.
 
-    Less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021, "Revisiting
-    integration in the material point method", section 4).
+    It has less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021,
+    "Revisiting integration in the material point method", section 4).
 
     Parameters
     ----------
@@ -64,18 +64,18 @@ class AFLIP(NamedTuple):
 
 
 class ASFLIP(NamedTuple):
-    """AFLIP in which points may leave the grid velocity where the material separates.
+    """AFLIP in which points need not move with the grid velocity where the material separates.
 
-    For granular flow and splashes (Fei et al. 2021, section 5). Points compressed by more than 0.1
-    % of their volume move with the grid.
+    It is meant for granular flow and splashes (Fei et al. 2021, section 5). Points compressed by
+    more than 0.1 % of their volume move with the grid.
 
     Parameters
     ----------
     alpha
         FLIP coefficient.
     beta
-        Separation: fraction of the velocity relative to the grid that moves uncompressed points. 0:
-        AFLIP.
+        Separation: fraction of their velocity relative to the grid with which uncompressed points
+        move. With 0 the transfer is AFLIP.
 
     Example
     -------
@@ -84,7 +84,7 @@ class ASFLIP(NamedTuple):
 
     Notes
     -----
-    In a solid under tension the points lose their order. Two elastic rings that collide at 30 m/s
+    In solids under tension, points become disordered. Two elastic rings that collide at 30 m/s
     rebound at 22.5 m/s with AFLIP; with ASFLIP and a FLIP coefficient of 0.97 at 22.2 (beta = 0.1),
     18.4 (0.3), 13.7 (0.5), 7.5 (0.7) and 2.7 m/s (1).
     """

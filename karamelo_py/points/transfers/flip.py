@@ -11,17 +11,17 @@ from karamelo_py.points import noise
 from karamelo_py.points.transfers import TransferTraits, in_step, lost_fractions, updated_velocity
 
 Share = Constraint("from 0 (PIC) to 1 (pure FLIP)", lambda value: 0 <= value <= 1)
-SWING = 0.05  # strain of vibrations that break bodies in time
-LAG = 0.03  # fraction of a free body's angular velocity
-BRAKED = 0.05  # fraction of its rotational energy
-BARELY = 0.01  # revolutions without relevant energy
-TURNS = 1.5  # revolutions of a free body with a relevant FLIP loss
+SWING = 0.05  # strain of vibrations that eventually break bodies
+LAG = 0.03  # lost fraction of a free body's angular velocity, for a warning
+BRAKED = 0.05  # lost fraction of rotational energy, for a warning
+BARELY = 0.01  # revolutions below which rotational energy is not relevant
+TURNS = 1.5  # revolutions of a free body above which the loss with FLIP is relevant
 
 
 class PIC(NamedTuple):
     """PIC: v_p = v_pic, the updated nodal velocity at the point.
 
-    Very stable and dissipative: each step smooths the velocity over a cell and loses angular
+    PIC is very stable and dissipative: each step smooths the velocity over a cell and loses angular
     momentum (Harlow 1964).
 
     Example
@@ -36,7 +36,7 @@ class PIC(NamedTuple):
 class FLIP(NamedTuple):
     """FLIP: v_p = (1 - alpha) v_pic + alpha (v_p + dv); alpha = 0 is PIC.
 
-    Conserves energy well, but retains noise in the null space of the grid, which a little PIC
+    FLIP conserves energy well, but retains noise in the null space of the grid, which a little PIC
     (alpha = 0.99) damps (Brackbill & Ruppel 1986).
 
     Parameters
@@ -61,8 +61,8 @@ class FLIP(NamedTuple):
 class FLIPPerTime(NamedTuple):
     """FLIP with damping per time, not per step: alpha applies to a stable step.
 
-    A shorter step uses alpha^(dt / stable dt). Plain FLIP removes 1 - alpha per step: half the step
-    doubles the damping per time.
+    In a shorter step, alpha^(dt / stable dt) is used. With plain FLIP the fraction 1 - alpha is
+    removed in each step, so half the step doubles the damping per time.
 
     Parameters
     ----------
@@ -146,8 +146,8 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
     """Warn of bodies that rotate freely many times.
 
     Points move with the grid velocity u but store v, so each step changes the angular momentum by
-    the sum of m u x v dt (2D disks, E 100 times the rotational energy, 4 and 8 cells across the
-    radius; R4, splines and linear basis).
+    the sum of m u x v dt. Limits are from 2D disks with 4 and 8 cells in the radius and a Young's
+    modulus of 100 times the rotational energy per volume (R4, splines, linear basis).
     """
     known_failure(
         transfer,
@@ -186,8 +186,8 @@ def _brakes(transfer, scene):
 def warn_of_slow_rotation(transfer: type) -> None:
     """Warn of free rotations in the total frame.
 
-    Points move with another velocity than they store: a square of n cells rotates too slowly by
-    2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
+    As points do not move with the velocity that they store, a square of n cells rotates too slowly
+    by the fraction 2.3/n^2 (14.6, 3.9, 1.0 % with 4, 8, 16 cells).
     """
     known_failure(
         transfer,

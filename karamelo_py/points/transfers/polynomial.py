@@ -1,7 +1,7 @@
-"""PolyPIC: points store the velocity field of their cell, a polynomial with the basis's modes.
+"""PolyPIC: points store the velocity field of their cell, a polynomial with the modes of the basis.
 
-With hats it is v + L (X - x) + sum_m c_m prod_(i in m) (X - x)_i over sets m of two or more
-directions. Coefficients at a point are derivatives of the nodal velocities, so mapping to the
+With a linear basis it is v + L (X - x) + sum_m c_m prod_(i in m) (X - x)_i over sets m of two or
+more directions. Coefficients at a point are derivatives of the nodal velocities, so mapping to the
 points and back loses no nodal velocity (Fu, Guo, Gast, Jiang & Teran 2017, "A polynomial
 particle-in-cell method", section 5.1).
 """
@@ -36,8 +36,8 @@ class Modes(Moment):
 class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
-    For the total frame with a linear basis. A disk that vibrates for 20 periods loses 4 % of its
-    energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
+    It is for the total frame with a linear basis. A disk that vibrates for 20 periods loses 4 % of
+    its energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
 
     Example
     -------

@@ -1,8 +1,8 @@
 """Taylor transfers: the point stores the velocity gradient L_p = sum_I v*_I (x) grad N_I.
 
-It gives a node m_p N_I (v_p + L_p (X_I - x_p)) without inverting D, so any basis will do. If D^-1
-N_I (X_I - x) is the gradient (linear, Bernstein-quadratic) this equals APIC; otherwise it conserves
-angular momentum where velocity is linear over the support.
+The momentum given to a node is m_p N_I (v_p + L_p (X_I - x_p)), without the inverse of D, so that
+any basis can be used. If D^-1 N_I (X_I - x) is the gradient (linear, Bernstein-quadratic), this is
+the same as APIC; otherwise angular momentum is conserved where velocity is linear over the support.
 """
 
 from typing import Annotated, NamedTuple
@@ -18,7 +18,7 @@ from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity
 class TPIC(NamedTuple):
     """TPIC: v_p = v_pic, and the point stores the velocity gradient L_p.
 
-    Damps less than PIC and needs no D (Nakamura, Matsumura & Mizutani 2023, "Taylor
+    TPIC damps less than PIC and does not need D (Nakamura, Matsumura & Mizutani 2023, "Taylor
     particle-in-cell transfer and kernel correction for material point method"). With bases whose D
     vanishes at nodes (linear, Bernstein-quadratic), a drifting body in the updated frame gains
     energy without bounds.
@@ -34,7 +34,7 @@ class TPIC(NamedTuple):
 
 
 class TFLIP(NamedTuple):
-    """FLIP whose points give nodes N_I (v_p + L_p (X_I - x_p)), as in Karamelo.
+    """FLIP in which the velocity mapped to nodes is v_p + L_p (X_I - x_p), as in Karamelo.
 
     ``method(kind, FLIP, basis, alpha, gradient-enhanced)`` is equivalent.
 
@@ -58,9 +58,9 @@ class TFLIP(NamedTuple):
 class MLS(NamedTuple):
     """APIC with N_I D^-1 (X_I - x), a moving least squares fit, instead of the gradient.
 
-    The point stores the velocity gradient C = B D^-1. Its force on a node is -V sigma N_I D^-1 (X_I
-    - x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). Conserves
-    angular momentum to round-off if D is constant (splines more than a cell from walls).
+    The point stores the velocity gradient C = B D^-1. Nodes get the force -V sigma N_I D^-1 (X_I -
+    x) (Hu et al. 2018, "A moving least squares material point method", eqs. 16 to 18). MLS
+    conserves angular momentum to round-off if D is constant (splines, more than a cell from walls).
 
     Example
     -------
@@ -106,7 +106,7 @@ def _by_arms_mls(transfer, inverse_d):
     return inverse_d
 
 
-# C is the velocity gradient (except for the hoop part), gathered once if both come from v*.
+# C is the velocity gradient (except for the hoop part), and is gathered once if both are from v*.
 
 
 @transfers.forces_by_arms.on(MLS)

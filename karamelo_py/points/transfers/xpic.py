@@ -14,7 +14,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC removed from a point, and velocity not yet in the series."""
+    """Energy per mass that XPIC has removed, and velocity that is not yet in the series."""
 
     shape = numbers(1, 1)
 
@@ -32,15 +32,16 @@ class Series(SummedField):
 class XPIC(NamedTuple):
     """XPIC: v_p = (I - (I - S S+)^m) v_p + sum N_I (v*_I - v_I), from PIC (m = 1) towards FLIP.
 
-    S maps nodes to points and S+ points to nodes by mass. A low order m removes null-space noise
-    and retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for material point
-    method particle updates that reduces noise and enhances stability", eq. 24). The nodes sum w_0 =
-    S+ v, w_k = w_(k-1) - S+ S w_(k-1). Each order costs one more pass over the points per step.
+    S maps nodes to points, and S+ maps points to nodes, weighted by mass. A low order m removes
+    null-space noise and retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for
+    material point method particle updates that reduces noise and enhances stability", eq. 24). The
+    nodes sum w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1). Each order costs one more pass over the
+    points per step.
 
     Parameters
     ----------
     order
-        m.
+        Order m of the series.
 
     Example
     -------

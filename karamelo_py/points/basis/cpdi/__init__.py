@@ -36,10 +36,10 @@ class Element(NamedTuple):
 class ConvectedDomain(NamedTuple):
     """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
 
-    Affine transfers measure arms from the centre sum_I N_I X_I, which differs from the point if
-    corners lie beyond the grid or the domain is no parallelogram or parallelepiped. Angular
-    momentum is exact about the centres; about the points it varies by 0.1 % of its variation with
-    FLIP (a spinning square, Q4).
+    Affine transfers use distances of nodes from the centre sum_I N_I X_I. It differs from the point
+    if corners are beyond the grid, or if the domain is no parallelogram or parallelepiped. Angular
+    momentum is conserved about the centres; about the points it varies by 0.1 % of its variation
+    with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
@@ -55,7 +55,7 @@ class CarriedDomain(ConvectedDomain):
     traits = ConvectedDomain.traits._replace(shape=("corners",))
 
 
-BENT, SMALL = 0.2, 0.15  # strain; fraction of the stable step
+BENT, SMALL = 0.2, 0.15  # strain, and fraction of the stable step, for a warning
 
 
 def _torn_by_bending(basis, scene):
@@ -76,9 +76,9 @@ known_failure(
     cure="dt_factor(0.1) (energy of such a beam within 0.1 % with R4), or method tlmpm",
 )
 
-# Least extent of a domain in cells, by dimension
+# Smallest extent of a domain in cells, by dimension.
 LEAST = (0.0, 0.0, 0.5, 0.0)
-# in mesh order: around the square; around the lower, then the upper face of the cube
+# In the order of meshes: around the square; around the lower, then the upper face of the cube.
 SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 CUBE = tuple((*corner, z) for z in (-1, 1) for corner in SQUARE)
 
@@ -110,7 +110,7 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """Treats corners as nodes, where a node's weight or gradient is used once, as a factor.
+    """Basis whose nodes are the corners, for sums in which weight or gradient is a factor once.
 
     Node numbers are then `Weighted`.
     """
@@ -121,11 +121,11 @@ class AtCorners(NamedTuple):
 def along_cell(grid, direction, x):
     """Return a corner's cell along an axis, the position in it (0 to 1), and their sum.
 
-    Corners beyond the grid move to its face, so that weights sum to one.
+    Corners beyond the grid are moved to its face, so that weights sum to one.
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # NaN becomes 0 in this order
+    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 
@@ -270,7 +270,7 @@ def _carry_corners(basis, kin, location, corner, displacement):
 
 @bases.extent.on(CarriedDomain)
 def _extent_corners(basis, kin, grid, location):
-    d = kin.dimension  # NaN if any corner is
+    d = kin.dimension  # NaN if a corner is NaN
     far = abs(location[d] - location[0])
     for k in range(d + 1, d + d * basis.element.corners):
         far = max(abs(location[k] - location[k % d]), far)

@@ -1,6 +1,6 @@
-"""The 3 x 3 nodes around a 2D domain, each once, summed over the corners.
+"""The 3 x 3 nodes around a 2D domain, each with the sum over the corners.
 
-In 3D (27 nodes, eight corners) this costs more than it saves.
+In 3D, with 27 nodes and eight corners, this would cost more than it saves.
 """
 
 from collections.abc import Iterable
@@ -20,7 +20,7 @@ WIDTH = 3  # nodes per direction
 class NodeBlock(NamedTuple):
     first: tuple[int, ...]  # node number per direction
     weights: tuple[float, ...]
-    gradients: tuple[Any, ...]  # of corners, without N / r
+    gradients: tuple[Any, ...]  # gradients of corners, without N / r
     holds: bool  # all corners are inside and walls remove no node
     seen: CornerStencil
 

@@ -12,7 +12,7 @@ class _Parallel(cpdi.ConvectedDomain):
 
 
 class R4(_Parallel):
-    """Parallelograms: x and two half edges, which rotate and stretch with the point.
+    """Parallelograms, given by x and two half edges, which rotate and stretch with the point.
 
     In non-uniform strain, neighbours may slightly overlap or separate (Sadeghirad, Brannon &
     Burghardt 2011).
@@ -27,7 +27,7 @@ class R4(_Parallel):
 
 
 class R8(_Parallel):
-    """Parallelepipeds: x and three half edges, which rotate and stretch with the point.
+    """Parallelepipeds, given by x and three half edges, which rotate and stretch with the point.
 
     Example
     -------
@@ -62,7 +62,7 @@ def _domain_parallel(basis, kin, location):
     corners: list = []
     gradients: list = []
     # With reciprocal vectors A . a = 1, A . b = 0 ..., N_c has the mean gradient (+-A +-B) / 4. In
-    # 3D, nine products with k before the sums beat twelve after them.
+    # 3D, nine products with k before the sums are faster than twelve after them.
     A = reciprocals(kin, edges, k if d == 3 else 1)
     for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
@@ -89,7 +89,7 @@ def _extent_parallel(basis, kin, grid, location):
         total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, location), strict=True)
     ]
     far = away[0]
-    for other in away[1:]:  # passes NaN on
+    for other in away[1:]:  # so that NaN remains NaN
         far = far + max(other - far, 0)
     return max(far * grid.inv_h, cpdi.LEAST[kin.dimension])
 
@@ -168,7 +168,7 @@ class Q4(cpdi.CarriedDomain):
 @cpdi.domain.on(Q4)
 def _domain_q4(basis, kin, location):
     x1, y1, x2, y2, x3, y3, x4, y4 = location[2:]
-    # diagonals; their cross product is 2 V
+    # Diagonals, whose cross product is 2 V.
     px, py = x3 - x1, y3 - y1
     qx, qy = x4 - x2, y4 - y2
     double = px * qy - qx * py
@@ -197,7 +197,7 @@ def _upright_q4(basis, kin, location):
     return least > 0
 
 
-# weights of an edge's ends at its near and far Gauss points
+# Weights of an end of an edge at the near and the far Gauss point.
 NEAR, FAR = (1 + 3**-0.5) / 2, (1 - 3**-0.5) / 2
 PAIRS = (0, 0), (1, 0), (0, 1), (1, 1)
 
@@ -262,8 +262,8 @@ def _edges(location):
 
 @cpdi.domain.on(H8)
 def _domain_h8(basis, kin, location):
-    # Rows of the Jacobian: u does not depend on xi, v on eta, w on zeta; keys are Gauss points of
-    # the other two.
+    # Rows of the Jacobian: u is independent of xi, v of eta, w of zeta; keys are Gauss points of
+    # the other two coordinates.
     u, v, w = [dict(zip(PAIRS, _at_gauss(*along), strict=True)) for along in _edges(location)]
     # Cofactors along xi by xi, eta, zeta, summed over the Gauss points of xi, and so on.
     first = {(a, b, c): _cross(v[a, c], w[a, b]) for a in (0, 1) for b, c in PAIRS}

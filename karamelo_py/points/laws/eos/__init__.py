@@ -54,7 +54,7 @@ def ignited(eos, memory, since):
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """Return (heat,), the part of `heat` that becomes internal energy in the memory, or ()."""
+    """Return (heat,), the part of `heat` that becomes internal energy of the memory, or ()."""
     return ()
 
 

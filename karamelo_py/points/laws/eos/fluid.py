@@ -23,9 +23,9 @@ from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # times to fall by, or rotations of, the liquid's size; dam breaks take 4
-FRONT = 1.5  # cells in which a point burns
-STEP, STRONG = 2.0, 20.0  # pressure ratios of a shock and of a strong shock
+LONG = 6.0, 0.5  # times to fall by the liquid's size; revolutions. Dam breaks take 4
+FRONT = 1.5  # cells that the front moves while a point burns
+STEP, STRONG = 2.0, 20.0  # pressure ratio above which there is a shock, and a strong shock
 
 
 class Tait(NamedTuple):
@@ -40,7 +40,7 @@ class Tait(NamedTuple):
     gamma
         Exponent, 7 for water.
     tension
-        Largest tension (0: none); by default the formula's, up to K.
+        Largest tension (0: none). By default the formula limits it to K.
 
     Example
     -------
@@ -50,7 +50,7 @@ class Tait(NamedTuple):
     Notes
     -----
     p = K ((rho/rho0)^gamma - 1) (Cole 1948; Monaghan 1994). The speed of sound is sqrt(K
-    gamma/rho0) at zero pressure. A lower K allows longer steps: density stays within 1 % while
+    gamma/rho0) at zero pressure. A lower K allows longer steps: density changes by less than 1 % if
     speeds are below 10 % of the speed of sound. Use ``tension=0`` for splashes, where tension makes
     drops swell and stick together.
 
@@ -66,7 +66,7 @@ class Tait(NamedTuple):
     specific_volume: float
     K: float  # bulk modulus over gamma
     gamma: float
-    tension: float = inf  # largest tension; beyond K the formula limits it
+    tension: float = inf  # largest tension; the formula itself limits it to K
 
     @classmethod
     def given(cls, rho0: AboveZero, K: AboveZero, gamma: AboveZero, *, tension: FromZero = inf):
@@ -161,8 +161,8 @@ class IdealGas(NamedTuple):
 
     Notes
     -----
-    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. Adiabatic e grows as
-    rho^(gamma - 1), exactly in each step. Viscous work heats the gas, as does kinetic energy
+    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. In adiabatic steps e is
+    proportional to rho^(gamma - 1), exactly. Viscous work heats the gas, as does kinetic energy
     dissipated by PIC, FLIP, APIC, MLS and TPIC. For shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
     A free surface expands from the first step. Fix initial_stress changes the energy at constant
@@ -308,7 +308,7 @@ class JwlConstants(NamedTuple):
     1 while the front moves 1.5 cells (programmed burn, Wilkins 1964). Viscous work heats the
     products.
 
-    The strain energy is E - E0: it falls as the products do work. Fix initial_stress has no effect.
+    The strain energy, E - E0, decreases as the products do work. Fix initial_stress has no effect.
 
     See Also
     --------
@@ -358,7 +358,7 @@ known_failure(
 
 class Burning(NamedTuple):
     E: Any  # per reference volume
-    since: Any  # time since lighting, below 0 before
+    since: Any  # time since ignition, negative before
 
 
 @stored_heat.on(IdealGas)
@@ -422,7 +422,7 @@ def _pressure_jwl(eos, j, memory, heat):
 
 @bulk_modulus.on(Jwl)
 def _bulk_modulus_jwl(eos, j, memory, heat):
-    # at constant entropy; until all is burnt, waves are at most as fast as the front
+    # At constant entropy; until all is burnt, waves are not faster than the front.
     p, slope = cold(eos, j)
     gas = eos.omega * memory.E / j
     K = max(gas + eos.omega * (p + gas) - j * slope, 0)

@@ -30,7 +30,7 @@ class PAlphaConstants(NamedTuple):
     Parameters
     ----------
     solid
-        ID of the equation of state without voids.
+        ID of the equation of state of the material without voids.
     alpha0
         Initial distension: density of the solid over density with voids.
     pe
@@ -50,8 +50,8 @@ class PAlphaConstants(NamedTuple):
     Notes
     -----
     p = ps(J_s)/alpha, with the pressure ps of the solid at its volume ratio J_s = J alpha0/alpha
-    (Herrmann 1969, J. Appl. Phys. 40, 2490-2499; Carroll & Holt 1972). In loading beyond pe,
-    alpha = 1 + (alpha0 - 1) ((ps - p)/(ps - pe))^n; it never grows. Each step solves for the
+    (Herrmann 1969, J. Appl. Phys. 40, 2490-2499; Carroll & Holt 1972). In loading beyond pe, alpha
+    = 1 + (alpha0 - 1) ((ps - p)/(ps - pe))^n; alpha never increases. Each step solves for the
     pressure on the crush curve. Unloading and reloading are elastic, at constant alpha. Dump column
     ``alpha``. The work of crushing is dissipated; with a temperature, it heats the solid.
 
@@ -143,7 +143,7 @@ def solid_pressure(eos, j, alpha, heat):
 
 @compressed.on(PAlpha)
 def _compressed_p_alpha(eos, memory, step, heating):
-    # Unique, as ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat moves the curve only slightly.
+    # The solution is unique: ps(j alpha0/alpha(p))/alpha(p) falls with p. Heat shifts it slightly.
     old = memory.alpha
     low = eos.ps - (eos.ps - eos.pe) * power((old - 1) / (eos.alpha0 - 1), 1 / eos.n)
     crushing = (solid_pressure(eos, step.j, old, ()) > low * old) & (old > 1)

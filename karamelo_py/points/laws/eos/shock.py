@@ -43,7 +43,7 @@ class ShockConstants(NamedTuple):
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
     tension
-        Tension at which the material spalls (0: none); by default the formula's.
+        Tension at which the material spalls (0: no tension). Default: only the formula limits it.
 
     Example
     -------
@@ -53,9 +53,9 @@ class ShockConstants(NamedTuple):
     Notes
     -----
     With mu = rho/rho0 - 1, p = rho0 c0^2 mu (1 + mu) / (1 - (S - 1) mu)^2 + Gamma rho0 cv (T - Tr)
-    for T above Tr (Meyers 1994, chapter 5). Without a temperature it is the Hugoniot curve alone.
-    In tension the first term is rho0 c0^2 mu. The curve has a pole at (S
-    - 1) mu = 1; beyond S (1 - rho0/rho) = 0.9 the pressure follows the tangent.
+    for T above Tr (Meyers 1994, chapter 5). Without a temperature, the pressure is the Hugoniot
+    curve. In tension the first term is rho0 c0^2 mu. The curve has a pole where (S - 1) mu = 1;
+    beyond S (1 - rho0/rho) = 0.9 the pressure follows the tangent.
 
     Voids open at constant tension and close before the material sustains pressure again. In the
     acoustic approximation the free surface velocity drops by 2 tension/(rho0 c0) (Antoun et al.

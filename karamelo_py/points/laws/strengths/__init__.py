@@ -2,7 +2,8 @@
 
 A strength is a NamedTuple of parameters, a part of `eos_strength`. `heat` is the temperature
 (`Warm`) or (). Strengths that depend on pressure and change the volume define `pressure_response`
-instead of `shear_response`. Defaults are elastic, with a shear modulus ``G`` and no memory.
+instead of `shear_response`. The default functions are for an elastic strength, with a shear modulus
+``G`` and no memory.
 """
 
 import sys
@@ -15,8 +16,8 @@ from karamelo_py.points.laws import answers, column
 
 
 class StrainStep(NamedTuple):
-    s: Any  # before the step, rotated with the point
-    strain: Any  # increment, not deviatoric
+    s: Any  # stress before the step, rotated with the point
+    strain: Any  # strain increment, including volume change
     j: Any  # volume ratio after the step
     dt: Any
     extra: Any  # pressure in the nodal forces minus the point's (F-bar)
@@ -63,7 +64,7 @@ def initial_memory(strength, template):
 
 @point_function(otherwise=True)
 def respond(strength, law, kin, step, memories):
-    """Return deviatoric stress, memory and unstored work per volume after a `StrainStep`.
+    """Return deviatoric stress, memory and dissipated work per volume after a `StrainStep`.
 
     `memories` holds the memories of all parts of the `law`.
     """
@@ -72,7 +73,7 @@ def respond(strength, law, kin, step, memories):
 
 @point_function()
 def shear_response(strength, kin, step, memory, heat):
-    """Respond like `respond`, for strengths independent of other parts."""
+    """Return the results of `respond`, for strengths that are independent of other parts."""
 
 
 @point_function()
@@ -126,7 +127,7 @@ def elastic_ratio(strength, memory, j):
 
 @point_function(otherwise=True)
 def added_pressure(strength, memory):
-    """Return the pressure added to the equation of state's."""
+    """Return the pressure that is added to the pressure of the equation of state."""
     return 0
 
 

@@ -27,7 +27,7 @@ from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yiel
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
-LEAST_STRAIN = 1e-9  # failure strain
+LEAST_STRAIN = 1e-9  # smallest failure strain
 
 
 class JohnsonHolmquist2(NamedTuple):
@@ -40,7 +40,7 @@ class JohnsonHolmquist2(NamedTuple):
     A, N
         Intact strength: A (P* + T*)^N.
     B, M
-        Strength when broken: B P*^M.
+        Strength of broken material: B P*^M.
     C
         Rate coefficient; 0 for none.
     epsdot0
@@ -50,13 +50,13 @@ class JohnsonHolmquist2(NamedTuple):
     HEL
         Hugoniot elastic limit: axial stress at which a plane wave yields.
     PHEL
-        Pressure there.
+        Pressure at the Hugoniot elastic limit.
     D1, D2
         Failure strain: D1 (P* + T*)^D2.
     beta
         Fraction of the lost shear energy that becomes pressure (bulking), 0 to 1.
     sfmax
-        Bound of the strength when broken, over the strength at the elastic limit.
+        Upper bound of the strength of broken material, over the strength at the elastic limit.
 
     Example
     -------
@@ -67,15 +67,15 @@ class JohnsonHolmquist2(NamedTuple):
     Notes
     -----
     The von Mises stress is at most sHEL (si - D (si - sf)), where the intact and broken strengths
-    si and sf rise by 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL - PHEL)
-    (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D grows to 1 with plastic
-    strain over failure strain, at once if the latter is 0. Damaged material opens beyond a tension
-    of T (1 - D). In compression, a step that lowers the strength converts the fraction beta of the
-    lost shear energy to pressure. Dump columns: ep, damage, bulking (the added pressure), opened
-    (the volume ratio of gaps). The rate is the strain rate.
+    si and sf get the factor 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL -
+    PHEL) (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D is the sum of
+    plastic strain over failure strain, up to 1, and 1 at once if the failure strain is 0. Beyond a
+    tension of T (1 - D), gaps open. In compression, if the strength decreases in a step, the
+    fraction beta of the lost shear energy becomes pressure. The rate is the total strain rate. Dump
+    columns: ep, damage, bulking (the added pressure), opened (the volume ratio of gaps).
 
-    Opening has an energy error of first order in the step: -4 % with 10 % of the stable step, -0.7
-    % with 1 %.
+    When gaps open, energy has an error of first order in the step: -4 % with 10 % of the stable
+    step, -0.7 % with 1 %.
 
     See Also
     --------
@@ -132,11 +132,11 @@ class Concrete(NamedTuple):
     T
         Largest tension, as a pressure.
     smax
-        Bound of the strength over fc.
+        Upper bound of the strength, over fc.
     D1, D2
         Strain to failure: D1 (P* + T*)^D2.
     efmin
-        Least strain to failure.
+        Smallest strain to failure.
 
     Example
     -------
@@ -147,12 +147,12 @@ class Concrete(NamedTuple):
 
     Notes
     -----
-    The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and smax fc;
-    in tension A falls to 0 at -T (1 - D). D grows by the plastic strain and, with eos p-alpha, by
-    the volume strain of crushed pores, over the strain to failure (Holmquist, Johnson & Cook 1993,
-    14th Int. Symp. Ballistics, 591-600). Their three-part pressure curve is not built in: use eos
-    p-alpha, which has the same parts, or eos formula. Dump columns: ep, damage, opened (the volume
-    ratio of gaps).
+    The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and at most
+    smax fc; in tension it decreases to 0 at a pressure of -T (1 - D). D is the sum of plastic
+    strain and, with eos p-alpha, of the volume strain of crushed pores, over the strain to failure
+    (Holmquist, Johnson & Cook 1993, 14th Int. Symp. Ballistics, 591-600). Their three-part pressure
+    curve is not built in: use eos p-alpha, which has the same parts, or eos formula. Dump columns:
+    ep, damage, opened (the volume ratio of gaps).
 
     See Also
     --------

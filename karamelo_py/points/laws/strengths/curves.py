@@ -48,9 +48,9 @@ class Tabulated(NamedTuple):
 
     Notes
     -----
-    Beyond the last point the flow stress is constant; it may fall by less than 3 G per unit of
-    plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file. Each step solves
-    for the plastic strain with the flow stress at its end.
+    Beyond the last point of the curve the flow stress is constant. The curve may fall by less than
+    3 G per unit of plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file.
+    Each step solves for the plastic strain with the flow stress at its end.
 
     See Also
     --------
@@ -174,9 +174,10 @@ class FlowStress(ByFlow, FlowFields):
 
     Notes
     -----
-    Each step solves q = 3 G x + Y for its plastic strain x, with Y at its end, by Newton's method
-    with the exact slope. Y may fall by less than 3 G per unit of plastic strain; a negative Y
-    counts as 0. The formula is compiled, with numbers of the script as parameters.
+    In each step, Newton's method with the exact slope solves q = 3 G x + Y for the plastic strain
+    x, with Y at the end; q is the von Mises stress of an elastic step. Y may fall by less than 3 G
+    per unit of plastic strain; a negative Y counts as 0. The formula is compiled, with numbers of
+    the script as parameters.
 
     See Also
     --------
@@ -232,6 +233,6 @@ def _flow_stress_by_flow(strength, before, increment, dt):
     flow = evaluated(strength.flow, strength, at)
     by_strain, by_rate = [evaluated(code, strength, at) for code in strength.slopes]
     slope = by_strain + by_rate / dt
-    # A slope of -3 G or less has no solution; ep^0.3 has none at 0, nor has a kink.
+    # With a slope of -3 G or less there is no solution; ep^0.3 at 0, and kinks, have no slope.
     slope = where(slope > -2 * strength.G, min(slope, STEEPEST * strength.G), -2 * strength.G)
     return max(flow, 0), slope

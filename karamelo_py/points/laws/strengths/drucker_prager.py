@@ -47,11 +47,11 @@ class DruckerPrager(NamedTuple):
         Match with mohr-coulomb: ``compression`` or ``extension`` in triaxial tests, or
         ``plane-strain`` at the limit load in plane strain.
     tension
-        Largest mean stress in tension; default: at the apex of the cone.
+        Largest mean stress in tension; default: the apex of the cone.
     residual_cohesion, residual_phi
         Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain of the fall, which is linear in the cone's coefficients.
+        Equivalent plastic strain over which the coefficients of the cone fall linearly.
 
     Example
     -------
@@ -65,7 +65,7 @@ class DruckerPrager(NamedTuple):
     compression xi = 6 cos(phi)/(sqrt(3) (3 - sin(phi))) and eta = 6 sin(phi)/(sqrt(3) (3 -
     sin(phi))). For extension 3 + sin(phi) replaces 3 - sin(phi). For plane-strain xi = cos(phi)/b
     and eta = sin(phi)/b, where b = sqrt(1 - d^2/3) + d sin(phi)/3 and d = 3 tan(psi)/sqrt(9 + 12
-    tan(psi)^2). At its limit s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain equals
+    tan(psi)^2). At the limit load s_zz is -2/3 d sqrt(s:s/2), so the limit in plane strain is
     mohr-coulomb's for any psi. The dilatancy coefficient is d, and for the other fits eta of psi.
     Tension beyond -p = tension, or the apex, is cut off. Pressure follows from the elastic part of
     J. A step uses the strength at its beginning. With softening, results depend on the cell size.
@@ -86,7 +86,7 @@ class DruckerPrager(NamedTuple):
     tension: float
     residual_cohesion: float  # after softening
     residual_friction: float
-    softening: float  # per unit of plastic strain; or 0
+    softening: float  # softening per unit of plastic strain; or 0
 
     @classmethod
     def given(
@@ -135,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # The trial pressure counts beyond the apex, see below.
+            # Beyond the apex the trial pressure is used, see below.
             p -= K * dilation * x
     if p < lowest:
         p = lowest

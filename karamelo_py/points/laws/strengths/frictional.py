@@ -1,11 +1,11 @@
 """Base of pressure-dependent strengths: cohesion and friction with optional softening.
 
 The memory is the equivalent plastic strain ep, the plastic volume ratio Jp and the separation
-volume ratio Js. Beyond the largest tension points separate; that volume closes before they sustain
-pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of granular flows
-through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017, "Multi-species
-simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section 4.3.4). Dilatancy,
-the volume gained by plastic shear, remains.
+volume ratio Js. Beyond the largest tension points separate; the volume of gaps must close before
+points sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
+granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017,
+"Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section
+4.3.4). The volume gained by plastic shear (dilatancy) remains.
 """
 
 from collections.abc import Callable
@@ -40,10 +40,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def surface(strength, strain):
-    """Return cohesion, friction and dilation, linear from peak to residual.
-
-    A step uses the values at its beginning.
-    """
+    """Return cohesion, friction and dilation, from peak to residual, at the start of a step."""
     weakened = min(strain * strength.softening, 1)
     intact = 1 - weakened
     cohesion = intact * strength.cohesion + weakened * strength.residual_cohesion
@@ -65,13 +62,14 @@ def tension_bound(strength, lowest):
 def fraction_by_dilatancy(strength, memory):
     """Return the fraction b of F-bar's averaged pressure that the yield surface uses.
 
-    Averaging multiplies waves by a (1 for long waves, 0.1 to 0.5 for two or three cells). Their
-    stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a positive number, f and d
-    being the sines of friction and dilatancy. With b = 0 it is negative for a between d and f
-    (pressure grows in stripes, and strength falls); with b = (f - d)/(f (1 - d)) it is a square.
+    Averaging multiplies volume waves by a factor a (1 for long waves, 0.1 to 0.5 for wave lengths
+    of two or three cells). Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a
+    positive number, where f and d are the sines of friction and dilatancy. With b = 0 it is
+    negative for a between d and f, so that pressure grows in stripes and strength is lost. With b =
+    (f - d)/(f (1 - d)) it is a square.
     """
     f, d = sines_after(strength, memory.ep)
-    # a steep cone's sine in plane strain may exceed 1
+    # the sine of a steep cone in plane strain may exceed 1
     return where(f > d, min((f - d) / (where(f > d, f, 1) * max(1 - d, 1e-3)), 1), 0)
 
 
@@ -91,12 +89,12 @@ def plastic_and_gaps(strength, memory):
 
 
 def respond_by_friction(strength, law, kin, step, memories):
-    """Return the stress to the yield surface, and store the plastic volume change."""
+    """Return a stress to the yield surface, and store the plastic volume change."""
     memory, heat = memories.strength, memories.heat
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_ratio(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
-    # with the pores that the trial crushes
+    # including pores that are crushed in the trial
     energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
     p_point = pressure(law.eos, elastic, energy, heat) + warm
     extra = fbar_fraction(strength, memory) * step.extra
@@ -114,7 +112,7 @@ def respond_by_friction(strength, law, kin, step, memories):
     memory = memory._replace(ep=memory.ep + sqrt(2 / 3 * inner(plastic, plastic)))
     work = inner(new, plastic)
     if reached != p:
-        # The volume that carries the new pressure is elastic, the rest plastic.
+        # The volume at the new pressure is elastic; the rest of the change is plastic.
         p_after = p_point + (reached - p) - warm
         after, _ = at_pressure(law.eos, elastic, memories.energy, p_after, heat)
         if p < lowest and reached - lowest <= 1e-6 * (lowest - p):
@@ -161,8 +159,8 @@ def frictional(strength: type) -> None:
 
 
 ENOUGH = 1 / 3  # sine of dilatancy over sine of friction above which neither occurs
-# f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar and without; the
-# latter also need steep friction and no cohesion.
+# f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar, and without it if
+# friction is steep and there is no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46
 
 
@@ -177,9 +175,9 @@ def little_dilatancy(strength):
 
 
 def _vibrates(strength, scene):
-    """Return facts if strain cycles of a point at its limit release net work.
+    """Return facts if strain cycles of a point at its yield limit release energy.
 
-    Without dilatancy this is (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
+    Without dilatancy this energy is (f - G/(K + G/3)) (K + G/3) e^2/2, with the sine f of friction.
     """
     f = little_dilatancy(strength)
     averaged = scene.hub.update.anti_locking

@@ -21,7 +21,7 @@ from karamelo_py.points.laws.temperatures import temperature_or, thermal_pressur
 
 
 def elastic_trial(G, s, strain):
-    # deviator of the sum, as rounding over many steps would give s a trace
+    # Deviator of the sum, as otherwise rounding in many steps would give s a trace.
     return dev(s + 2 * G * strain)
 
 
@@ -33,7 +33,7 @@ class LinearHardening(NamedTuple):
     G
         Shear modulus.
     yield_stress
-        In uniaxial tension, sqrt(3) times the value in pure shear.
+        Yield stress in uniaxial tension, sqrt(3) times the value in pure shear.
     H
         Hardening modulus: increase of the yield stress per unit of plastic strain.
 
@@ -44,9 +44,9 @@ class LinearHardening(NamedTuple):
 
     Notes
     -----
-    If q = sqrt(3/2 s:s) (von Mises) of an elastic step exceeds the yield stress Y, the equivalent
-    plastic strain (dump column ep) grows by (q - Y)/(3 G + H), and s is scaled to the yield stress
-    (radial return; Wilkins 1964; de Souza Neto et al. 2008, section 7.3).
+    If the von Mises stress q = sqrt(3/2 s:s) after an elastic step exceeds the yield stress Y, the
+    equivalent plastic strain (dump column ep) grows by (q - Y)/(3 G + H), and s is scaled to the
+    yield stress (radial return; Wilkins 1964; de Souza Neto et al. 2008, section 7.3).
 
     See Also
     --------
@@ -143,7 +143,7 @@ def radial_return(strength, kin, step, memory, heat):
 
 
 class Around(NamedTuple):
-    """Surroundings of a flow stress that depends on pressure; replaces `heat`."""
+    """Arguments of a flow stress that depends on pressure, instead of `heat`."""
 
     T: Any
     p: Any
@@ -163,7 +163,7 @@ def around_flow(strength, law, step, memories):
 
 
 def surroundings(strength, heat):
-    """Return `heat` of `respond_at_pressure`; else no pressure, at the volume of rest."""
+    """Return `heat` as given by `respond_at_pressure`; else zero pressure and initial volume."""
     if len(heat) > 1:
         return heat
     return Around(temperature_or(heat, strength.initial_temperature), 0.0, 1.0)
@@ -176,8 +176,8 @@ _MOST_ITERATIONS = 80
 def plastic_increment(strength, q, memory, heat, dt):
     """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
 
-    The left side falls with x, the flow stress does not, so x is unique for any step size. Newton's
-    method is safeguarded by bisection.
+    The left side falls with x and the flow stress does not fall, so x is unique for any step size.
+    Newton's method is safeguarded by bisection.
     """
     slope = 3 * strength.G
     enough = 4 * round_off(q) * q  # rounding of the three terms
@@ -195,8 +195,8 @@ def plastic_increment(strength, q, memory, heat, dt):
         high = where(excess > 0, high, x)
         change = excess / (slope + hardening)
         new = x + change
-        # Quadratic convergence: the next change is (c_n / c_(n-1))^2 c_n. Next to a kink it is
-        # larger, so the excess must be small too.
+        # With quadratic convergence, the next change is (c_n / c_(n-1))^2 c_n. Next to a kink it is
+        # larger, so the excess must be small, too.
         square, least = change * change, round_off(q) * new
         next_is_small = (abs(change) * square <= least * last * last) & (curved * square <= least)
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))

@@ -12,7 +12,7 @@ from karamelo_py.points.laws.viscosity import damped, inviscid
 
 
 class Elastic(NamedTuple):
-    """Unlimited elastic shear.
+    """Elastic shear without a limit.
 
     Parameters
     ----------
@@ -25,8 +25,8 @@ class Elastic(NamedTuple):
 
     Notes
     -----
-    The deviatoric stress rotates with the point (Jaumann rate) and grows by 2 G dev(d) for a strain
-    increment d.
+    The deviatoric stress rotates with the point (Jaumann rate) and changes by 2 G dev(d) for a
+    strain increment d.
 
     See Also
     --------
@@ -77,7 +77,7 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
-SIGNIFICANT = 0.05  # fraction of the fluid's viscosity
+SIGNIFICANT = 0.05  # numerical viscosity over viscosity of the fluid, for a warning
 
 
 def _viscosity(strength, scene):

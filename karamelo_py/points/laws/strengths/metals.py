@@ -34,7 +34,7 @@ class JohnsonCookConstants(NamedTuple):
     A
         Initial flow stress, at the reference rate and temperature.
     B, n
-        Hardening: the flow stress rises by B ep^n with the plastic strain ep.
+        Hardening: the flow stress increases by B ep^n, where ep is the equivalent plastic strain.
     epsdot0
         Reference plastic strain rate; may be 0 if C is.
     C
@@ -42,9 +42,9 @@ class JohnsonCookConstants(NamedTuple):
     m
         Exponent of thermal softening; 0 for none.
     Tr
-        Reference temperature; no softening below.
+        Reference temperature, below which there is no softening.
     Tm
-        Melting temperature; no strength above.
+        Melting temperature, above which there is no strength.
 
     Example
     -------
@@ -53,9 +53,9 @@ class JohnsonCookConstants(NamedTuple):
     Notes
     -----
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
-    1983). The second factor is 1 up to the reference rate, the third without a temperature. Each
-    step solves for the plastic strain with the flow stress at its end, the step's rate and the
-    temperature at its beginning; the solution is unique for any step size.
+    1983). The second factor is 1 up to the reference rate, the third without a temperature. In each
+    step, the plastic strain is found for the flow stress at the end of the step, with the mean rate
+    in the step and the temperature at its beginning; the solution is unique for any step size.
 
     See Also
     --------
@@ -73,7 +73,7 @@ class JohnsonCookConstants(NamedTuple):
     Tm: float
 
     def checked(self):
-        """Omit factors of 1, each of which costs a logarithm or a power."""
+        """Return a law without factors that are 1, as each costs a logarithm or a power."""
         *hardening, epsdot0, C, m, Tr, Tm = self
         check_temperatures(Tr, Tm)
         epsdot0 = reference_rate(epsdot0, C, "C")
@@ -120,7 +120,7 @@ remembers(JohnsonCook, ep=0.0)
 shear_response.on(JohnsonCook)(radial_return)
 
 
-# Increments up to this fraction of the strain use a series of this many terms.
+# For increments up to the fraction _NEAR of the strain, a series of _TERMS terms is used.
 _NEAR, _TERMS = 1 / 32, 9
 
 
@@ -172,7 +172,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, before, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the precomputed part lacks the rate
+        return real(0, q), real(0, q)  # the precomputed part does not include the rate
     hard, soft = before.precomputed
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, before.memory.ep, hard * soft, excess, slope)
@@ -202,9 +202,9 @@ class Swift(NamedTuple):
     A
         Flow stress on the plateau.
     B, n
-        Hardening.
+        Hardening constants (see notes).
     C
-        Plastic strain at the end of the plateau; negative: earlier plastic strain.
+        Plastic strain at the end of the plateau. If negative, -C is an initial plastic strain.
 
     Example
     -------
@@ -212,8 +212,8 @@ class Swift(NamedTuple):
 
     Notes
     -----
-    Y = A + B (ep - C)^n for plastic strains ep above C, else A (after Swift 1952). Each step solves
-    for the plastic strain with the flow stress at its end.
+    Y = A + B (ep - C)^n for plastic strains ep above C, else A (after Swift 1952). In each step,
+    the plastic strain is found for the flow stress at the end of the step.
 
     See Also
     --------
@@ -285,8 +285,7 @@ class ZerilliArmstrong(NamedTuple):
     -----
     Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n (Zerilli & Armstrong
     1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. At rest the strength is C0 + C5
-    ep^n. Each step solves for the plastic strain with the flow stress at its end and the rate of
-    the step.
+    ep^n. Each step finds the plastic strain for the flow stress at its end and its mean rate.
 
     See Also
     --------

@@ -32,7 +32,7 @@ class MohrCoulomb(NamedTuple):
     residual_cohesion, residual_phi
         Residual cohesion and friction angle; default: no softening.
     softening
-        Equivalent plastic strain over which they fall, linearly in c cos(phi) and sin(phi).
+        Equivalent plastic strain over which c cos(phi) and sin(phi) fall linearly.
 
     Example
     -------
@@ -43,8 +43,8 @@ class MohrCoulomb(NamedTuple):
     Notes
     -----
     s1 - s3 + (s1 + s3) sin(phi) <= 2 c cos(phi), with s1 the largest and s3 the smallest principal
-    stress (tension positive). Principal stresses return to a plane, an edge or, in tension, the
-    apex p = -c cot(phi) (Simpson 2017, Practical Finite Element Modeling in Earth Science using
+    stress (tension positive). Principal stresses are returned to a plane, an edge or, in tension,
+    the apex p = -c cot(phi) (Simpson 2017, Practical Finite Element Modeling in Earth Science using
     Matlab, section 11.4; de Souza Neto et al. 2008, section 8.2). Pressure follows from the elastic
     part of J. A step uses the strength at its beginning. With softening, results depend on the cell
     size.
@@ -88,8 +88,8 @@ frictional(MohrCoulomb)
 def returned_to_plane(s, yield_surface, G, K):
     """Return the principal stresses s1 >= s2 >= s3 of an elastic trial to the yield surface.
 
-    They return to a plane; to an edge if that changes their order; or else to the apex (Simpson
-    2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
+    They are returned to a plane; to an edge if this would change their order; otherwise to the apex
+    (Simpson 2017, section 11.4; de Souza Neto et al. 2008, box 8.4). `yield_surface` is c cos(phi),
     sin(phi), sin(psi).
     """
     k, sin_phi, sin_psi = yield_surface
@@ -121,7 +121,7 @@ def returned_to_plane(s, yield_surface, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # on both planes, as they are equal but for rounding
+        # from both planes, which give equal values except for rounding
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3

@@ -24,11 +24,11 @@ class MuI(NamedTuple):
     G
         Shear modulus of the grains while they are in contact.
     mu_s
-        Friction coefficient of slow flow, the tangent of the angle of repose.
+        Friction coefficient of slow flow: the tangent of the angle of repose.
     mu_2
         Friction coefficient of fast flow, above mu_s.
     I0
-        Inertial number at which friction is half way between.
+        Inertial number at which friction is (mu_s + mu_2)/2.
     d
         Grain diameter.
     rho_s
@@ -45,8 +45,8 @@ class MuI(NamedTuple):
     sqrt(s:s/2) = mu(I) p in flow, with mu = mu_s + (mu_2 - mu_s)/(I0/I + 1) (Jop, Forterre &
     Pouliquen 2006). I = gamma' d sqrt(rho_s/p), with the plastic shear rate gamma'. Below mu_s p
     the response is elastic. A step of any size solves a quadratic equation for the shear stress at
-    its end (Dunatunga & Kamrin 2015). Below the initial density grains separate and sustain no
-    stress. Flow conserves the volume. Dump column ``inertial``: I.
+    its end (Dunatunga & Kamrin 2015). Below the initial density, grains are separated and sustain
+    no stress. Flow conserves the volume. Dump column ``inertial``: I.
 
     See Also
     --------
@@ -91,11 +91,11 @@ known_failure(
 )
 
 
-SLOW = 0.05  # fraction of the grains' viscosity that gives a warning
+SLOW = 0.05  # numerical viscosity over viscosity of the grains, for a warning
 
 
 def _slows(strength, scene):
-    """Compare the viscosity of the PIC fraction with the grains', mu p/(rho gamma').
+    """Compare numerical viscosity (PIC) with the viscosity mu p/(rho gamma') of the grains.
 
     p is taken at half a body's height, I as I0 / 2.
     """
@@ -128,7 +128,7 @@ remembers(MuI, ep=0.0, inertial=0.0)
 
 @elastic_ratio.on(MuI)
 def _elastic_ratio_mu_i(strength, memory, j):
-    return min(j, 1)  # separated grains are not stretched
+    return min(j, 1)  # separated grains have no strain
 
 
 @fbar_fraction.on(MuI)
@@ -162,5 +162,5 @@ def _respond_mu_i(strength, law, kin, step, memories):
 
 
 def yields_early_with_fbar(strength):
-    """Return True for friction with little dilatancy, which yields at the point's pressure."""
+    """Return True for friction with little dilatancy, which yields by the pressure of the point."""
     return isinstance(strength, MuI) or little_dilatancy(strength) > 0

@@ -20,12 +20,12 @@ from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
 MOST_PASSES = 80  # Newton's method with bisection
-DENSE = 0.999999  # fraction of the strain of densification
+DENSE = 0.999999  # largest strain over the strain of densification
 NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
 
 class CrushableFoamConstants(NamedTuple):
-    """Metal or polymer foam, crushed by pressure and shear.
+    """Metal or polymer foam that is crushed by pressure and shear.
 
     Parameters
     ----------
@@ -51,8 +51,8 @@ class CrushableFoamConstants(NamedTuple):
     sqrt((q^2 + alpha^2 p^2)/(1 + alpha^2/9)) is at most Y + H ep + a ln(1/(1 - (ep/e)^beta)), with
     alpha^2 = 9/2 (1 - 2 nu)/(1 + nu); flow is associated, and dep is the axial strain in uniaxial
     compression (Deshpande & Fleck 2000, J. Mech. Phys. Solids 48, 1253-1283). The plastic volume
-    ratio is the dump column Jp. With eos p-alpha, steps must be below the elastic strain at yield:
-    in larger steps pores relieve pressure before flow does.
+    ratio is the dump column Jp. With eos p-alpha, strain increments must be below the elastic
+    strain at yield; in larger steps, pores reduce the pressure before the foam yields.
 
     See Also
     --------
@@ -102,7 +102,7 @@ class Gurson(NamedTuple):
     q1, q2
         Constants of Tvergaard.
     fc, ff
-        Void fractions at which voids begin to join, and at failure; fc = 1 for none.
+        Void fractions at which voids begin to join, and at failure; with fc = 1 they do not join.
     fn, en, sn
         Nucleation in tension: void fraction, mean and deviation of the matrix strain.
 
@@ -114,11 +114,11 @@ class Gurson(NamedTuple):
     -----
     (q/Ym)^2 + 2 q1 f cosh(3 q2 p/(2 Ym)) is at most 1 + (q1 f)^2; flow is associated and (1 - f) Ym
     dem the plastic work (Gurson 1977; Tvergaard & Needleman 1984, Acta Metall. 32, 157-169). Voids:
-    df = (1 - f) dev + fn/(sn sqrt(2 pi)) exp(-((em - en)/sn)^2/2) dem. Beyond fc, f in the surface
-    grows (1/q1 - fc)/(ff - fc) times as fast. Each step uses the matrix and f at its beginning: at
-    a strain of 0.4 the error is 6 % with steps of 0.04, 1 % with steps of 0.008. Compression closes
-    voids, even of failed metal, which then is intact again; without voids, metal yields by q = Ym.
-    Dump columns: ep (em), f, Jp (plastic volume ratio).
+    df = (1 - f) dev + fn/(sn sqrt(2 pi)) exp(-((em - en)/sn)^2/2) dem. Beyond fc, f in the yield
+    surface increases (1/q1 - fc)/(ff - fc) times as fast. Each step uses Ym and f at its beginning:
+    at a strain of 0.4 the error is 6 % with steps of 0.04, 1 % with steps of 0.008. Compression
+    closes voids, even of failed metal, which is then intact again; without voids, metal yields at q
+    = Ym. Dump columns: ep (em), f, Jp (plastic volume ratio).
 
     See Also
     --------
@@ -179,7 +179,7 @@ def grown(strength, memory, flow):
 
 @point_function(otherwise=True)
 def most_recovered(strength, memory):
-    """Return the largest elastic volume ratio after a step over the trial's."""
+    """Return the largest elastic volume ratio after a step over the ratio of the trial."""
     return inf
 
 
@@ -202,7 +202,7 @@ def _respond_porous(strength, law, kin, step, memories):
     q_trial = von_mises(trial)
     q, p, x = returned(strength, memory, Trial(q_trial, p_trial, K))
     slip = (q_trial - q) / (3 * strength.G)
-    # The volume that carries the new pressure is elastic, the rest plastic.
+    # The volume at the new pressure is elastic; the rest of the change is plastic.
     moved = p != p_trial
     after, _ = at_pressure(law.eos, elastic, memories.energy, p - warm, heat)
     after = min(where(moved, after, elastic), elastic * most_recovered(strength, memory))

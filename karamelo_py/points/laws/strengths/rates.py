@@ -27,8 +27,8 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.points.laws.temperatures import temperature_or
 
-MELTED = 1e-6  # fraction of the shear modulus
-LEAST = 1e-30  # plastic strain of a step that counts as a rate
+MELTED = 1e-6  # smallest fraction of the shear modulus
+LEAST = 1e-30  # smallest plastic strain in a step that counts as a rate
 
 
 class SteinbergGuinan(NamedTuple):
@@ -45,11 +45,11 @@ class SteinbergGuinan(NamedTuple):
     Ymax
         Bound of Y0 (1 + beta ep)^n.
     A
-        Growth with pressure, per pressure: 28e-12 1/Pa for copper.
+        Relative increase per pressure: 28e-12 1/Pa for copper.
     B
-        Softening with temperature, per kelvin: 3.77e-4 for copper.
+        Relative decrease per kelvin: 3.77e-4 for copper.
     Tm
-        Melting temperature; no strength and no shear stiffness above.
+        Melting temperature, above which there is no strength and no shear stiffness.
     T
         Temperature, if neither the material nor its solid has one.
 
@@ -61,7 +61,7 @@ class SteinbergGuinan(NamedTuple):
     -----
     Y = min(Y0 (1 + beta ep)^n, Ymax) g with g = 1 + A p J^(1/3) - B (T - 300), not below 0; the
     shear modulus is G g (Steinberg, Cochran & Guinan 1980, J. Appl. Phys. 51, 1498-1504). Elastic
-    shear strains remain when g changes, and their change of energy counts as dissipated. Dump
+    shear strains do not change with g; the change of their energy counts as dissipated. Dump
     columns: ep, stiffness (g).
 
     See Also
@@ -142,8 +142,8 @@ class Norton(NamedTuple):
 
     Notes
     -----
-    Each step solves for its creep strain with the stress at its end, so steps may be much longer
-    than the relaxation time (Norton 1929). Dump column ep: the creep strain.
+    In each step, the creep strain is found for the stress at the end of the step, so steps may be
+    much longer than the relaxation time (Norton 1929). Dump column ep: the creep strain.
 
     See Also
     --------
@@ -153,7 +153,7 @@ class Norton(NamedTuple):
     in_lanes = True
 
     G: float
-    log_A: float  # A, or a rate of creep, may be too small for single precision
+    log_A: float  # as A itself may be too small for single precision
     n: float
     Q: float
     initial_temperature: float
@@ -201,9 +201,9 @@ class Perzyna(NamedTuple):
     Y
         Yield stress at rest.
     H
-        Its growth per plastic strain.
+        Increase of the yield stress per plastic strain.
     eta
-        Viscosity, a time.
+        Viscosity parameter, a time.
     n
         Exponent of the overstress.
 
@@ -214,8 +214,8 @@ class Perzyna(NamedTuple):
     Notes
     -----
     The plastic strain rate is <q/(Y + H ep) - 1>^n/eta (Perzyna 1966, Adv. Appl. Mech. 9, 243-377);
-    with eta = 1/D and n = q that is the law of Cowper and Symonds. Each step solves for the plastic
-    strain with the stress at its end.
+    with eta = 1/D and n = q it is the law of Cowper and Symonds. In each step, the plastic strain
+    is found for the stress at the end of the step.
 
     See Also
     --------
@@ -249,7 +249,7 @@ def _first_guess_perzyna(strength, before, q, slope):
 
 
 class Mts(NamedTuple):
-    """Flow stress of metals by their mechanical threshold, the stress that flows at 0 kelvin.
+    """Flow stress of metals by the mechanical threshold, their flow stress at 0 kelvin.
 
     Parameters
     ----------
@@ -278,8 +278,8 @@ class Mts(NamedTuple):
     -----
     Y = sa + s (1 - (k T/(g0 G) ln(rate0/epdot))^(1/q))^(1/p), with the threshold s: ds/dep = theta
     (1 - tanh(2 s/sm)/tanh 2), ln(sm/ss) = k T/(gs G) ln(epdot/rates) (Follansbee & Kocks 1988, Acta
-    Metall. 36, 81-93). Dump column threshold. Its growth in a step follows from the threshold at
-    the beginning; the flow stress is the value at the end.
+    Metall. 36, 81-93). The dump column threshold is s. In each step, its increase is computed with
+    the threshold at the beginning, and the flow stress with the threshold at the end.
 
     See Also
     --------
