@@ -17,6 +17,7 @@ AREA = 21840 / 9  # m2, by the number of points of Wyser et al. 2020
 GROUND = 15.0  # height of the ground before the slope
 # With the method of in.collapse, which nothing has to be compiled for any more.
 SMALL = {
+    "refine": 0.8,
     "CFL": 0.9,
     "ppc": 2,
     "kind": "ulmpm",

@@ -91,6 +91,7 @@ def lanes_are_the_point_function(run_script, run_interpreted, script):
     assert slow["Ed"][-1] > 0
     for name in ("Es", "Ed"):
         assert fast[name] == pytest.approx(slow[name], rel=1e-8)
+    return fast
 
 
 def leaning_is_reported(run_interpreted, script, straight, leaning):

@@ -210,11 +210,11 @@ def test_a_sheet_in_plane_stress(run_interpreted):
 
 DISK = f"""
     method(tlmpm, FLIP, linear, 1)
-    dimension(2, 0, 1, 0, 1, 0.25)
+    dimension(2, 0, 1, 0, 1, 0.5)
     plane_stress(true)
     region(box, block, 0, 1, 0, 1)
     {MATERIAL}
-    solid(s, region, box, 2, sheet, 0.25, 0)
+    solid(s, region, box, 2, sheet, 0.5, 0)
     group(s, particles, region, box, solid, s)
     fix(v, initial_velocity_particles, s, 90*x, -60*y + 30*x)
     set_dt(1e-5)

@@ -164,10 +164,10 @@ def test_a_thin_specimen(run_interpreted):
 
 SLIDE = """
     method(tlmpm, FLIP, linear, 1)
-    dimension(2, 0, 1, 0, 1, 0.25)
+    dimension(2, 0, 1, 0, 1, 0.5)
     region(box, block, 0, 1, 0, 1)
     material(slate, jointed, 1000, 1e6, 0.25, 1e3, 30, 60, 90, psi=5)
-    solid(s, region, box, 2, slate, 0.25, 0)
+    solid(s, region, box, 2, slate, 0.5, 0)
     group(s, particles, region, box, solid, s)
     fix(v, initial_velocity_particles, s, x*y, -y)
     set_dt(2e-3)

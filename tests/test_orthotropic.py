@@ -184,12 +184,12 @@ def test_compiled_lanes_are_hookes_law(run_script, run_interpreted):
     script = """
         law = "built"
         method(tlmpm, FLIP, linear, 1)
-        dimension(2, 0, 1, 0, 1, 0.25)
+        dimension(2, 0, 1, 0, 1, 0.5)
         region(box, block, 0, 1, 0, 1)
         material(built, saint-venant-kirchhoff, 1000, 1e6*0.3/1.3/0.4, 1e6/2.6)
         G = 1e6/2.6
         material(axes, orthotropic, 1000, 1e6, 1e6, 1e6, 0.3, 0.3, 0.3, G, G, G, 30)
-        solid(s, region, box, 2, law, 0.25, 0)
+        solid(s, region, box, 2, law, 0.5, 0)
         group(s, particles, region, box, solid, s)
         fix(v, initial_velocity_particles, s, x*y, -y)
         set_dt(2e-3)

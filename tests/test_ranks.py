@@ -54,6 +54,7 @@ def test_schemes(state_interpreted, tmp_path, scheme, transfer):
 # Of these a sibling shows the same: in the other frame, by a formula, at an edge, in space.
 SHOWN = {f"{part} in the total frame" for part in ("loads", "flow", "heat")}
 SHOWN |= {"rigid by a formula", "rate of plastic strain", "reflected", "bench"}
+SHOWN.add("flow with averaged volumes")
 
 
 @pytest.mark.parametrize("name", few(SCENES, *(name for name in SCENES if name not in SHOWN)))
