@@ -16,12 +16,14 @@ from tempfile import TemporaryDirectory, mkdtemp
 from textwrap import dedent
 from typing import Any
 
+# Threads of OpenBLAS wait in loops, and each process of tests has one processor.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# LLVM's passes take longer than the steps of most tests, and change no bit (test_identical.py).
+os.environ.setdefault("KARAMELO_PY_OPTIMISATION", "0")
+
 import numpy as np
 import pytest
 from hypothesis import settings
-
-# LLVM's passes take longer than the steps of most tests, and change no bit (test_identical.py).
-os.environ.setdefault("KARAMELO_PY_OPTIMISATION", "0")
 
 from comparisons.results import Result
 from karamelo_py.app.cli import main
