@@ -128,15 +128,18 @@ def swapped(
 
 
 def comma_in_number(arguments: Sequence[Argument]) -> str | None:
-    """Suggest 0.5 for 0,5, and 12500 for 12,500, in a line with blanks after other commas."""
-    for one, two in pairwise(arguments):
-        adjacent = one.mark.column + one.mark.length + 1 == two.mark.column
-        digits = one.text.lstrip("+-").isdigit() and two.text[:1].isdigit()
-        if adjacent and digits and ", " in one.mark.text:
-            if re.fullmatch(r"\d{3}", two.text) and int(one.text):
-                return "commas separate arguments: a million is 1e6 or 1000000"
-            return f"with a decimal point: {one.text}.{two.text}"
-    return None
+    """Suggest 0.5 for 0,5, and how to write 12,500, in a line with blanks after other commas."""
+    adjacent = [
+        (one, two) for one, two in pairwise(arguments)
+        if one.mark.column + one.mark.length + 1 == two.mark.column and ", " in one.mark.text
+        and one.text.lstrip("+-").isdigit() and two.text[:1].isdigit()
+    ]  # fmt: skip
+    if any(re.fullmatch(r"\d{3}", two.text) and int(one.text) for one, two in adjacent):
+        return "commas separate arguments: a million is 1e6 or 1000000"
+    if len(adjacent) != 1:  # none, or 0,1, 0,1
+        return None
+    one, two = adjacent[0]
+    return f"with a decimal point: {one.text}.{two.text}"
 
 
 def misfit(

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from karamelo_py import __version__
-from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant, one_of
+from karamelo_py.script.errors import FAILURES, ScriptError, instead, meant, one_of, table
 
 PREFIX = "karamelo_py."
 BUILT_IN = Path(__file__).parents[1] / "styles.toml"
@@ -161,9 +161,11 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
     if of_module := _of_module(family, name):
         return [of_module]
     hint = instead(family, name) or meant(name, styles)
-    others = [other for other in families() if other != "command" and knows(other, name)]
+    same = {name, name.replace("-", "_"), name.replace("_", "-")}
+    others = {f: one for f in families() if f != "command" for one in same if knows(f, one)}
     if hint is None and others:
-        hint = f"'{name}' is a style of {' and of '.join(others)}"
+        hint = f"'{next(iter(others.values()))}' is a style of {' and of '.join(others)}"
+        hint += table()["uses"].get(f"{family} {next(iter(others))}", "")
     if hint is None and (dotted := _CLASS.fullmatch(name)):
         hint = f"there is no {dotted[1]}.py next to the script, nor an installed module {dotted[1]}"
     raise ScriptError(

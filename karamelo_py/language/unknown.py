@@ -41,7 +41,7 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
     commands = registry.names("command")
     kind = "command" if statement else "function"
     other = in_own_words(script, name) or instead("command", name) or as_style(script, name)
-    other = other if statement else None
+    other = other if statement else table()["functions"].get(name)
     if script.knows(name) and not other:
         message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"
@@ -113,6 +113,8 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
 
 def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
     statement, energies = script.statement, table()["energies"]
+    if isinstance(statement, CommandCall) and statement.name == "material":
+        energies = {}  # E is a modulus
     if name.lower() in ("true", "false"):
         alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
         said = f'"{name.lower()}", in quotes' if alone else str(int(name[0] in "tT"))

@@ -287,9 +287,9 @@ class Pair:
     """Numbers of a scene for two values of one variable; NaN where missing."""
 
     label: str
-    error: tuple[float, float]
-    cost: tuple[float, float]
-    bytes: tuple[float, float]
+    error: np.ndarray
+    cost: np.ndarray
+    bytes: np.ndarray
 
     @property
     def cost_ratio(self) -> float:
@@ -319,17 +319,11 @@ def pairs(table: Table, name: str, accuracy: str, cost: str) -> tuple[list[Pair]
             continue
         values_of = dict(zip(others, case, strict=True))
         parts = filter(None, [scene, label({name: values_of[name] for name in differing})])
-        numbers = [
-            tuple(_number(two[word], column) for word in values)
-            for column in (accuracy, cost, "bytes_per_particle")
-        ]
-        compared.append(Pair(", ".join(parts), *numbers))
+        columns = (accuracy, cost, "bytes_per_particle")
+        numbers = [sizes([two[word] for word in values], column) for column in columns]
+        used = (np.where(np.isfinite(n) & (n > 0), n, np.nan) for n in numbers)
+        compared.append(Pair(", ".join(parts), *used))
     return compared, values
-
-
-def _number(row: Mapping[str, str], column: str) -> float:
-    (number,) = sizes([row], column)
-    return number if usable(number) else np.nan
 
 
 def tell_pairs(pairs: Sequence[Pair], values: Sequence[str], accuracy: str, cost: str) -> None:
