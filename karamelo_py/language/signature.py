@@ -148,9 +148,8 @@ def call(
             message = "there is not enough memory for this"
             raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
-        if not error.complete:
-            error.hint = explain.comma_in_number(arguments) or error.hint
         for wrong in () if error.complete else (error, *error.others):
+            wrong.hint = explain.comma_in_number(arguments) or wrong.hint
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
                 wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"
             wrong.mark = wrong.mark or explain.guilty(wrong, arguments, bound)
