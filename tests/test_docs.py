@@ -546,6 +546,10 @@ QUESTIONS = {
     "how many cells": "choose",
     "compare with an experiment": "howto/experiment",
     "pandas": "howto/paraview",
+    "symmetry plane": "howto/boundary",
+    "prescribed displacement": "howto/boundary",
+    "mass scaling": "howto/time-step",
+    "hourglass": "failures",
 }
 
 
