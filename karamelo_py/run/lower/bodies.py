@@ -12,12 +12,11 @@ from karamelo_py.kernels.arrays import PROGRAM, Block
 from karamelo_py.kernels.contact import ListedPairs
 from karamelo_py.kernels.touching import CALL
 from karamelo_py.points.laws import can, constrained_velocity, is_rigid
-from karamelo_py.run.lower.hooks import NO_PROGRAM
-from karamelo_py.run.lower.links import lower_links
+from karamelo_py.run.lower.hooks import Programs
+from karamelo_py.run.lower.links import lower_links, refusal
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.lattice import Lattice
-from karamelo_py.scene.modify import Fix, moved
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.scene.modify import moved
 from karamelo_py.script.formula import evaluate_in_table
 from karamelo_py.styles.fixes.rigid_body import (
     ContactRigidBody,
@@ -86,24 +85,11 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
 
 
 def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
-    programs, code, numbers = motion.records(PROGRAM, motion.FORMULAS), [], [np.empty(0)]
-    programs[:] = NO_PROGRAM
-    lines = values = 0
-    for k, formula in enumerate(fix.formulas_of_body):
-        if formula is None:
-            continue
-        program = formula.program(hub.values) if not formula.is_constant else None
-        constants = np.array([formula.constant]) if program is None else program.constants
-        length = 0 if program is None else len(program.code)
-        programs[k] = lines, lines + length, values, values + len(constants)
-        code += [] if program is None else [program.code]
-        numbers.append(constants)
-        lines, values = lines + length, values + len(constants)
-    return motion.Formulas(
-        address_of(evaluate_in_table, EVALUATE), programs,
-        np.concatenate([np.empty((0, 2), np.int64), *code]), np.concatenate(numbers),
-        np.zeros((STACK + ROWS + 1, BLOCK)),
-    )  # fmt: skip
+    programs, formulas = motion.records(PROGRAM, motion.FORMULAS), Programs(hub)
+    programs[:] = [formulas.add(formula) for formula in fix.formulas_of_body]
+    scratch = np.zeros((STACK + ROWS + 1, BLOCK))
+    evaluate = address_of(evaluate_in_table, EVALUATE)
+    return motion.Formulas(evaluate, programs, *formulas.tables(), scratch)
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
@@ -126,7 +112,7 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
             message = f"points of '{body.id}' are not at the position stored by its fix"
             if np.isnan(away):
                 message = f"points of '{body.id}' are missing"
-            raise _error(fix, message, "the fix that moved it, with the same ID, from the start")
+            raise refusal(fix, message, "the fix that moved it, with the same ID, from the start")
     fixes = [fix for fix in hub.fixes.values() if fix.leads_points]
     for solid in hub.solids.values():
         led = solid in moved(hub) or any(fix.group.touches(solid) for fix in fixes)
@@ -152,23 +138,23 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
         body, apart = fix.body, method.own_grids or method.fields_per_solid
         if body.places is not fix.weighed:
             message = f"points of '{body.id}' were moved or deleted after its mass was computed"
-            raise _error(fix, message, "fix rigid_body after the commands that change the points")
+            raise refusal(fix, message, "fix rigid_body after the commands that change the points")
         other = next((solid for solid in rigid if solid not in bodies and not apart), None)
         if other is not None:
             message = f"'{body.id}' moves freely, and rigid solid '{other.id}' on its grid does not"
-            raise _error(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
+            raise refusal(fix, message, "method(ulmpm/contacts, ...) or method(tlmpm, ...)")
         if any(body in (s, s.glued_to) for s in solids if s.glued_to is not None):
-            raise _error(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
+            raise refusal(fix, f"'{body.id}' is glued to another solid", "no GlueToSolid")
         if body not in driven and not (method.fields_per_solid and len(solids) > len(rigid)):
             hint = "velocity=(...), gravity=(...), force=(...), or fix contact/rigid_body"
-            raise _error(fix, f"no load acts on the body '{body.id}': it stays at rest", hint)
+            raise refusal(fix, f"no load acts on the body '{body.id}': it stays at rest", hint)
     for fix in hub.fixes.values() if moving else ():
         leads = fix.leads_points or fix.style == "initial_velocity_particles"
         led = [s for s in bodies if leads and not fix.group.all and fix.group.touches(s)]
         if led:
             message = f"fix {fix.style} also moves '{led[0].id}', which fix rigid_body moves"
             hint = "velocity=, spin=, motion= or turning= of fix rigid_body, or another group"
-            raise _error(fix, message, hint)
+            raise refusal(fix, message, hint)
 
 
 def _driven(hub: Hub, moving: list[RigidBody]) -> set:
@@ -191,17 +177,11 @@ def _refuse_contact(hub: Hub, fix: ContactRigidBody, bodies: set) -> None:
     if fix.touches not in bodies:
         hint = f"fix(ID, rigid_body, {fix.touches.id}, ...); or fix contact/surface, which moves "
         hint += "by formulas"
-        raise _error(fix, f"solid '{fix.touches.id}' has no fix rigid_body", hint)
+        raise refusal(fix, f"solid '{fix.touches.id}' has no fix rigid_body", hint)
     if hub.update.method.fields_per_solid:
         hint = "fix contact/friction for friction, or method ulmpm"
-        raise _error(fix, "ulmpm/contacts has this contact on its grid already", hint)
+        raise refusal(fix, "ulmpm/contacts has this contact on its grid already", hint)
     other = next((body for body in bodies if not fix.group.all and fix.group.touches(body)), None)
     if other is not None:
         message = f"the group has points of '{other.id}': rigid bodies pass through each other"
-        raise _error(fix, message, "a group of points that deform")
-
-
-def _error(fix: Fix, message: str, hint: str) -> ScriptError:
-    error = ScriptError(message, mark=fix.mark, hint=hint)
-    error.command = f"fix {fix.style}"
-    return error
+        raise refusal(fix, message, "a group of points that deform")

@@ -66,13 +66,12 @@ def _too_large(hub: Hub, least: float) -> ScriptError:
     need = f", which take at least {in_words(least)} of its memory" if least else ""
     has = f"{hub.settings.card.name} has {free} of {whole} free"
     single = "" if hub.settings.precision == "single" else "; precision(single)"
-    error = ScriptError(
+    return ScriptError(
         f"the scene does not fit into the memory of the GPU: {plural(count, 'point')}{need}; {has}",
         mark=largest(hub).mark,
         hint=f"larger cells, or fewer points per cell{single}; {WITHOUT}",
+        command="solid",
     )
-    error.command = "solid"
-    return error
 
 
 def memory_there(simulation: SceneState) -> int:

@@ -39,13 +39,14 @@ def lower_hooks(
         return arrays.NoHooks()
     solids = hub.solids.values() if builder.uses_first else ()
     copies, values = threads if threads > 1 else 0, len(hub.values.array)
+    code, constants = builder.formulas.tables()
     return arrays.Hooks(
         evaluate=address_of(evaluate_in_table, EVALUATE),
         table=np.array(builder.rows, arrays.HOOK).view(np.recarray),
         programs=np.array(builder.programs, arrays.PROGRAM).view(np.recarray),
         members=np.concatenate([np.empty(0, np.int64), *builder.members]),
-        code=np.concatenate([np.empty((0, 2), np.int64), *builder.code]),
-        constants=np.concatenate([np.empty(0), *builder.constants]),
+        code=code,
+        constants=constants,
         x0=np.concatenate([np.empty((0, dimension)), *(s.x0 for s in solids)]),
         chosen=np.zeros(BLOCK, np.int64),
         scratch=np.zeros((STACK + ROWS + 1, BLOCK)),
@@ -80,6 +81,26 @@ def is_wet(hub: Hub) -> bool:
     return any(solid.material.fluid is not None for solid in hub.solids.values())
 
 
+class Programs:
+    """Code and constants of formulas, one after another."""
+
+    def __init__(self, hub: Hub):
+        self.hub = hub
+        self.code: list[np.ndarray] = [np.empty((0, 2), np.int64)]
+        self.constants: list[np.ndarray] = [np.empty(0)]
+
+    def add(self, formula: Expression | None) -> tuple:
+        if formula is None:
+            return NO_PROGRAM
+        if formula.is_constant:
+            return 0, 0, *_put(self.constants, np.array([formula.constant]))
+        program = formula.program(self.hub.values)
+        return *_put(self.code, program.code), *_put(self.constants, program.constants)
+
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.concatenate(self.code), np.concatenate(self.constants)
+
+
 class _Builder:
     def __init__(self, hub: Hub, points: int):
         self.hub = hub
@@ -88,8 +109,7 @@ class _Builder:
         self.rows: list[tuple] = []
         self.programs: list[list[tuple]] = []
         self.members: list[np.ndarray] = []
-        self.code: list[np.ndarray] = []
-        self.constants: list[np.ndarray] = []
+        self.formulas = Programs(hub)
         self.holding: list[Fix] = []
         self.loaded_nodes = 0  # 0 if hooks add no forces to nodes
         method = hub.update.method
@@ -123,9 +143,9 @@ class _Builder:
         self.rows.append((address, stage, begin, end, slot, *uses))
         whole = hook.tag is not None  # its functions are for all directions
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
-        programs = list(map(self._program, formulas_of_hook))
+        programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
-        self.programs.append([*programs, self._program(fix.wall_friction)])
+        self.programs.append([*programs, self.formulas.add(fix.wall_friction)])
         if fix.accelerates and self.wet:
             self.rows.append((address, arrays.POST_WATER_TO_GRID, begin, end, -1, *uses))
             self.programs.append(self.programs[-1])
@@ -154,14 +174,6 @@ class _Builder:
             return _put(self.members, unique(fix.nodes))
         members = fix.group.bits(self.points).view("<i8").astype(np.int64, copy=False)
         return _put(self.members, members)
-
-    def _program(self, formula: Expression | None) -> tuple:
-        if formula is None:
-            return NO_PROGRAM
-        if formula.is_constant:
-            return 0, 0, *_put(self.constants, np.array([formula.constant]))
-        program = formula.program(self.hub.values)
-        return *_put(self.code, program.code), *_put(self.constants, program.constants)
 
 
 def _put(pieces: list[np.ndarray], piece: np.ndarray) -> tuple[int, int]:

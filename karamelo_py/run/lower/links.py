@@ -80,9 +80,9 @@ def _refuse(fix: ContactBodies | Joint, moving: Sequence[RigidBody]) -> None:
     for solid in fix.linked:
         if solid is not None and solid not in bodies:
             hint = f"fix(ID, rigid_body, {solid.id}, ...); motion=(0, 0) holds it"
-            raise _error(fix, f"solid '{solid.id}' has no fix rigid_body", hint)
+            raise refusal(fix, f"solid '{solid.id}' has no fix rigid_body", hint)
     if not any(bodies[solid].dofs.any() for solid in fix.linked if solid is not None):
-        raise _error(fix, "none of its bodies moves freely", "a body without motion= and fixed=")
+        raise refusal(fix, "none of its bodies moves freely", "a body without motion= and fixed=")
 
 
 def _refuse_overlap(
@@ -98,7 +98,7 @@ def _refuse_overlap(
     depth = fix.parts[b].region.depth(x[:, :d], reach) + touch.first.balls[:, 3]
     if depth.max() > OVERLAP * hub.domain.h:
         names = f"'{fix.parts[a].ID}' and '{fix.parts[b].ID}'"
-        raise _error(
+        raise refusal(
             fix, f"{names} overlap by {depth.max():.3g} at the start", "a gap between them"
         )
 
@@ -132,10 +132,8 @@ def _joints(
     return records
 
 
-def _error(fix: Fix, message: str, hint: str) -> ScriptError:
-    error = ScriptError(message, mark=fix.mark, hint=hint)
-    error.command = f"fix {fix.style}"
-    return error
+def refusal(fix: Fix, message: str, hint: str) -> ScriptError:
+    return ScriptError(message, mark=fix.mark, hint=hint, command=f"fix {fix.style}")
 
 
 def _is_ball(shape: Tag) -> bool:

@@ -126,9 +126,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         return
     hint = _ways(hub, need, memory.whole, copied)
     said = f"{message}{in_words(memory.whole)} in all"
-    error = ScriptError(said, mark=mark, hint=hint, code="memory")
-    error.command = "solid"
-    raise error
+    raise ScriptError(said, mark=mark, hint=hint, code="memory", command="solid")
 
 
 def _ways(hub: Hub, need: float, free: float, copied: bool) -> str:
@@ -172,12 +170,11 @@ def no_room(hub: Hub, error: MemoryError) -> ScriptError:
     nodes = sum(lattice.node_count for lattice in hub.lattices)
     count = sum(solid.count for solid in hub.solids.values())
     of_grid = nodes > count
-    refusal = ScriptError(
+    return ScriptError(
         f"the arrays of {plural(nodes, 'node')} and {plural(count, 'point')} do not fit into "
         f"memory: {str(error) or 'the system gives no more'}",
         mark=hub.domain.mark if of_grid else largest(hub).mark,
         hint="larger cells, or a smaller domain" if of_grid else "larger cells, or fewer points",
         code="memory",
+        command="dimension" if of_grid else "solid",
     )
-    refusal.command = "dimension" if of_grid else "solid"
-    return refusal

@@ -235,16 +235,15 @@ class ULMPMContacts(Method):
             if other is not fix:
                 first, second = (solid.id for solid in fix.solids)
                 line = f" (line {other.mark.line})" if other.mark else ""
-                error = ScriptError(
+                raise ScriptError(
                     f"the friction of solids '{first}' and '{second}' is already set by fix "
                     f"'{other.id}'{line}",
                     mark=fix.mark,
                     expected="one fix contact/friction for each pair of solids (solids "
                     "glued together count as one)",
                     hint=f"fix({other.id}, contact/friction, {first}, {second}, ...) replaces it",
+                    command=f"fix {fix.style}",
                 )
-                error.command = f"fix {fix.style}"
-                raise error
 
     @staticmethod
     def _rubbing(hub: Hub) -> Iterator[tuple[tuple[int, int], Fix]]:
