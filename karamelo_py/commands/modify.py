@@ -10,7 +10,7 @@ from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import initial_state, law_kind, specific_volume
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material, MaterialPart
-from karamelo_py.script.errors import ScriptError, unknown
+from karamelo_py.script.errors import ScriptError, blaming, unknown
 
 
 def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
@@ -49,11 +49,8 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     if kind not in (kinds := ("material", "viscosity", *hub.parts)):
         raise unknown(f"unknown kind '{kind}'", kind, kinds, argument="kind")
     catalogue = hub.parts.get(kind, hub.materials)
-    try:
+    with blaming(argument="ID"):
         entry = catalogue[ID]
-    except ScriptError as error:
-        error.argument = "ID"
-        raise
     if not numbers:
         raise ScriptError("no number changes", argument="ID", expected="name=value, ...")
     if isinstance(entry, Material):

@@ -6,7 +6,7 @@ from karamelo_py.points.laws.across import Across, with_stretch
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, PointsView
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, blaming
 from karamelo_py.script.expressions import Expression
 
 impose_stretch = imposing(with_stretch)
@@ -88,11 +88,8 @@ def plane_strain(hub: Hub, *, ezz: Expression) -> None:
         expected = "plane_strain before the first material"
         raise ScriptError(message, expected=expected, code="too-late")
     across = StretchAcross(hub, ezz)
-    try:
+    with blaming(argument="ezz"):
         start = across.strain_at(hub.update.time)
-    except ScriptError as error:
-        error.argument = "ezz"
-        raise
     if start != 0:
         message = f"ezz is {start:g} at the start, where bodies have no strain"
         raise ScriptError(message, argument="ezz", expected="a formula that is 0 at time 0")

@@ -8,7 +8,7 @@ from copy import copy
 from typing import Any
 
 from karamelo_py.language.scene import Scene
-from karamelo_py.script.errors import Mark, ScriptError, meant, one_of
+from karamelo_py.script.errors import Mark, ScriptError, blaming, meant, one_of
 from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.parser import NUMBER, parse_expression
 from karamelo_py.script.syntax import Raw
@@ -191,8 +191,5 @@ def look_up(catalogue: Any, argument: Argument):
         article = "an" if catalogue.kind[0] in "aeiou" else "a"
         message = f"'{argument.text}' is not the ID of {article} {catalogue.kind}"
         raise ScriptError(message, mark=argument.mark)
-    try:
+    with blaming(argument.mark):
         return catalogue[word]
-    except ScriptError as error:
-        error.mark = error.mark or argument.mark
-        raise

@@ -12,7 +12,7 @@ from karamelo_py.language.further_mistakes import errors_of_text, further_errors
 from karamelo_py.language.presets import Presets
 from karamelo_py.language.replay import Record, Replay
 from karamelo_py.script import evaluation, syntax
-from karamelo_py.script.errors import Mark, Pause, Quit, ScriptError
+from karamelo_py.script.errors import Mark, Pause, Quit, ScriptError, blaming
 from karamelo_py.script.expressions import FIRST, SEEDS, Expression, Value
 from karamelo_py.script.functions import CONSTANTS, FUNCTIONS, WORDS
 from karamelo_py.script.parser import parse, parse_expression
@@ -77,11 +77,8 @@ class Interpreter:
             message = f"{name} includes itself"
             expected = "a script that is not in progress already"
             raise ScriptError(message, expected=expected, argument="file")
-        try:
+        with blaming(argument="file"):
             text = read_script(path)
-        except ScriptError as error:
-            error.argument = "file"
-            raise
         self.files.append(path)
         try:
             statements = parse(text, str(path))
@@ -342,11 +339,8 @@ class Interpreter:
             signature.Argument(syntax.Raw(raw.source, raw.start + o.start, raw.start + o.end), self)
             for o in node.operands
         ]
-        try:
+        with blaming(mark):
             value = signature.call(target, self.hub, arguments, name)
-        except ScriptError as error:
-            error.mark = error.mark or mark
-            raise
         if isinstance(value, (int, float)):
             return float(value)
         if not isinstance(value, (str, Expression)):

@@ -41,7 +41,7 @@ from karamelo_py.language.kinds import (
 )
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import check_name, renamed
-from karamelo_py.script.errors import FAILURES, ScriptError, meant, table
+from karamelo_py.script.errors import FAILURES, ScriptError, blaming, meant, table
 
 __all__ = [
     "Argument", "AtLeast", "ByName", "Constraint", "In", "InputFile", "Keyword", "NonNegative",
@@ -268,11 +268,8 @@ def _bind(
         elif word in by_name:
             bound[word] = [value]
         elif formula:
-            try:
+            with blaming(argument.mark):
                 check_name(word)
-            except ScriptError as error:
-                error.mark = argument.mark
-                raise
             numbers[word] = value
         else:
             raise explain.unknown_keyword(word, argument, expected, name, syntax(target, name))

@@ -37,7 +37,7 @@ from karamelo_py.output.point_table import (
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws import can, elastic_law, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import Mark, NoItem, ScriptError, nearest
+from karamelo_py.script.errors import Mark, NoItem, ScriptError, blaming, nearest
 
 
 class Shown:
@@ -519,11 +519,8 @@ def set_columns(
             )
         if not np.isfinite(array).all():
             raise ScriptError(f"'{name}' has numbers that are not finite", mark=mark)
-        try:
+        with blaming(mark):
             view.set_column(name, np.broadcast_to(array, ids.shape)[present[ids]])
-        except ScriptError as error:
-            error.mark = error.mark or mark
-            raise
     if view.moved:
         simulation.tiles.unsort(simulation.control)
     simulation.changed()

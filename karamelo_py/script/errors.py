@@ -4,7 +4,8 @@ import difflib
 import re
 import tomllib
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -97,6 +98,17 @@ class ScriptError(Exception):
         for mark in self.included:
             text += f"\n{mark.file}:{mark.line}: the script above is included here"
         return "\n\n".join([text, *(error.render() for error in self.others)])
+
+
+@contextmanager
+def blaming(mark: Mark | None = None, argument: str | None = None) -> Iterator[None]:
+    """Give errors a mark, if they have none, and an argument."""
+    try:
+        yield
+    except ScriptError as error:
+        error.mark = error.mark or mark
+        error.argument = argument or error.argument
+        raise
 
 
 def render_message(

@@ -21,7 +21,7 @@ from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix, moved
 from karamelo_py.scene.views import NodesView, PointsView
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, blaming
 from karamelo_py.script.expressions import FIRST, POINT_SEEDS, Expression
 from karamelo_py.script.formula import evaluate_in_table
 
@@ -229,13 +229,10 @@ def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | N
     If their collective calls differed, processes would deadlock; if published values differ, they
     are partial sums.
     """
-    try:
+    with blaming(fix.mark):
         hook(view)
         if fix.point_by_point:
             _agree(simulation, fix)
-    except ScriptError as error:
-        error.mark = error.mark or fix.mark
-        raise
 
 
 def _agree(simulation: SceneState, fix: Fix) -> None:

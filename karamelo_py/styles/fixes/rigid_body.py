@@ -219,14 +219,14 @@ class RigidBody(Fix):
     def defined(self) -> None:
         before = self.previous
         if before and before.mark and before.id != self.id and before.id in self.hub.fixes:
-            error = ScriptError(
+            raise ScriptError(
                 f"fix '{before.id}' in line {before.mark.line} moves '{self.body.id}' already",
                 argument="solid",
                 expected="one fix rigid_body for each solid",
                 hint=f"fix({before.id}, rigid_body, {self.body.id}, ...) replaces it",
+                mark=self.mark,
+                command="fix rigid_body",
             )
-            error.mark, error.command = self.mark, "fix rigid_body"
-            raise error
         if before is None and self.hub.update.step > 0:
             raise ScriptError(
                 f"solid '{self.body.id}' may have moved in earlier runs",
@@ -495,14 +495,14 @@ class ContactRigidBody(Fix):
         for other in others:
             same = (other.touches, other.region) == (self.touches, self.region)
             if same and len(np.intersect1d(other.group.members, self.group.members)):
-                error = ScriptError(
+                raise ScriptError(
                     f"fix '{other.id}' (line {other.mark.line}) is the contact of points of this "
                     f"group with '{self.touches.id}' already",
                     argument="group",
                     expected="groups without points in common, or one fix",
+                    mark=self.mark,
+                    command="fix contact/rigid_body",
                 )
-                error.mark, error.command = self.mark, "fix contact/rigid_body"
-                raise error
 
     def behind(self, points: PointTable) -> tuple[int, float]:
         """Return the number of points in the body before the first step, and the largest depth."""

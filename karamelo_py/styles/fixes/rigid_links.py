@@ -129,13 +129,13 @@ class ContactBodies(Fix):
             if pair in pairs:
                 a, b = sorted(pair)
                 other = pairs[pair]
-                error = ScriptError(
+                raise ScriptError(
                     f"fix '{other.id}' (line {other.mark.line}) is the contact of '{a}' with "
                     f"'{b}' already",
                     expected="each pair in only one fix",
+                    mark=self.mark,
+                    command="fix contact/bodies",
                 )
-                error.mark, error.command = self.mark, "fix contact/bodies"
-                raise error
 
     def pairs(self) -> set[frozenset[str]]:
         return {frozenset((a.ID, b.ID)) for a, b in combinations(self.parts, 2)}
