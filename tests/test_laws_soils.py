@@ -161,7 +161,7 @@ def test_triaxial_extension(radial):
         assert -axial == pytest.approx(strength, rel=1e-9)
 
 
-@pytest.mark.parametrize("psi", [0.0, 12.0, PHI])
+@pytest.mark.parametrize("psi", few((0.0, 12.0, PHI), 0.0, PHI))
 def test_plane_strain_cone(psi):
     """Flow in plane strain ends where Mohr-Coulomb ends, for any psi.
 

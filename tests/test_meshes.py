@@ -364,7 +364,7 @@ def test_inside_of_meshes(cell, tmp_path):
     hub = SmallHub(dimension, -3, 3, 0.25)
     region = MeshRegion(hub, path)
     rng = np.random.default_rng(1)
-    natural = rng.random((5000, dimension)) * 1.4 - 0.2
+    natural = rng.random((1500, dimension)) * 1.4 - 0.2
     natural[:100] = rng.integers(0, 2, (100, dimension))  # corners
     natural[100:300, 0] = 1  # on a face, and beyond its ends
     want = ((natural >= 0) & (natural <= 1)).all(axis=1)

@@ -5,6 +5,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 from going_on import goes_on, with_files
+from selection import parameters
 
 pytestmark = pytest.mark.xdist_group("rigid links")
 SCENE = """
@@ -98,8 +99,7 @@ def test_a_stack_rests(run_interpreted, heavy):
     assert log.a_fy[-1] == pytest.approx(10, abs=1e-3 * heavy)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-@pytest.mark.parametrize("mu", [0.5, 0.06])
+@pytest.mark.parametrize(("mu", "d"), parameters([(0.06, 2), (0.5, 3)], [(0.5, 2), (0.06, 3)]))
 def test_a_ball_on_a_slope(run_interpreted, mu, d):
     """2/3 or 5/7 of g sin(alpha) as it rolls; g (sin - mu cos), and the spin of friction."""
     k = {2: 0.5, 3: 0.4}[d]  # inertia / (m R^2)

@@ -1,8 +1,10 @@
 """Walls of dry sand behind smooth plates (Rankine 1857), with and without averaged volumes."""
 
+from itertools import product
 from math import radians, sin
 
 import pytest
+from selection import parameters
 
 # Sand of the weight 1 and the height 1, friction 30 degrees, begins with K0 = 1/2. A smooth plate
 # moves away or into it, until all of it yields.
@@ -60,18 +62,17 @@ def wall(scheme="musl", more="", run=RUN, base="NULL, 0", **numbers):
 
 @pytest.mark.xdist_group("walls of sand")
 @pytest.mark.parametrize(
-    "numbers",
-    [
-        {},
-        {"basis": "quadratic-spline"},
-        pytest.param({"kind": "tlmpm"}, marks=pytest.mark.full),
-        pytest.param({"scheme": "usavg"}, marks=pytest.mark.full),
-        pytest.param({"psi": 10}, marks=pytest.mark.full),
-        pytest.param(CONE, marks=pytest.mark.full),
-    ],
+    ("numbers", "away"),
+    parameters(
+        [({}, 1), ({"basis": "quadratic-spline"}, 0)],
+        [
+            ({}, 0),
+            ({"basis": "quadratic-spline"}, 1),
+            *product(({"kind": "tlmpm"}, {"scheme": "usavg"}, {"psi": 10}, CONE), (1, 0)),
+        ],
+    ),
     ids=str,
 )
-@pytest.mark.parametrize("away", [1, 0])
 def test_averaged_volumes_keep_the_strength_of_sand(run_script, numbers, away):
     """Active and passive pressure of Rankine, 1/3 and 3, within 3 and 6 %.
 
