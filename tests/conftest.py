@@ -28,6 +28,7 @@ from hypothesis import settings
 from comparisons.results import Result
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import case
+from karamelo_py.styles.dumps.pyplot import PyPlot
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -119,14 +120,20 @@ def _checked(result: Result, status: int | None) -> Result:
 
 @pytest.fixture
 def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
-    """``run_script(text or path, *options, status=0, folder="run")``: compiled, in this process."""
+    """``run_script(text or path, *options, status=0, folder="run")``: compiled, in this process.
+
+    Of a path, dump pyplot writes nothing; test_dumps.py draws.
+    """
 
     def run(script: str | Path, *options: str, status: int = 0, folder: str = "run") -> Result:
         place = tmp_path / folder
         place.mkdir(exist_ok=True)
         monkeypatch.chdir(place)
         capsys.readouterr()
-        result = main([str(_prepared(place, script)), *options])
+        with monkeypatch.context() as patch:
+            if isinstance(script, Path):  # a picture takes as long as its scene at a small size
+                patch.setattr(PyPlot, "write", lambda dump: None)
+            result = main([str(_prepared(place, script)), *options])
         captured = capsys.readouterr()
         return _checked(Result(result, captured.out, captured.err, place), status)
 

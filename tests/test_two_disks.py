@@ -75,7 +75,8 @@ def test_scripts_as_others_write_them(run_script, karamelo, name, kinetic):
     rebound comes about 15 ms later; kinetic energy changes by up to 6.8 per second then (Karamelo's
     history), so 15 ms are worth up to 3.9 % of the 2.6 at the start.
     """
-    result = run_script(INPUTS / f"in.two_disks_{name}", "-var", "N_log", "250")
+    script = (INPUTS / f"in.two_disks_{name}").read_text("utf-8")
+    result = run_script(script, "-var", "N_log", "250")
     log = result.log
     steps = karamelo["step"]
     chosen = steps % 250 == 0
