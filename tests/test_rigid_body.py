@@ -294,7 +294,7 @@ def test_a_wheel_on_a_slope(run_script, mu, far):
 
 
 @pytest.mark.parametrize(
-    ("refine", "draught", "end"), [(0.5, 0.2, 2), pytest.param(1, 0.05, 8, marks=pytest.mark.full)]
+    ("refine", "draught", "end"), [(0.5, 0.05, 2), pytest.param(1, 0.01, 8, marks=pytest.mark.full)]
 )
 def test_a_box_floats(run_script, refine, draught, end):
     """in.floating: Archimedes. The level is 1.2 + (draught - 0.4) 1.2/4 with what is displaced."""

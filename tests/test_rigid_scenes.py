@@ -78,7 +78,7 @@ def test_a_t_bar_in_clay(run_script, refine, mu):
 
 @pytest.mark.parametrize(
     ("refine", "within"),
-    [(0.75, 0.12), *(pytest.param(*one, marks=FULL) for one in ((1, 0.1), (2, 0.05)))],
+    [(0.75, 0.06), *(pytest.param(*one, marks=FULL) for one in ((1, 0.06), (2, 0.02)))],
 )
 def test_a_sphere_sinks_in_a_viscous_liquid(run_script, refine, within):
     """Stokes 1851 with walls (Haberman & Sayre 1958)."""

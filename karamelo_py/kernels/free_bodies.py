@@ -9,7 +9,7 @@ from karamelo_py.compiler.fields import load_vector
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
-from karamelo_py.kernels.contact import Bodies, SeparateFields, list_pairs
+from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
 from karamelo_py.kernels.surfaces import Surface, depth, distance, encloses, nearest, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import WORK, add_to
@@ -233,7 +233,8 @@ def _list_nodes(body, s):
         last = abs(contact.touched[n, b] if a < b else contact.touched[m, a])
         memory = max(contact.memory[a], contact.memory[b])
         lasts = last > 0 and last >= step - memory
-        one.gap = 0.0 if lasts else max(body.pairs.gaps[q], 0.0)
+        closing = closing_part(contact, a, b) if lasts else 1.0
+        one.gap = closing * max(body.pairs.gaps[q], 0.0)
         one.mass, one.mu, one.share = nodes.sums[m, arrays.MASS], contact.friction[a, b], 1.0
         one.most = 0.0
         body.count[0] += 1
