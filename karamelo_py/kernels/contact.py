@@ -14,10 +14,10 @@ grid axes, as normals tilt where faces end. Any positive gap means that convex b
 
 In liquids and granular materials some points lie closer to a wall than their mean suggests, so each
 apparent gap would let them sink in. Such bodies may leave a wall, but not approach it for 100 steps
-after a contact; liquids close 1 % of a gap per step. (If they closed all of it, water at rest would
-sink half a cell into an inclined wall one cell thick. If none, it would stay away from a floating
-box, whose draught is then 8 % too small. For elastic bodies the rule would lower the force: by 4 %
-for a Hertzian disk.) A wall may be one cell thick; only its faces towards the other body count.
+after a contact; liquids close 1 % of a gap per step. (Faster, water would sink half a cell into an
+inclined thin wall; slower, it would stay away from a floating box, with 8 % less draught. The force
+on a Hertzian disk would be 4 % too small.) Only faces towards the other body count, so walls may be
+one cell thick.
 """
 
 from math import sqrt
@@ -411,8 +411,7 @@ def _last_contact(bodies, pair):
 @noinline
 def closing_part(contact, a, b):
     """Return the part of a gap that may close in a step while a contact is remembered."""
-    fluid = contact.fluid[a] or contact.fluid[b]
-    return 1.0 / max(contact.memory[a], contact.memory[b]) if fluid else 0.0
+    return max(contact.fluid[a] / contact.memory[a], contact.fluid[b] / contact.memory[b])
 
 
 @noinline

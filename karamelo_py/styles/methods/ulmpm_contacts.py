@@ -86,10 +86,9 @@ class ULMPMContacts(Method):
     thinner one appears higher by up to a quarter of a cell.
 
     Walls one cell thick contain liquids and granular materials, even if they have corners, are
-    inclined or move: in 1e5 steps, points of sand penetrated fixed walls by at most 10 % of a
-    cell, water by 28 %, gel by 15 %, and moving walls by 29 %. For 100 steps after contact at a node, points
-    of sand there can move away from the wall but not towards it, and liquids close 1 % of a gap per
-    step.
+    inclined or move: points of sand penetrated fixed walls by at most 10 % of a cell in 1e5 steps,
+    gel by 15 %, and water by 28 % in 2e4 steps (moving walls 29 %). For 100 steps after contact at
+    a node, sand there does not approach the wall, and liquids close 1 % of a gap per step.
 
     The two solids at a node have a common normal, so momentum is conserved. It is computed from the
     sums of m grad N of both solids, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4
