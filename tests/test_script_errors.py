@@ -238,6 +238,7 @@ COMMANDS = [
     ("solid(s2, region, n, 1, m, 0.1)", 19, "'n' is a group"),
     ("fix(v, velocity_nodes, b, 1, 0)", 24, "hint: group(b, nodes, region, b, all) makes"),
     ("method(FLIP, linear, 0.99)", 22, "hint: FLIP is a transfer; a method comes first: "),
+    ("method(mlsmpm, quadratic)", 8, "did you mean 'ulmpm' or 'tlmpm'?"),
     ("method(mpm, FLIP, linear, 1)", 8, "hint: ulmpm, or tlmpm"),
     ("material(m2, linear, 1000; 1000, 0.3)", 22, "hint: is a comma missing in '1000; 1000'?"),
     ("material(m2, linear, 1000, 1,000,000, 0.3)", 34, "hint: commas separate arguments: a mill"),

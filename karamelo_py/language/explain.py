@@ -19,6 +19,10 @@ def wrong_count(
     arguments: Sequence[Argument],
     keywords: Sequence[str],
 ) -> ScriptError:
+    first = arguments[0].word() if arguments else None
+    known = any(registry.knows(family, first or "") for family in registry.families())
+    if first and expected and expected[0].kind.family and not known:
+        registry.find(expected[0].kind.family, first)  # an error with similar names
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()

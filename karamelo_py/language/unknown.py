@@ -47,8 +47,7 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
         expected = "an operator between the name and the parenthesis"
         hint, code = f"{name}*(...)", "unknown-command"
         return ScriptError(message, mark=mark, expected=expected, hint=hint, code=code)
-    shown = commands if statement else sorted(FUNCTIONS)
-    callables = commands if statement else [*FUNCTIONS, "value"]
+    shown = commands if statement else sorted([*FUNCTIONS, "value"])
     return ScriptError(
         f"unknown {kind} '{name}'",
         code="unknown-command",
@@ -56,7 +55,7 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
         kind=kind,
         mark=mark,
         expected=one_of(name, shown, "command") if statement else f"one of {', '.join(shown)}",
-        hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, callables),
+        hint=NO_BLOCKS if name in table()["blocks"] else other or meant(name, shown),
     )
 
 

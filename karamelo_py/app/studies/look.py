@@ -39,10 +39,6 @@ FAMILIES = (
 )
 
 
-def has_number(word: str) -> bool:
-    return any(word in family for family in FAMILIES)
-
-
 def number(word: str, others: Sequence[str] = ()) -> int:
     """Style number of a word: fixed for methods, else by order."""
     for family in FAMILIES:

@@ -199,10 +199,9 @@ def heat(family: Family, x: str, y: str, sheet: Sheet) -> None:
 
 
 def _sorted(rows: Sequence[Mapping[str, str]], name: str) -> list[str]:
-    values = list(dict.fromkeys(row[name] for row in rows))
-    return (
-        sorted(values, key=number_of) if all(number_of(v) is not None for v in values) else values
-    )
+    values = dict.fromkeys(row[name] for row in rows)
+    numbers = all(number_of(v) is not None for v in values)
+    return sorted(values, key=number_of) if numbers else [*values]
 
 
 class History(NamedTuple):
@@ -261,7 +260,8 @@ def draw_histories(
     if exact is not None:
         axes.plot(exact.x, exact.y, color="0.6", linewidth=4, zorder=1)
         ends.append((exact.x[-1], exact.y[-1], exact.label, "0.4"))
-    fixed = [look.number(each.label) for each in curves if look.has_number(each.label)]
+    words = {word for family in look.FAMILIES for word in family}
+    fixed = [look.number(each.label) for each in curves if each.label in words]
     places = fixed if len(fixed) == len(curves) else range(1 + (len(curves) > 1), len(curves) + 2)
     for k, each in enumerate(curves):
         colour = look.PALETTE[places[k] % len(look.PALETTE)]
