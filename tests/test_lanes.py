@@ -502,12 +502,13 @@ def _give_affine(array, at, weights, field, p):
     value, by_row, by_node = (
         tuple([of_present(p, field[3 * k + c, p]) for c in range(3)]) for k in range(3)
     )
-    accumulate_affine(array, nodes, 1, given, (value, (by_row, by_node)))
-    accumulate_affine(array, nodes, 4, given, (value[:2], ()))
+    parts = (array, 1, value, (by_row, by_node)), (array, 4, value[:2], ())
+    accumulate_affine(parts, nodes, given)
     # More than the widest register takes: eleven, and nine that do not grow.
     wide, along, across = (3 * part + part[:2] for part in (value, by_row, by_node))
-    accumulate_affine(array, nodes, 8, given, (wide, (along, across)))
-    accumulate_affine(array, nodes, 20, given, (3 * value, ()))
+    parts = (array, 8, wide, (along, across)), (array, 20, 3 * value, ())
+    accumulate_affine(parts, nodes, given)
+    accumulate_affine(((array, 32, wide, (along, across)),), nodes, ())
 
 
 @kernel
@@ -534,17 +535,17 @@ def test_affine_fields_at_the_nodes(real_type, give):
     at = rng.integers(0, 20, n)
     at[:width] = at[0]
     weights, field = rng.uniform(size=(9, n)), rng.normal(size=(9, n))
-    array, expected = np.zeros((40, 32), real_type), np.zeros((40, 32))
+    array, expected = np.zeros((40, 44), real_type), np.zeros((40, 44))
     give(tag, width, at, weights.astype(real_type), field.astype(real_type), array, n)
     for p in range(n):
         first = at[p] if give is _give_affine_in_lanes else at[0]
         nodes = [first + k // 3 * 7 + k % 3 for k in range(9)]
         value, *slopes = field[:3, p], field[3:6, p], field[6:, p]
-        accumulate_affine(expected, nodes, 1, weights[:, p], (value, slopes))
-        accumulate_affine(expected, nodes, 4, weights[:, p], (value[:2], ()))
         wide, *growths = (np.append(np.tile(part, 3), part[:2]) for part in (value, *slopes))
-        accumulate_affine(expected, nodes, 8, weights[:, p], (wide, growths))
-        accumulate_affine(expected, nodes, 20, weights[:, p], (np.tile(value, 3), ()))
+        constant = (expected, 4, value[:2], ()), (expected, 20, np.tile(value, 3), ())
+        parts = (expected, 1, value, slopes), (expected, 8, wide, growths), *constant
+        accumulate_affine(parts, nodes, weights[:, p])
+        accumulate_affine(((expected, 32, wide, growths),), nodes, ())
     np.testing.assert_allclose(array, expected, rtol=0, atol=200 * np.finfo(real_type).eps)
 
 

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from karamelo_py.language.signature import Positive
 from karamelo_py.points.laws import is_rigid, specific_volume
+from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman
 from karamelo_py.run.lower.pore_water import PoreWater
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
@@ -136,4 +137,5 @@ def pore_water(
             f"density {dry:g} over 1 - n",
             hint="a material takes the dry density, (1 - n) times the density of its grains",
         )
-    material.fluid = PoreWater(n, drag, K, rho, float(kozeny), K if suction is None else suction)
+    k = KozenyCarman() if kozeny else ConstantPermeability()
+    material.fluid = PoreWater(n, drag, K, rho, k, K if suction is None else suction)

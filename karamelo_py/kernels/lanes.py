@@ -7,6 +7,7 @@ import numpy as np
 from karamelo_py.compiler import classes_in, implements, index
 from karamelo_py.compiler.lanes import EightLanes, group, lanes_for, spread
 from karamelo_py.kernels.arrays import Index, Number, Tag
+from karamelo_py.kernels.equations.pore_water import Seep
 from karamelo_py.kernels.equations.strain import Strain
 
 
@@ -40,7 +41,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
     Separate loops are faster for passes in lanes that only strain, as a law may fill the
     instruction cache. If points move, the update is short, and computing stencils twice costs more.
     """
-    strains = [isinstance(task, Strain) for task in visit.tasks]
+    strains = [isinstance(task, Strain | Seep) for task in visit.tasks]
     return not isinstance(lanes, OneByOne) and any(strains) and all(strains)
 
 

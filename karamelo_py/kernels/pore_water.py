@@ -43,7 +43,7 @@ def make_flux(s):
 
 COMPANIES = (
     (MassMomentum, Company(then=(pores.WaterMomentum(),))),
-    (InternalForce, Company(then=(pores.PoreVolumes(), pores.WaterForce()))),
+    (InternalForce, Company(then=(pores.Drag(), pores.PoreVolumes(), pores.WaterForce()))),
     (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
     (NodalUpdate, Company(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))),

@@ -7,6 +7,7 @@ from llvmlite import ir
 from numba import types
 
 from karamelo_py.compiler import fma, implements, intrinsic, llvm, shared, tag_class
+from karamelo_py.compiler.fields import LINE
 from karamelo_py.compiler.lanes import REGISTER_BYTES, Beside, ask, at_lane, lanes_of
 from karamelo_py.compiler.llvm import I32, I64, Lanes, lane, pack, shuffle, splat
 from karamelo_py.points.basis.weighted import Weighted
@@ -47,19 +48,21 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
             array[i, first + k] += value
 
 
-def accumulate_affine(array, nodes, first, weights, field):
-    """Add an affine field times the weights to nodes, from component `first` on.
+def accumulate_affine(parts, nodes, weights):
+    """Add affine fields times the weights to nodes; () for weights of 1.
 
-    `field` is the value at the first node, and increments ``slopes[d]`` from node to node along
-    axis `d`, or () if it is constant. Nodes form a square or cube, with the last axis fastest.
+    A part is an array, its first component, the value at the first node, and increments
+    ``slopes[d]`` from node to node along axis `d`, or () if it is constant. Nodes form a square or
+    cube, with the last axis fastest.
     """
-    value, slopes = field
-    width = _width(nodes, slopes)
-    for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
-        for c, number in enumerate(value):
-            for d, slope in enumerate(reversed(slopes)):
-                number = number + (k // width**d % width) * slope[c]
-            array[node, first + c] += weight * number
+    weights = weights if len(weights) else (1,) * len(nodes)
+    for array, first, value, slopes in parts:
+        width = _width(nodes, slopes)
+        for k, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
+            for c, number in enumerate(value):
+                for d, slope in enumerate(reversed(slopes)):
+                    number = number + (k // width**d % width) * slope[c]
+                array[node, first + c] += weight * number
 
 
 def move_record(target, source, first, template, keep):
@@ -215,8 +218,7 @@ def _scatter(array, nodes, first, values):
             column = builder.add(first, I64(begin))
             rows = _records_of(builder, some, lanes, count)
             if not lanes_of(nodes):
-                while len(rows) > 1:
-                    rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
+                rows = [_added(builder, rows)]
             for k, number in enumerate(rows):
                 pointer = at_lane(builder, array, table, nodes, at, k, column)
                 here = _record(builder, array, pointer, count)
@@ -240,16 +242,18 @@ def _move(*kinds):
         here, i, source_table, j, first, _, keep = values
         size = _size(array)
 
-        def address(kind, table, node):
-            pointer = llvm.item_pointer(builder, kind, table, [node, first])
-            return _record(builder, kind, pointer, len(template))
-
-        to, of = address(array, here, i), address(other, source_table, j)
-        before = builder.load(to, align=size)
-        zero = ir.Constant(before.type, None)
-        kept = builder.select(keep, before, zero)
-        builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
-        builder.store(zero, of, align=size)
+        count = len(template)
+        widest = LINE // (2 * size)  # parts of a record cross no cache line
+        for begin in range(0, count, widest):
+            column, some = builder.add(first, I64(begin)), min(widest, count - begin)
+            tables = (array, here, i), (other, source_table, j)
+            items = [llvm.item_pointer(builder, k, table, [n, column]) for k, table, n in tables]
+            to, of = (_record(builder, array, item, some) for item in items)
+            before = builder.load(to, align=size)
+            zero = ir.Constant(before.type, None)
+            kept = builder.select(keep, before, zero)
+            builder.store(builder.fadd(kept, builder.load(of, align=size)), to, align=size)
+            builder.store(zero, of, align=size)
 
     number = types.int64
     return types.void(array, number, other, number, number, template, types.boolean), codegen
@@ -267,7 +271,7 @@ def _records(builder: ir.IRBuilder, parts: list) -> list:
 def _accumulate(array, i, first, values):
     if tag_class(i) is Weighted and lanes_of(i):
         return lambda array, i, first, values: _scatter_affine(
-            array, i.rows, first, i.weights, values, ()
+            ((array, first, values, ()),), i.rows, i.weights
         )
     if isinstance(array, types.Array) and (lanes_of(i) or lanes_of(values)):
         return _scatter
@@ -275,58 +279,78 @@ def _accumulate(array, i, first, values):
 
 
 @implements(accumulate_affine)
-def _accumulate_affine(array, nodes, first, weights, field):
-    _scatter_affine(array, nodes, first, weights, *field)
+def _accumulate_affine(parts, nodes, weights):
+    if len(parts):
+        _scatter_affine(parts, nodes, weights)
 
 
 @intrinsic
-def _scatter_affine(*kinds):
+def _scatter_affine(parts, nodes, weights):
     """Scatter with records made once per point, not per node, and weights from memory."""
-    array, nodes, _, weights, value, slopes = kinds
-    lanes, width = weights[0], _width(nodes, slopes)
 
-    def codegen(builder, *values):
-        table, places, first, factors, numbers, growth = values
-        size = _size(array)
-        factor_at = _kept_in_memory(builder, llvm.unpack(builder, factors))
-        components = llvm.unpack(builder, numbers)
-        growths = [llvm.unpack(builder, slope) for slope in llvm.unpack(builder, growth)]
-        widest = min(REGISTER_BYTES // size, 8)
-        for begin in range(0, len(components), widest):
-            some = slice(begin, begin + widest)
-            left = len(components[some])
-            count = widest if left > 4 else _chunks(left)[0][1]
-            column = builder.add(first, I64(begin))
-            one = Lanes(array.dtype, count)
-            # by the node's position along the first axes
-            at = {(): _records_of(builder, components[some], lanes, count)}
-            grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
+    def codegen(builder, of_parts, places, factors):
+        factor_at = _kept_in_memory(builder, llvm.unpack(builder, factors)) if weights else None
+        at = llvm.unpack(builder, places)
+        for part, values in zip(parts, llvm.unpack(builder, of_parts), strict=True):
+            _scatter_part(builder, (part, nodes), llvm.unpack(builder, values), at, factor_at)
 
-            def field_at(*steps, at=at, grow=grow):
-                if steps not in at:
-                    *outer, last = steps
-                    at[steps] = field_at(*outer, last - 1) if last else field_at(*outer)
-                    if last:
-                        pairs = zip(at[steps], grow[len(outer)], strict=True)
-                        at[steps] = [builder.fadd(*pair) for pair in pairs]
-                return at[steps]
+    return types.void(parts, nodes, weights), codegen
 
-            for k, node in enumerate(llvm.unpack(builder, places)):
-                steps = tuple(k // width**d % width for d in reversed(range(len(grow))))
-                total = pointer = None
-                for j, record in enumerate(field_at(*steps)):
-                    if total is None or lanes_of(nodes[k]):
-                        pointer = at_lane(builder, array, table, nodes[k], node, j, column)
-                        pointer = _record(builder, array, pointer, count)
-                        total = builder.load(pointer, align=size)
+
+def _scatter_part(
+    builder: ir.IRBuilder, kinds: tuple, values: list, places: list, factor_at: Callable | None
+) -> None:
+    (array, _, value, slopes), nodes = kinds
+    table, first, numbers, growth = values
+    lanes, width, size = value[0], _width(nodes, slopes), _size(array)
+    components = llvm.unpack(builder, numbers)
+    growths = [llvm.unpack(builder, slope) for slope in llvm.unpack(builder, growth)]
+    widest = min(REGISTER_BYTES // size, 8)
+    for begin in range(0, len(components), widest):
+        some = slice(begin, begin + widest)
+        left = len(components[some])
+        count = widest if left > 4 else _chunks(left)[0][1]
+        column = builder.add(first, I64(begin))
+        one = Lanes(array.dtype, count)
+        # by the node's position along the first axes
+        at = {(): _records_of(builder, components[some], lanes, count)}
+        grow = [_records_of(builder, slope[some], lanes, count) for slope in growths]
+        if factor_at is None and not lanes_of(nodes[0]):
+            at = {(): [_added(builder, at[()])]}
+            grow = [[_added(builder, slope)] for slope in grow]
+
+        def field_at(*steps, at=at, grow=grow):
+            if steps not in at:
+                *outer, last = steps
+                at[steps] = field_at(*outer, last - 1) if last else field_at(*outer)
+                if last:
+                    pairs = zip(at[steps], grow[len(outer)], strict=True)
+                    at[steps] = [builder.fadd(*pair) for pair in pairs]
+            return at[steps]
+
+        for k, node in enumerate(places):
+            steps = tuple(k // width**d % width for d in reversed(range(len(grow))))
+            total = pointer = None
+            for j, record in enumerate(field_at(*steps)):
+                if total is None or lanes_of(nodes[k]):
+                    pointer = at_lane(builder, array, table, nodes[k], node, j, column)
+                    pointer = _record(builder, array, pointer, count)
+                    total = builder.load(pointer, align=size)
+                if factor_at is None:
+                    total = builder.fadd(total, record)
+                else:
                     weight = splat(builder, builder.load(factor_at(k, j), align=size), one)
                     total = _fma(builder, [weight, record, total])
-                    if lanes_of(nodes[k]):
-                        builder.store(total, pointer, align=size)
-                if not lanes_of(nodes[k]):
+                if lanes_of(nodes[k]):
                     builder.store(total, pointer, align=size)
+            if not lanes_of(nodes[k]):
+                builder.store(total, pointer, align=size)
 
-    return types.void(array, nodes, types.int64, weights, value, slopes), codegen
+
+def _added(builder: ir.IRBuilder, rows: list) -> ir.Value:
+    while len(rows) > 1:
+        rows = [builder.fadd(*pair) for pair in zip(rows[::2], rows[1::2], strict=True)]
+    return rows[0]
 
 
 def _records_of(builder: ir.IRBuilder, parts: list, lanes: Lanes, count: int) -> list:

@@ -32,21 +32,24 @@ def joined(lanes, kin, parts):
     """Join momentum and force if both have increments and a register holds both."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
         return parts
-    array, first, a, to_a = parts[0]
-    _, _, b, to_b = parts[1]
+    array, first, weighted, a, to_a = parts[0]
+    *_, b, to_b = parts[1]
     of_sums = len(a) == 1 + kin.dimension and len(b) == kin.dimension
     if not (of_sums and len(to_a) and len(to_b)):
         return parts
     growths = [_beside(x, y) for x, y in zip(to_a, to_b, strict=True)]
-    return ((array, first, _beside(a, b), tuple(growths)),)
+    return ((array, first, weighted, _beside(a, b), tuple(growths)),)
 
 
 def give_affine(lanes, w, stencil, parts):
     seen = PointView(w, stencil, (), ()).nodes
     nodes, weights = tuple([node.i for node in seen]), tuple([node.N for node in seen])
-    for array, first, value, growths in joined(lanes, w.kin, parts):
-        value, growths = (*value,), tuple([(*growth,) for growth in growths])
-        accumulate_affine(array, nodes, first, weights, (value, growths))
+    some = [
+        (weighted, (array, first, (*value,), tuple([(*growth,) for growth in growths])))
+        for array, first, weighted, value, growths in joined(lanes, w.kin, parts)
+    ]
+    accumulate_affine(tuple([part for weighted, part in some if weighted]), nodes, weights)
+    accumulate_affine(tuple([part for weighted, part in some if not weighted]), nodes, ())
 
 
 def gathered_by_arms(w):

@@ -35,12 +35,19 @@ def _zero(kin):
     return 0
 
 
+class Unweighted(NamedTuple):
+    """Contribution to the first node of a stencil, and its increments to the next ones."""
+
+    value: tuple
+    growths: tuple
+
+
 class Sum(NamedTuple):
     """Nodal sum over points; ``of(pt, node)`` is a point's contribution, a tuple.
 
     If the contribution is N_i (a + b (X_i - x)), ``affine(pt, w)`` returns a and the columns of b
-    (none if b is 0), otherwise (). In lanes, affine sums are arranged like records once per point
-    instead of once per node.
+    (none if b is 0); if it is affine without a weight, an `Unweighted`; otherwise (). In lanes,
+    affine sums are arranged like records once per point instead of once per node.
     """
 
     into: NodeColumns
@@ -136,7 +143,7 @@ def scattered(quantity: Tag, load: tuple, node: NodeView) -> None:
 
 @point_function()
 def affine_part(quantity, w, stencil, load):
-    """Return (array, first component, value at the first node, increments per node), or ()."""
+    """Return (array, first component, weighted?, value at the first node, increments), or ()."""
 
 
 def _register(kind: Any) -> None:
@@ -168,8 +175,9 @@ def _register(kind: Any) -> None:
         parts = [one.affine(load, w) for one in sums]
         if not all(len(term) for term in parts):
             return ()
-        at_first = [_at_first(w, stencil, *term) for term in parts]
-        return node_array(w.nodes, array), sums[0].into.first(w.kin), *_joined(at_first)
+        weighted = not isinstance(parts[0], Unweighted)
+        at_first = [_at_first(w, stencil, *term) if weighted else term for term in parts]
+        return node_array(w.nodes, array), sums[0].into.first(w.kin), weighted, *_joined(at_first)
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:
@@ -251,7 +259,11 @@ def updated_all(tasks, pt, totals, fastest):
 
 
 def load_all(quantities, pt):
-    return tuple([load_of(quantity, pt) for quantity in quantities])
+    """Return the load of each quantity, once for those that take the same."""
+    kinds = [type(quantity).takes for quantity in quantities]
+    firsts = [kinds.index(takes) for takes in kinds]
+    loads = [load_of(quantities[k], pt) if k == firsts[k] else () for k in range(len(kinds))]
+    return tuple([loads[first] for first in firsts])
 
 
 def scattered_all(quantities, loads, node):

@@ -30,9 +30,12 @@ from karamelo_py.compiler.fields import (
     increase,
     numbers,
     pair,
+    scalar,
     store,
+    store_from,
     vector,
 )
+from karamelo_py.compiler.tuples import count_in
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
@@ -47,6 +50,7 @@ from karamelo_py.points.kinematics import I, det, dot, nothing, outer, zero
 from karamelo_py.points.kinematics import total as sum_of
 from karamelo_py.points.laws.pore_water import (
     Saturated,
+    drag_at,
     drag_per_volume,
     pore_pressure,
     porosity,
@@ -78,22 +82,27 @@ class UnseenPressure(Field):
     needed = RelativeVelocity.needed
 
 
+def of_drag(kin):
+    return 7 if kin.dimension == 3 else 3
+
+
+def of_volumes(kin):
+    return 4 if kin.dimension == 1 else 8
+
+
+def of_pressure(kin):
+    return of_volumes(kin) + 4
+
+
 class WaterSums(SummedField):
-    """Water's nodal mass, momentum and force, as in `Nodes.sums`."""
+    """Nodal sums of water and pores.
 
-    shape = eq.RigidSums.shape
+    Mass, momentum and force of the water, as in `Nodes.sums`, in which it leaves a column to the
+    drag; volume, volume of pores, volume times pressure, its unseen part; force of the pressure
+    (d,) and outward area (d,).
+    """
 
-
-class PoreSums(SummedField):
-    """Nodal sums: volume, pore volume, volume times pressure and times unseen pressure, drag."""
-
-    shape = numbers(5)
-
-
-class PoreForce(SummedField):
-    """Force of the pressure (d,), and outward area (d,)."""
-
-    shape = numbers(0, 2)
+    shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension)
 
 
 class WaterAgain(SummedField):
@@ -103,15 +112,15 @@ class WaterAgain(SummedField):
 
 
 class WaterUpdate(StepField):
-    """w* after the update, w* - w, and the mass of the soil."""
+    """w* after the update, w* - w, the mass of the soil, exp(-b) and f."""
 
-    shape = numbers(1, 2)
+    shape = numbers(3, 2)
 
 
 class Flux(Field):
-    """Mass flux per area (d,); two outflows; two pressures.
+    """Mass flux per area (d,), an outflow, two pressures, another outflow.
 
-    The first outflow, per volume, is for closed nodes, where points retain the water; the second, a
+    The first outflow, per volume, is for closed nodes, where points retain the water; the last, a
     mass per time, leaves through open nodes. The pressures are the mean at the node, and the mean
     of the unseen part.
     """
@@ -138,7 +147,7 @@ class GivenFlux(StepField):
 
 POINT_FIELDS = RelativeVelocity, UnseenPressure, WorkOfForces
 NODE_FIELDS = (
-    WaterSums, PoreSums, PoreForce, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
+    WaterSums, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
 )  # fmt: skip
 
 
@@ -180,48 +189,33 @@ def water_v(pt):
     return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
 
 
-@eq.reads("mass", "state", "material", "unseen pressure")
-def volumes(pt):
-    """Return the quantities of `PoreSums`, or () if dry."""
-    if not _is_wet(pt):
-        return ()
-    law, state = pt.law_and_state
-    volume = eq.mass(pt) * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
-    p, drag = pore_pressure(law, pt.kin, state), drag_per_volume(law, pt.kin, state)
-    unseen = pt.of(UnseenPressure)[0, pt.p]
-    return volume, volume * porosity(law, pt.kin, state), volume * p, volume * unseen, volume * drag
+class Pores(NamedTuple):
+    m: arrays.Number  # of the water
+    v: tuple  # of the water
+    drag: arrays.Number  # per relative velocity
+    volumes: tuple  # of the point and of pores; times pressure and its unseen part
+    p: arrays.Number
+    area: tuple  # the volume as a stress
 
 
-@eq.reads("mass", "state", "material", "deformation gradient")
+@eq.reads(
+    "mass", "state", "material", "deformation gradient", "v", "relative velocity",
+    "unseen pressure",
+)  # fmt: skip
 def pores(pt):
-    """Return pressure, and volume as a stress, or () if dry."""
+    """Return what a point gives to `WaterSums`, or () if dry."""
     if not _is_wet(pt):
         return ()
     law, state, f = pt.law_state_F
-    one = nothing(pt.kin) + laws.jacobian(law, pt.kin, state) * I
-    area = eq.mass(pt) * laws.specific_volume(law) * force_stress(pt.w.frame, pt.kin, one, f)
-    return pore_pressure(law, pt.kin, state), area
-
-
-def _sums_at(pt, node):
-    if not len(pt.volumes):
-        return ()
-    *some, drag = pt.volumes
-    return (*[pore_N(node) * one for one in some], node.N * drag)
-
-
-def _affine_sums(pt, w):
-    if not len(pt.volumes) or isinstance(w.basis, Linear):
-        return ()
-    return pt.volumes, ()
-
-
-def _force_and_area_at(pt, node):
-    if not len(pt.pores):
-        return ()
-    p, V = pt.pores
-    area = V.dot(pore_grad(node))
-    return (*(p * area), *area)
+    kin, J = pt.kin, laws.jacobian(law, pt.kin, state)
+    V0 = eq.mass(pt) * laws.specific_volume(law)
+    V, n, p = V0 * J, porosity(law, kin, state), pore_pressure(law, kin, state)
+    unseen = () if isinstance(pt.w.basis, Linear) else (V * pt.of(UnseenPressure)[0, pt.p],)
+    area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
+    drag = V * drag_at(law.permeability, law, n)
+    return Pores(
+        V0 * water_content(law, kin, state), water_v(pt), drag, (V, V * n, V * p, *unseen), p, area
+    )
 
 
 class OfWater(NamedTuple):
@@ -230,49 +224,107 @@ class OfWater(NamedTuple):
     moment: tuple
 
 
-def _momentum_at(pt, node):
-    if not len(pt.water):
+def _momentum(m, v, node):
+    return nodal_momentum(node.transfer, OfWater(m, v, ()), node)
+
+
+def _times(factor, numbers):
+    return tuple([factor * number for number in numbers])
+
+
+def _affine_volumes(pt, w):
+    if not len(pt.pores):
         return ()
-    return nodal_momentum(node.transfer, OfWater(pt.water[0], pt.water_v, ()), node)
+    if not isinstance(w.basis, Linear):
+        return pt.pores.volumes, ()
+    return eq.Unweighted(_times(0.5**w.kin.dimension, pt.pores.volumes), ())
 
 
-def _affine_mass(pt, w):
-    return (pt.water[0], ()) if len(pt.water) else ()
+def _force_and_area_at(pt, node):
+    if not len(pt.pores):
+        return ()
+    area = pt.pores.area.dot(pore_grad(node))
+    return (*(pt.pores.p * area), *area)
 
 
-def _affine_momentum(pt, w):
-    return (pt.water[0] * pt.water_v, ()) if len(pt.water) else ()
+def _affine_force_and_area(pt, w):
+    # The gradients at a cell's centre are the same but for signs.
+    if not (len(pt.pores) and isinstance(w.basis, Linear)):
+        return ()
+    p, slope = pt.pores.p, 0.5 ** (w.kin.dimension - 1) * w.grid.inv_h
+    steps = [slope * column for column in pt.pores.area.columns()]
+    first = -sum_of(steps)
+    growths = tuple([(*(2 * p * step), *(2 * step)) for step in steps])
+    return eq.Unweighted((*(p * first), *first), growths)
+
+
+MASS = eq.MASS._replace(array=WaterSums)
+MOMENTUM = eq.MOMENTUM._replace(
+    array=WaterSums, end=lambda kin: min(arrays.of_force(kin), of_drag(kin))
+)
+DRAG = eq.NodeColumns(WaterSums, of_drag, scalar, lambda kin: of_drag(kin) + 1)
+VOLUMES = eq.NodeColumns(WaterSums, of_volumes, lambda kin: 4, of_pressure)
+PRESSURE = eq.NodeColumns(WaterSums, of_pressure, lambda kin: 2 * kin.dimension, WaterSums.shape)
+OF_PORES = eq.of_point(pores=pores)
 
 
 class WaterMomentum(eq.NodalQuantity):
     says = "water to grid"
-    takes = eq.of_point(water=water, water_v=water_v)
+    takes = OF_PORES
     gives = (
         eq.Sum(
-            eq.MASS._replace(array=WaterSums),
-            lambda pt, node: tuple([node.N * m for m in pt.water]),
-            _affine_mass,
+            MASS,
+            lambda pt, node: (node.N * pt.pores.m,) if len(pt.pores) else (),
+            lambda pt, w: (pt.pores.m, ()) if len(pt.pores) else (),
         ),
-        eq.Sum(eq.MOMENTUM._replace(array=WaterSums), _momentum_at, _affine_momentum),
+        eq.Sum(
+            MOMENTUM,
+            lambda pt, node: _momentum(*pt.pores[:2], node) if len(pt.pores) else (),
+            lambda pt, w: (pt.pores.m * pt.pores.v, ()) if len(pt.pores) else (),
+        ),
+    )
+
+
+class Drag(eq.NodalQuantity):
+    says = "drag to grid"
+    takes = OF_PORES
+    gives = (
+        eq.Sum(
+            DRAG,
+            lambda pt, node: (node.N * pt.pores.drag,) if len(pt.pores) else (),
+            lambda pt, w: (pt.pores.drag, ()) if len(pt.pores) else (),
+        ),
     )
 
 
 class PoreVolumes(eq.NodalQuantity):
     says = "volumes of pores to grid"
-    takes = eq.of_point(volumes=volumes)
-    gives = (eq.Sum(eq.whole(PoreSums), _sums_at, _affine_sums),)
+    takes = OF_PORES
+    gives = (
+        eq.Sum(
+            VOLUMES,
+            lambda pt, node: _times(pore_N(node), pt.pores.volumes) if len(pt.pores) else (),
+            _affine_volumes,
+        ),
+    )
 
 
 class WaterForce(eq.NodalQuantity):
     says = "pore pressure to grid"
-    takes = eq.of_point(pores=pores)
-    gives = (eq.Sum(eq.whole(PoreForce), _force_and_area_at),)
+    takes = OF_PORES
+    gives = (eq.Sum(PRESSURE, _force_and_area_at, _affine_force_and_area),)
 
 
 class WaterMomentumAgain(eq.NodalQuantity):
     says = "momentum of the water to grid"
     takes = eq.of_point(water=water, water_v=water_v)
-    gives = (eq.Sum(eq.whole(WaterAgain), _momentum_at, _affine_momentum),)
+    gives = (
+        eq.Sum(
+            eq.whole(WaterAgain),
+            lambda pt, node: _momentum(*pt.water, pt.water_v, node) if len(pt.water) else (),
+            lambda pt, w: (pt.water[0] * pt.water_v, ()) if len(pt.water) else (),
+        ),
+    )
 
 
 # --- at the nodes ---------------------------------------------------------------------------------
@@ -285,10 +337,11 @@ def _taken_up(b):
 
 
 def _is_rim(nodes, kin, n, rim):
-    force, V = field(nodes.fields, PoreForce), field(nodes.fields, PoreSums)[n, 0]
-    squared, d = real(0, V), kin.dimension
-    for k in range(d):
-        squared += force[n, d + k] * force[n, d + k]
+    sums, first = field(nodes.fields, WaterSums), of_pressure(kin) + kin.dimension
+    V = sums[n, of_volumes(kin)]
+    squared = real(0, V)
+    for k in range(kin.dimension):
+        squared += sums[n, first + k] * sums[n, first + k]
     return squared >= rim * rim * V * V
 
 
@@ -299,14 +352,14 @@ def _is_open(nodes, n):
 
 def _close_if_dry(nodes, kin, n):
     """Close a node of a seepage face unless its pressure or flow is outward."""
-    prescribed, sums = field(nodes.fields, GivenPressure), field(nodes.fields, PoreSums)
-    if prescribed[n, 1] == 1 and sums[n, 2] <= prescribed[n, 0] * sums[n, 0]:
-        water, force = field(nodes.fields, WaterSums), field(nodes.fields, PoreForce)
-        m, m_s, across = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], real(0, sums[n, 0])
+    prescribed, sums = field(nodes.fields, GivenPressure), field(nodes.fields, WaterSums)
+    of_V, of_area = of_volumes(kin), of_pressure(kin) + kin.dimension
+    if prescribed[n, 1] == 1 and sums[n, of_V + 2] <= prescribed[n, 0] * sums[n, of_V]:
+        m, m_s, across = sums[n, arrays.MASS], nodes.sums[n, arrays.MASS], real(0, sums[n, 0])
         for k in range(kin.dimension):
             of_momentum = arrays.of_momentum(kin) + k
-            w = water[n, of_momentum] / m - nodes.sums[n, of_momentum] / m_s
-            across += w * force[n, kin.dimension + k]
+            w = sums[n, of_momentum] / m - nodes.sums[n, of_momentum] / m_s
+            across += w * sums[n, of_area + k]
         if across <= 0:
             prescribed[n, 0] = nan
 
@@ -321,24 +374,25 @@ def _by_pressure(nodes, kin, n, rim):
     The latter is the prescribed pressure at an open node, the mean pressure at other nodes of the
     rim, and otherwise 0.
     """
-    sums, force = field(nodes.fields, PoreSums), field(nodes.fields, PoreForce)
-    p, d = real(0, sums[n, 0]), kin.dimension
+    sums, d, of_P = field(nodes.fields, WaterSums), kin.dimension, of_pressure(kin)
+    of_V, p = of_volumes(kin), real(0, sums[n, 0])
+    per_volume = 1 / sums[n, of_V]
     if _is_open(nodes, n):
         p = field(nodes.fields, GivenPressure)[n, 0]
     elif _is_rim(nodes, kin, n, rim):
-        p = sums[n, 2] / sums[n, 0]
-    share = sums[n, 1] / sums[n, 0]
-    return [share * (force[n, k] - force[n, d + k] * p) for k in range(d)], p
+        p = sums[n, of_V + 2] * per_volume
+    share = sums[n, of_V + 1] * per_volume
+    return [share * (sums[n, of_P + k] - sums[n, of_P + d + k] * p) for k in range(d)], p
 
 
 def _mass_given(nodes, kin, n, V):
     """Return the mass of water that a node gets per time; store it by `WAYS`."""
-    supply, force, d = field(nodes.fields, GivenFlux), field(nodes.fields, PoreForce), kin.dimension
+    supply, sums, d = field(nodes.fields, GivenFlux), field(nodes.fields, WaterSums), kin.dimension
     whole, squared = real(0, V), real(0, V)
     if supply is None:
         return whole
     for k in range(d):
-        area = force[n, d + k]
+        area = sums[n, of_pressure(kin) + d + k]
         squared += area * area
         supply[n, 2 * k] *= max(-area, real(0, V))
         supply[n, 2 * k + 1] *= max(area, real(0, V))
@@ -349,9 +403,10 @@ def _mass_given(nodes, kin, n, V):
     return whole
 
 
-def _is_wet_node(nodes, n):
-    water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
-    return nodes.sums[n, arrays.MASS] > 0 and water[n, arrays.MASS] > 0 and sums[n, 0] > 0
+def _is_wet_node(nodes, kin, n):
+    sums = field(nodes.fields, WaterSums)
+    soil, water = nodes.sums[n, arrays.MASS], sums[n, arrays.MASS]
+    return soil > 0 and water > 0 and sums[n, of_volumes(kin)] > 0
 
 
 @node_task
@@ -362,39 +417,41 @@ class ShareForces(NamedTuple):
     surface: float  # |B| / V of nodes at the surface
 
     says = "forces on soil and water"
-    goes_through = ("sums", "water sums", "pore sums", "pore force", "water update")
+    goes_through = ("sums", "water sums", "water update")
 
     def at_node(task, kin, nodes, n, dt):
-        if not _is_wet_node(nodes, n):
+        if not _is_wet_node(nodes, kin, n):
             return
-        water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
-        force, d = field(nodes.fields, PoreForce), kin.dimension
+        water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
+        d, of_P = kin.dimension, of_pressure(kin)
         _close_if_dry(nodes, kin, n)
-        m, m_s, D = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], sums[n, 4]
+        m, m_s, D = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], water[n, of_drag(kin)]
         along = real(0, m)
         pushed, _ = _by_pressure(nodes, kin, n, task.rim)
         if _is_closed(nodes, kin, n, task.surface):
             # A wall supports the weight of water next to it, which is not in the mean pressure.
             squared = real(0, m)
             for k in range(d):
-                along += water[n, arrays.of_force(kin) + k] * force[n, d + k]
-                squared += force[n, d + k] * force[n, d + k]
+                area = water[n, of_P + d + k]
+                along += water[n, arrays.of_force(kin) + k] * area
+                squared += area * area
             along /= squared
-        _, taken = _taken_up(dt * D / m)
+        per_mass, per_soil = 1 / m, 1 / m_s
+        left, taken = _taken_up(dt * D * per_mass)
         whole = m_s + m * (1 - taken)
+        put_at(out, n, 2 * d, (m_s, left, taken))
         for k in range(d):
             of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
             by_pressure = pushed[k]
-            carried = along * force[n, d + k]
+            carried = along * water[n, of_P + d + k]
             on_water = water[n, of_force] - carried + by_pressure
-            v = nodes.sums[n, of_momentum] / m_s
-            w = water[n, of_momentum] / m - v
-            rest = nodes.sums[n, of_force] + carried + force[n, k] - by_pressure
+            v = nodes.sums[n, of_momentum] * per_soil
+            w = water[n, of_momentum] * per_mass - v
+            rest = nodes.sums[n, of_force] + carried + water[n, of_P + k] - by_pressure
             water[n, of_force] = on_water
             nodes.sums[n, of_force] = rest + (1 - taken) * on_water + D * taken * w
             nodes.sums[n, of_momentum] = whole * v
         nodes.sums[n, arrays.MASS] = whole
-        field(nodes.fields, WaterUpdate)[n, 2 * kin.dimension] = m_s
 
 
 @node_task
@@ -402,26 +459,25 @@ class DragWater(NamedTuple):
     """Sets the relative velocity after the step from the soil's change, and the soil's mass."""
 
     says = "drag"
-    goes_through = ("sums", "update", "water sums", "pore sums", "water update")
+    goes_through = ("sums", "update", "water sums", "water update")
 
     def at_node(task, kin, nodes, n, dt):
         out, d = field(nodes.fields, WaterUpdate), kin.dimension
-        if not _is_wet_node(nodes, n):
-            for k in range(2 * d):
-                out[n, k] = 0
+        if not _is_wet_node(nodes, kin, n):
+            put_at(out, n, 0, (0,) * (2 * d))
             return
-        water, sums = field(nodes.fields, WaterSums), field(nodes.fields, PoreSums)
-        m, m_s, whole = water[n, arrays.MASS], out[n, 2 * d], nodes.sums[n, arrays.MASS]
-        left, taken = _taken_up(dt * sums[n, 4] / m)
+        water = field(nodes.fields, WaterSums)
+        m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
+        per_mass, fraction = 1 / water[n, arrays.MASS], m_s / nodes.sums[n, arrays.MASS]
         for k in range(d):
             of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
             dv = nodes.update[n, arrays.of_change(kin) + k]
-            w = water[n, of_momentum] / m - (nodes.update[n, k] - dv)
-            new = left * w + taken * (dt * water[n, of_force] / m - dv)
+            w = water[n, of_momentum] * per_mass - (nodes.update[n, k] - dv)
+            new = left * w + taken * (dt * water[n, of_force] * per_mass - dv)
             out[n, k] = new
             out[n, d + k] = new - w
             water[n, of_force] = 0
-            nodes.sums[n, of_momentum] *= m_s / whole
+            nodes.sums[n, of_momentum] *= fraction
         nodes.sums[n, arrays.MASS] = m_s
 
 
@@ -430,42 +486,43 @@ class MakeFlux(NamedTuple):
     rim: float
 
     says = "flux of the water"
-    goes_through = ("sums", "velocity", "water sums", "water again", "pore sums", "flux")
+    goes_through = ("sums", "velocity", "water sums", "water again", "flux")
 
     def at_node(task, kin, nodes, n, dt):
         flux, d = field(nodes.fields, Flux), kin.dimension
         across = real(0, dt)
-        if not _is_wet_node(nodes, n):
+        if not _is_wet_node(nodes, kin, n):
             put_at(flux, n, 0, (0,) * (d + 4))
             if field(nodes.fields, GivenFlux) is not None:
                 put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
             return
-        m, V = field(nodes.fields, WaterSums)[n, arrays.MASS], field(nodes.fields, PoreSums)[n, 0]
-        again, force = field(nodes.fields, WaterAgain), field(nodes.fields, PoreForce)
+        water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
+        of_V, of_area = of_volumes(kin), of_pressure(kin) + d
+        m, V = water[n, arrays.MASS], water[n, of_V]
+        pushed, p = _by_pressure(nodes, kin, n, task.rim)
+        per_mass, per_volume = 1 / m, 1 / V
         for k in range(d):
-            j = (again[n, k] - m * nodes.velocity[n, k]) / V
+            j = (again[n, k] - m * nodes.velocity[n, k]) * per_volume
             flux[n, k] = j
-            across += j * force[n, d + k]
+            across += j * water[n, of_area + k]
         enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
         drained = _is_open(nodes, n) and not enters
         closed = not drained and _is_rim(nodes, kin, n, task.rim)
-        for k in range(2):
-            flux[n, d + 2 + k] = field(nodes.fields, PoreSums)[n, 2 + k] / V
         supply = _mass_given(nodes, kin, n, V)
         stays = across + supply if closed else supply
-        flux[n, d] = real(0, dt) if drained else stays / V
-        flux[n, d + 1] = across + supply if drained else real(0, dt)
+        leaves = across + supply if drained else real(0, dt)
+        means = water[n, of_V + 2] * per_volume, water[n, of_V + 3] * per_volume
+        put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
         # With the mean relative velocity in the step, the remaining work is the work of weight
         # minus the work of drag, and the work of pressure on water that enters or leaves.
-        water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
-        pushed, p = _by_pressure(nodes, kin, n, task.rim)
-        work = dt * (supply - flux[n, d + 1]) * p * field(nodes.fields, PoreSums)[n, 1] / m
+        out = field(nodes.fields, WaterUpdate)
+        work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
         for k in range(d):
             of_momentum = arrays.of_momentum(kin) + k
             v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
             # a fix that holds the soil prescribes its velocity throughout
             before = v if nodes.update[n, k] == v else nodes.update[n, k] - dv
-            w = 0.5 * ((water[n, of_momentum] + again[n, k]) / m - before - v)
+            w = 0.5 * ((water[n, of_momentum] + again[n, k]) * per_mass - before - v)
             dv += out[n, d + k]
             work += w * (m * dv - dt * pushed[k])
         field(nodes.fields, WorkAtNodes)[n, 0] += work
@@ -502,13 +559,14 @@ class MoveWater(eq.Task):
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
-        b = pt.w.kick * drag * (1 + m) / m
-        unseen = (b / (1 + b)) * (new - at_nodes)
+        b = pt.w.kick * drag * (1 + m)  # times m
+        unseen = (b / (m + b)) * (new - at_nodes)
+        part = m / (1 + m)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
-        store(pt.w.points.v, pt.p, pt.v + (m / (1 + m)) * unseen)
+        store(pt.w.points.v, pt.p, pt.v + part * unseen)
         # Work of this impulse: for nodes, the step ends with the velocity after it.
         way = dot(unseen, change) - new.squared() + (new - unseen).squared()
-        increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * (m / (1 + m)) * way,))
+        increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * part * way,))
         return eq.Report(real(0, pt.dt), fastest)
 
 
@@ -520,40 +578,47 @@ class Seep(eq.Task):
     writes = ("state", "relative velocity", "unseen pressure")
 
     def empty(task, w, x):
-        none = real(0, x[0])
-        return zero(w.kin, x[0]), zero(w.kin, x[0]), none, (none, none)
+        none, tensor = real(0, x[0]), zero(w.kin, x[0])
+        spread = none if w.frame.moves else tensor
+        if isinstance(w.basis, Linear):
+            return spread, none, (), tensor
+        return spread, none, (none, none), ()  # `Strain` gathers the gradient
 
     def gathered(task, node, total):
         if not isinstance(node.w.laws, Saturated):
             return total
-        spread, gradient, kept, means = total
+        spread, kept, means, gradient = total
         d, g = node.kin.dimension, pore_grad(node)
-        (*j, stays, _, mean, again) = row(node.of(Flux), node.i, 0, (*g[:d], kept, kept, *means))
+        some = row(node.of(Flux), node.i, 0, (*g[:d], kept, *means))
+        j, pairs = node.v._make(some[:d]), zip(means, some[d + 1 :], strict=True)
         return (
-            spread + outer(node.v._make(j), g),
-            gradient + outer(node.v, g),
-            kept + pore_N(node) * stays,
-            (means[0] + node.N * mean, means[1] + node.N * again),
+            spread + (dot(j, g) if node.w.frame.moves else outer(j, g)),
+            kept + pore_N(node) * some[d],
+            tuple([mean + node.N * at_node for mean, at_node in pairs]),
+            gradient + outer(node.v, g) if len(gradient) else (),
         )
 
     def updated(task, pt, total, totals, fastest):
         if not _is_wet(pt):
             return eq.Report(real(0, pt.dt), fastest)
-        spread, gradient, kept, (mean, again) = total
+        spread, kept, means, gradient = total
+        if not len(gradient):
+            gradient = totals[-1][0]
         law, old, f = pt.law_state_F
         frame, kin = pt.w.frame, pt.kin
-        # per initial volume
-        leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
-        lost = laws.jacobian(law, kin, old) * (leaving - kept)
-        content = old.content - pt.dt * lost / law.rho
+        leaving = spread
+        if not frame.moves:
+            leaving = sum_of(spatial_increment(frame, kin, spread, f).diagonal())
+        content = old.content - pt.dt * laws.jacobian(law, kin, old) * (leaving - kept)
         grown = det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
         pores = old.pores * grown + (1 - law.n) * (grown - 1)
-        if not isinstance(pt.w.basis, Linear):
+        if len(means):
+            mean, again = means
             factor = real(SMOOTHING, mean) / law.K
             pores = pores * (1 + factor * (pt.of(UnseenPressure)[0, pt.p] - again))
             store(pt.of(UnseenPressure), pt.p, (pore_pressure(law, kin, old) - mean,))
         new = old._replace(content=content, pores=pores)
-        store(pt.w.points.state, pt.p, new)
+        store_from(pt.w.points.state, pt.p, count_in(old.skeleton), new)
         v = pt.v
         ratio = old.content / content  # momentum of the water is conserved
         w = pt.load(RelativeVelocity, v)

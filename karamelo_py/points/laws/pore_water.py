@@ -1,17 +1,26 @@
 """Saturated soil: a law for the effective stress of the skeleton, and water in the pores.
 
-The state also has the volume of the water at zero pressure and the pore volume, per initial volume:
-p = K ln(content / pores). With a suction a < K, p = a ln S where the saturation S = content / pores
-is below 1, and the relative permeability is S (Gardner 1958). `advance` alone is undrained; in a
-run the flux through the nodes changes the content
-(:mod:`karamelo_py.kernels.equations.pore_water`).
+The state also has the mass of the water and the pore volume, per initial volume: p = K ln S with S
+= content / (rho pores). With a suction a < K, p = a ln S where the saturation S is below 1, and the
+relative permeability is S (Gardner 1958). `advance` alone is undrained; in a run the flux through
+the nodes changes the content (:mod:`karamelo_py.kernels.equations.pore_water`).
 """
 
 from typing import Any, NamedTuple
 
-from karamelo_py.compiler import where
-from karamelo_py.compiler.powers import exponential, logarithm
+from karamelo_py.compiler import point_function, where
+from karamelo_py.compiler.powers import exponential, logarithm_near_one
 from karamelo_py.points import laws
+
+
+class ConstantPermeability(NamedTuple):
+    in_lanes = True
+
+
+class KozenyCarman(NamedTuple):
+    """Permeability in proportion to n^3 / (1 - n)^2."""
+
+    in_lanes = True
 
 
 class Saturated(NamedTuple):
@@ -22,7 +31,7 @@ class Saturated(NamedTuple):
     drag: float  # force per pore volume and water velocity: rho g / permeability
     K: float  # bulk modulus of the water
     rho: float  # density of the water at zero pressure
-    kozeny: float  # 1: permeability follows porosity; 0: constant
+    permeability: Any  # tag: how it depends on porosity
     suction: float  # suction at which the saturation is 1/e; K: pores remain full
 
     in_lanes = True
@@ -36,7 +45,7 @@ class State(NamedTuple):
 
 @laws.initial_state.on(Saturated)
 def _initial_state_saturated(law, kin, template):
-    return State(laws.initial_state(law.law, kin, template), law.n, law.n)
+    return State(laws.initial_state(law.law, kin, template), law.n * law.rho, law.n)
 
 
 @laws.advance.on(Saturated)
@@ -64,44 +73,48 @@ laws.wraps(
 @laws.energy_density.on(Saturated)
 def _energy_density_saturated(law, kin, state):
     """Return the energy of skeleton and water; derivative by pore volume: -p."""
-    x = state.content / state.pores - 1
+    x = _filled(law, state) - 1
     series = x * x * (0.5 - x * (1 / 3 - x * (0.25 - 0.2 * x)))
-    compressed = where(abs(x) < 0.01, series, x - logarithm(1 + x))
+    compressed = where(abs(x) < 0.01, series, x - logarithm_near_one(1 + x))
     stiff = where(x < 0, law.suction, law.K)
     return laws.energy_density(law.law, kin, state.skeleton) + stiff * state.pores * compressed
 
 
-def _terms(law, kin, state, of_skeleton):
-    """Return trace and determinant of the two-phase wave problem."""
-    dry = 1 / (laws.specific_volume(law) * laws.jacobian(law, kin, state))
-    n = porosity(law, kin, state)
-    slow, water = of_skeleton(law.law, kin, state.skeleton), law.K / n
-    trace = slow + water * ((1 - n) * (1 - n) / dry + n / law.rho)
-    return trace, slow * law.K / law.rho
+def _trace(law, kin, state, slow):
+    """Return the trace of the two-phase wave problem, given the skeleton's c^2."""
+    # K / n ((1 - n)^2 / dry + n / rho), with one division
+    dry = laws.specific_volume(law) * laws.jacobian(law, kin, state)
+    grains, pores = 1 - law.n, law.rho * state.pores * (state.pores + (1 - law.n))
+    return slow + law.K * ((grains * grains * law.rho * dry + pores) / (pores * law.rho))
 
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
     # Slightly above the larger eigenvalue of the two phases, without a root; drag slows waves down.
-    trace, product = _terms(law, kin, state, laws.wave_speed_squared)
-    return trace - product / trace
+    slow = laws.wave_speed_squared(law.law, kin, state.skeleton)
+    trace = _trace(law, kin, state, slow)
+    return trace - slow * law.K / (law.rho * trace)
 
 
 @laws.wave_speed_bound.on(Saturated)
 def _wave_speed_bound_saturated(law, kin, state):
-    return _terms(law, kin, state, laws.wave_speed_bound)[0]
+    return _trace(law, kin, state, laws.wave_speed_bound(law.law, kin, state.skeleton))
+
+
+def _filled(law, state):
+    return state.content / (law.rho * state.pores)
 
 
 @laws.number
 def pore_pressure(law, kin, state):
-    ratio = state.content / state.pores
-    return where(ratio < 1, law.suction, law.K) * logarithm(ratio)
+    ratio = _filled(law, state)
+    return where(ratio < 1, law.suction, law.K) * logarithm_near_one(ratio)
 
 
 @laws.number
 def saturation(law, kin, state):
     """Return the fraction of the pores that water fills; 1 without suction."""
-    ratio = state.content / state.pores
+    ratio = _filled(law, state)
     return where(law.suction < law.K, where(ratio < 1, ratio, 1), 1)
 
 
@@ -114,18 +127,33 @@ def porosity(law, kin, state):
 @laws.number
 def water_content(law, kin, state):
     """Return the water's mass per initial volume."""
-    return law.rho * state.content
+    return state.content
 
 
 def with_pore_pressure(law, kin, state, p):
-    return state._replace(content=state.pores * exponential(p / where(p < 0, law.suction, law.K)))
+    return state._replace(
+        content=law.rho * state.pores * exponential(p / where(p < 0, law.suction, law.K))
+    )
+
+
+@point_function()
+def drag_at(permeability, law, n):
+    """Return n^2 rho g / k, the drag per volume and relative velocity at porosity n."""
+
+
+@drag_at.on(ConstantPermeability)
+def _drag_at_constant(permeability, law, n):
+    return law.drag * n * n
+
+
+@drag_at.on(KozenyCarman)
+def _drag_at_kozeny(permeability, law, n):
+    k = n * n * n / ((1 - n) * (1 - n)) * ((1 - law.n) * (1 - law.n) / (law.n * law.n * law.n))
+    return law.drag * n * n / k
 
 
 def drag_per_volume(law, kin, state):
-    """Return n^2 rho g / k, the drag per volume and relative velocity, with the present k."""
-    n = porosity(law, kin, state)
-    k = n * n * n / ((1 - n) * (1 - n)) * ((1 - law.n) * (1 - law.n) / (law.n * law.n * law.n))
-    return law.drag * n * n / (1 + law.kozeny * (k - 1))
+    return drag_at(law.permeability, law, porosity(law, kin, state))
 
 
 for _function in (pore_pressure, saturation, porosity, water_content):

@@ -28,13 +28,14 @@ from karamelo_py.kernels.equations.pore_water import (
 from karamelo_py.kernels.pore_water import AT_WATER
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
-from karamelo_py.points.laws.pore_water import Saturated, State, drag_per_volume, porosity
+from karamelo_py.points.laws.pore_water import State, drag_per_volume, porosity
 from karamelo_py.run.implicit.equations import Equations, interpolation, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
 OUTLET = 1e3  # conductance of a seepage face over the conductance of its cells
 CAVITATION = -1e5  # Pa
+NUMBERS = "n", "drag", "K", "rho", "suction"
 EPS = 50 * float(np.finfo(float).eps)
 
 
@@ -86,15 +87,16 @@ class Seepage:
         columns = []
         for block, _ in self.wet:
             points, of = block.points, block.points.material
-            numbers = [np.asarray(column)[of] for column in block.laws[1:]]
-            law, records = Saturated(None, *numbers), _laws_of(block)
+            per_point = {name: np.asarray(getattr(block.laws, name))[of] for name in NUMBERS}
+            law, records = block.laws._replace(law=None, **per_point), _laws_of(block)
             state = State(None, points.state[-2], points.state[-1])
             n = porosity(law, kin, state)
             mobility = n * n / drag_per_volume(law, kin, state)
             per_mass = np.array([float(specific_volume(one)) for one in records])[of]
             M = np.array([_modulus(one.law, kin) for one in records])[of]
             numbers = [law.n, law.K, law.rho, law.suction, mobility, M, grids.spacing[points.grid]]
-            columns.append((per_mass * points.mass, *state[1:], *numbers))
+            content = state.content / law.rho  # a volume
+            columns.append((per_mass * points.mass, content, state.pores, *numbers))
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
         self.V0, self.content, self.pores, self.n, self.K, self.rho, *more = every
         self.suction, self.mobility, M, h = more
@@ -248,14 +250,14 @@ class Seepage:
         for block, seen in self.wet:
             some = slice(first, first := first + len(seen.count))
             n, state = self.pores_after[some], block.points.state
-            state[-2], state[-1] = self.content[some] + self.gain[some], n
+            state[-2], state[-1] = self.rho[some] * (self.content[some] + self.gain[some]), n
             flow = self.mobility * (self.gravity.T - np.stack([g @ self.p for g in self.G]))
             w = field(block.points.fields, RelativeVelocity)
             w[:] = flow[:, some] * (n + 1 - self.n[some]) / n
         nodes = self.equations.nodes
         left = self.density * np.where(self.open, -self.rest, self.seeps) / self.dt
         flux = field(self.equations.s.nodes.fields, Flux)
-        flux[nodes, self.d + 1] = left
+        flux[nodes, self.d + 3] = left
         for fix in fixes:
             if Flux in fix.node_fields:
                 leaves = float(left[np.isin(nodes, fix.nodes)].sum())

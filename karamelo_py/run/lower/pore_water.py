@@ -8,7 +8,7 @@ from karamelo_py.kernels import pore_water as rows
 from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
 from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
-from karamelo_py.points.laws.pore_water import Saturated
+from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman, Saturated
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 
@@ -31,7 +31,7 @@ class PoreWater(NamedTuple):
     drag: float
     K: float
     rho: float
-    kozeny: float
+    permeability: ConstantPermeability | KozenyCarman
     suction: float
 
     @property

@@ -16,11 +16,11 @@ from karamelo_py.script.expressions import Expression
 
 def give(flux, values, dt):
     """Return the pressure; publish the mass of water per time that has left."""
-    return (values[0], 0 * values[0]), flux[-3]
+    return (values[0], 0 * values[0]), flux[-1]
 
 
 def give_one_way(flux, values, dt):
-    return (values[0], 1 + 0 * values[0]), flux[-3]
+    return (values[0], 1 + 0 * values[0]), flux[-1]
 
 
 def supply(given, values, dt):
