@@ -189,7 +189,7 @@ def water_v(pt):
     return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
 
 
-class Pores(NamedTuple):
+class WetPoint(NamedTuple):
     m: arrays.Number  # of the water
     v: tuple  # of the water
     drag: arrays.Number  # per relative velocity
@@ -213,7 +213,7 @@ def pores(pt):
     unseen = () if isinstance(pt.w.basis, Linear) else (V * pt.of(UnseenPressure)[0, pt.p],)
     area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
     drag = V * drag_at(law.permeability, law, n)
-    return Pores(
+    return WetPoint(
         V0 * water_content(law, kin, state), water_v(pt), drag, (V, V * n, V * p, *unseen), p, area
     )
 
