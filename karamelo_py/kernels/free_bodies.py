@@ -86,6 +86,14 @@ def _touched_faces(shape, kin, x, about):
     return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
 
 
+def _is_near(body, kin, x, p, square):
+    """Return whether point `p` is within a distance, given its square, of the centre."""
+    away = 0.0
+    for c in range(kin.dimension):
+        away += (x[c, p] - body.state[0].x[c]) ** 2
+    return away <= square
+
+
 @noinline
 def _list_point(body, surface, s, block, p):
     """Put a contact of point `p` with a surface into the next record; return whether it touches."""
@@ -94,13 +102,10 @@ def _list_point(body, surface, s, block, p):
     times, dt = s.control.step[0], s.control.values[arrays.DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
     x = load_vector(kin, points.x[s.control.motion[0].now], p)
-    away = speed = 0.0
-    for c in range(d):
-        away += (x[c] - state.x[c]) ** 2
-        speed += abs(points.v[c, p])
-    if away > (constants.bound + 2 * h) ** 2:
-        return False
     # Reject points that cannot reach the surface in this step; a search in a short reach is cheap.
+    speed = 0.0
+    for c in range(d):
+        speed += abs(points.v[c, p])
     move, number = 2 * dt * (speed + constants.speed), points.id[p]
     law, material = state_at(kin, points, block.laws, p)
     ball = radius(kin, volume_of(kin, points, law, material, p), x)
@@ -141,9 +146,11 @@ def _list_point(body, surface, s, block, p):
 
 @noinline
 def _list_points(body, surface, s, block, number):
-    points = block.points
+    points, x = block.points, block.points.x[s.control.motion[0].now]
+    square = (body.constants[0].bound + 2 * s.grids.h[0]) ** 2
     for p in range(points.mass.size):
-        if surface.members[points.id[p]] and _list_point(body, surface, s, block, p):
+        near = _is_near(body, s.kin, x, p, square) and surface.members[points.id[p]]
+        if near and _list_point(body, surface, s, block, p):
             contact = body.contacts[body.count[0]]
             contact.block, contact.point, contact.slot = number, p, surface.slot
             contact.torque = surface.torque
