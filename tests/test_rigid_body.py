@@ -274,6 +274,16 @@ def test_contact_force_of_a_body_is_published(run_interpreted):
     assert log.ContactTorque_b_z[1:] == pytest.approx(about, rel=1e-4)
 
 
+def test_the_area_of_contact(run_interpreted):
+    """The foot of the block, of width 2, with at most a point more at each end; 0 when apart."""
+    text = HIT.format(method="ulmpm", touch=POINTS, ratio=1).replace(", f_y)", ", f_y, f_area)")
+    text = text.replace("velocity=(0.2, -0.9), spin=0.1", "velocity=(0, -0.9)").replace("4.2", "4")
+    log = run_interpreted(text.replace("run(20)", "run(3)")).log
+    assert log.f_y[-1] < 0 and 2 <= log.f_area[-1] <= 4
+    log = run_interpreted(text.replace("-0.9", "0.9").replace("run(20)", "run(1)")).log
+    assert log.f_area[-1] == log.f_y[-1] == 0
+
+
 @pytest.mark.parametrize(("method", "touch"), [("ulmpm/contacts", GRID), ("tlmpm", POINTS)])
 def test_a_restarted_run_has_the_same_bits(run_interpreted, method, touch):
     text = HIT.format(method=method, touch=touch, ratio=1).replace("run(20)", "run(10)")

@@ -16,7 +16,7 @@ from karamelo_py.kernels.totals import WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
-from karamelo_py.points.bodies import radius
+from karamelo_py.points.bodies import face, radius
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
@@ -36,6 +36,7 @@ class TouchingSurface(NamedTuple):
     mu: float
     slot: int  # of the force on points
     torque: int  # of its torque, or 0
+    area: int  # of the area of contact
     lost: int  # address of a function for points without a way out
 
 
@@ -108,7 +109,8 @@ def _list_point(body, surface, s, block, p):
         speed += abs(points.v[c, p])
     move, number = 2 * dt * (speed + constants.speed), points.id[p]
     law, material = state_at(kin, points, block.laws, p)
-    ball = radius(kin, volume_of(kin, points, law, material, p), x)
+    volume = volume_of(kin, points, law, material, p)
+    ball = radius(kin, volume, x)
     close = min(move, h) + ball
     surface.clear[number] -= move
     if surface.clear[number] > close:
@@ -140,7 +142,7 @@ def _list_point(body, surface, s, block, p):
     deep = max((within + ball) / (DEEP * h), 1.0)
     share = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact.share = min(deep * deep * share, 1.0)
-    contact.most = 0.0
+    contact.most, contact.face = 0.0, face(kin, volume, x)
     return True
 
 
@@ -153,7 +155,7 @@ def _list_points(body, surface, s, block, number):
         if near and _list_point(body, surface, s, block, p):
             contact = body.contacts[body.count[0]]
             contact.block, contact.point, contact.slot = number, p, surface.slot
-            contact.torque = surface.torque
+            contact.torque, contact.area = surface.torque, surface.area
             body.count[0] += 1
 
 
@@ -193,6 +195,7 @@ def _give_to_points(body, s, block, number, measures):
                         nodes.update[n, c] += impulse / nodes.sums[n, arrays.MASS]
                         nodes.update[n, change] += impulse / nodes.sums[n, arrays.MASS]
         if measures:
+            s.control.values[contact.area] += contact.face if contact.push > 0 else 0.0
             for c in range(d):
                 s.control.values[contact.slot + c] += contact.impulse[c] / kick
             for c in range(3 if contact.torque else 0):
@@ -296,6 +299,7 @@ def _follow(s, n, again):
 def _list_contacts(body, s):
     body.count[0] = 0
     for surface in body.surfaces:
+        s.control.values[surface.area] = 0.0
         for c in range(s.kin.dimension):
             s.control.values[surface.slot + c] = 0.0
         for c in range(3 if surface.torque else 0):

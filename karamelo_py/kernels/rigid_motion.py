@@ -60,6 +60,7 @@ CONTACT = np.dtype([
     ("most", *_NUMBER),  # friction bound
     ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point and its force
     ("torque", np.int64),  # slot, or 0
+    ("area", np.int64), ("face", *_NUMBER),  # slot of the area of contact; area of the point
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
 SOLVED, GOOD_ENOUGH = 1e-26, 1e-16  # fractions of the initial squared residual

@@ -63,6 +63,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
             int(hub.values.torques[hub.values.slot(f"{touch.id}_x")]),
+            hub.values.slot(f"{touch.id}_area"),
             address_of_python(touch.refuse, CALL),
         )
         for touch in surfaces_of(fix)
