@@ -187,6 +187,10 @@ def fluid(eos, strength="fluid, 0"):
         (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 30"), "",
          "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
         (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "", "method(ulmpm, FLIP, linear, 0.99)"),
+        (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3"), "scheme(quasi-static)\nset_dt(1)",
+         "method(tlmpm, FLIP, Bernstein-quadratic, 1)"),
+        (RUBBER, f"{OTHER}fix(rub, contact/friction, body, other, 0.2)",
+         "method(ulmpm/contacts, FLIP, cubic-spline, 0.99)"),
     ],
 )  # fmt: skip
 def test_auto_by_the_scene(run_interpreted, material, more, lines):

@@ -97,6 +97,12 @@ class Scouted(SceneFacts):
         )
 
     @property
+    def limit_load(self) -> bool:
+        """True in load steps of soil that dilates, or that end at its limit load."""
+        slow = self.implicit and not self.scheme.traits.inertia
+        return slow and self.soil and (self.dilates or self.scheme.limit == "stop")
+
+    @property
     def pressed(self) -> bool:
         return any(
             len(x) and not all(map(is_zero, fix.formulas))
