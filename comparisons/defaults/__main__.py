@@ -14,14 +14,15 @@ PAGE = Path(__file__).parent.parent.parent / "docs" / "defaults.md"
 HEAD = """# What the defaults do
 
 This table compares scenes that have exact answers with the program's own choices of step, scheme
-and averaging. `python -m comparisons.defaults` writes it.
+and averaging. `python -m comparisons.defaults` writes it. Materials and fixes, such as the contact of
+`in.slope_balls`, are always the script's.
 
 | column | meaning |
 |---|---|
 | error | relative to the exact number; where that is 0, the number itself |
 | order in h | how fast the error falls with smaller cells; "exact" means an error below 0.1 % |
 | at half the step | the error with half the time step |
-| auto | the error with [`method(auto)`](choose.md#chosen-by-the-program); materials and fixes, such as the contact of `in.slope_balls`, are those of the script |
+| auto | the error with [`method(auto)`](choose.md#chosen-by-the-program) |
 | warnings | the warnings of the program; an error above 5 % needs one, or 1 % if easy |
 
 | scene | quantity | exact | default | error | order in h | at half the step | auto | warnings |
