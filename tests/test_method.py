@@ -187,7 +187,9 @@ def fluid(eos, strength="fluid, 0"):
         (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 30"), "",
          "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
         (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "", "method(ulmpm, FLIP, linear, 0.99)"),
-        (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 0"), "scheme(quasi-static)\nset_dt(1)",
+        (fluid("linear, 1000, 1e6", "mohr-coulomb, 5e5, 1e3, 0"),
+         "scheme(quasi-static)\nset_dt(1)\ngroup(g, nodes, region, box, all)\n"
+         "fix(press, velocity_nodes, g, 0, -1e-3)",
          "method(tlmpm, FLIP, Bernstein-quadratic, 1)"),
         (RUBBER, f"{OTHER}fix(rub, contact/friction, body, other, 0.2)",
          "method(ulmpm/contacts, FLIP, cubic-spline, 0.99)"),

@@ -161,7 +161,7 @@ def is_round(solid: Solid) -> bool:
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)
-    return bool(away.max() < 1.1 * radius)
+    return bool(away.max() < 1.05 * radius)
 
 
 def holds_shape(law: tuple) -> bool:
