@@ -23,6 +23,12 @@ SIZES = {  # finer than the two of `comparisons.auto`
     "slosh": ("0.5", "1", "2"), "taylor_green": ("0.5", "1", "2"),
     "plates": ("0.5", "1", "2"), "cantilever": ("0.5", "1", "2"),
 }  # fmt: skip
+TITLES = {
+    "axis_aligned": "Pulsating square", "bar": "Vibrating bar", "pulse": "Travelling pulse",
+    "energy_disk": "Vibrating disk", "turns": "Rotating disk", "rods": "Colliding rods",
+    "slope_27": "Block on a slope of 27 degrees", "sod": "Shock tube", "slosh": "Sloshing tank",
+    "taylor_green": "Taylor-Green vortices", "plates": "Plate impact", "cantilever": "Cantilever",
+}  # fmt: skip
 AFTER = {
     "APIC quadratic corrected": "method(ulmpm, APIC, quadratic-spline, mass=corrected)",
     "APIC cubic corrected": "method(ulmpm, APIC, cubic-spline, mass=corrected)",
@@ -45,8 +51,13 @@ EXACT = 1e-4  # errors below count as this
 Lines = Iterable[Sequence[dict]]  # the runs of each set-up, from coarse to fine
 
 
+def words_of(setup: str) -> str:
+    """Return the arguments of the method and scheme of a set-up."""
+    return SETUPS[setup][7:-1].replace(")\nscheme(", ", ").replace(", {domain}", "")
+
+
 def drawn(runs: Sequence[dict], cost: str) -> list[tuple[float, float]]:
-    """Cost and error of the runs that have one."""
+    """Return cost and error of the runs that have one."""
     return [(r[cost], max(r["error"], EXACT)) for r in runs if isfinite(r["error"])]
 
 
@@ -90,31 +101,38 @@ def main() -> None:
             line = {"color": plt.cm.tab20(k), "lw": 1.6 if new else 0.9, "ls": "-" if new else ":"}
             if setup == "auto":
                 line = {"color": "k", "marker": "*", "ms": 11, "ls": "", "zorder": 9}
-            axes.loglog(*zip(*good, strict=True) if good else ((), ()), label=setup, **line)
+            axes.loglog(
+                *zip(*good, strict=True) if good else ((), ()), label=words_of(setup), **line
+            )
         mine = found.pop("auto")
         usual = [runs for s, runs in found.items() if s not in AFTER]
         costs = covered(usual, cost)
         before, after = (least(costs, some, cost) for some in (usual, found.values()))
-        axes.loglog(costs, before, color="0.6", lw=5, alpha=0.5, label="least before")
-        axes.loglog(costs, after, color="r", lw=5, alpha=0.3, label="least now")
+        axes.loglog(costs, before, color="0.6", lw=5, alpha=0.5, label="least error, usual set-ups")
+        axes.loglog(costs, after, color="r", lw=5, alpha=0.3, label="least error, all set-ups")
         for k, (label, points) in enumerate(PUBLISHED.get(name, {}).items()):
             if cost == "cost":
                 axes.loglog(*zip(*points, strict=True), "sD"[k], color="b", mfc="none", label=label)
-                axes.annotate(label, points[0], fontsize=7, color="b")
-        axes.set_title(name)
+                axes.text(0.03, 0.03, label, fontsize=7, color="b", transform=axes.transAxes)
+        axes.set_title(TITLES[name])
         gains.append(float(np.mean(np.log(before / after))))
         ratios = [e / least(np.array([c]), found.values(), cost)[0] for c, e in drawn(mine, cost)]
         ends = (f"{100 * errors[-1]:.2g} %" for errors in (before, after))
-        cells = (f"`{name}`", *ends, f"{exp(gains[-1]):.2f}", f"{max(ratios, default=inf):.2f}")
+        cells = (
+            f"{TITLES[name]} (`{name}`)",
+            *ends,
+            f"{exp(gains[-1]):.2f}",
+            f"{max(ratios, default=inf):.2f}",
+        )
         print(f"| {' | '.join(cells)} |", flush=True)
     print(f"mean of log(error before / after) at equal cost: {np.mean(gains):.3f}, a factor of "
           f"{exp(np.mean(gains)):.2f}")  # fmt: skip
     words = "processor time of the steps (s)" if cost == "seconds" else "visited nodes"
     fig.supxlabel(words)
-    fig.supylabel("relative error; below 0.01 % counts as 0.01 %")
+    fig.supylabel("relative error; below 0.01 % counts as 0.01 %", x=-0.01)
     handles, labels = panels.flat[0].get_legend_handles_labels()
     fig.legend(
-        handles, labels, loc="lower center", ncols=7, fontsize=8, bbox_to_anchor=(0.5, -0.06)
+        handles, labels, loc="lower center", ncols=6, fontsize=8, bbox_to_anchor=(0.5, -0.09)
     )
     fig.tight_layout()
     picture = PICTURE if cost == "cost" else folder / "seconds.png"

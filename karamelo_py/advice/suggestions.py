@@ -16,8 +16,8 @@ from karamelo_py.script.errors import plural
 
 Words = Iterator[tuple[str, str]]
 
-# Core seconds (Intel Xeon) of a point in a step (linear), a log line, a picture, the first picture,
-# a file of points, a number in it.
+# Core seconds (Intel Xeon): point and step (linear), line of a log, picture, first picture, file of
+# points, number in this file.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 WORTHWHILE = 10.0  # seconds of output above which there is a suggestion
 

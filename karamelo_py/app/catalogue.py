@@ -41,7 +41,7 @@ def describe_parameter(parameter: Parameter) -> str:
     family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
     if parameter.keyword and parameter.optional and default is None:
         text = text.removesuffix(" or NULL")
-    if text == "anything":  # the command or style interprets it
+    if text == "anything":  # checked by the command or style
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]
     if parameter.variadic and parts[0].startswith("one of "):

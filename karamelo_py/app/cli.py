@@ -155,7 +155,7 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return launch.ERROR
     options.command_line = arguments
-    if options.act is not _run:  # `_run` calls it after its imports
+    if options.act is not _run:  # `_run` calls `begun` after its imports
         begun()
     with ExitStack() as options.ends:
         return options.act(options)

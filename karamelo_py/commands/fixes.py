@@ -138,7 +138,7 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
         expected = f"{kind}({ID}, {third}, {style}, ...)"
         raise ScriptError(message, mark=arguments[0].mark, expected=expected)
     if third and instead(kind, third):
-        registry.find(kind, third)  # its error suggests the name
+        registry.find(kind, third)  # raises an error that suggests a name
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:

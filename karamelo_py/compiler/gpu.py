@@ -214,7 +214,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 class Code(NamedTuple):
     name: str
-    code: bytes  # empty if it is to be read from disk
+    code: bytes  # empty: read the file
     file: str
     needs: tuple
     modules: frozenset[str]
@@ -339,7 +339,7 @@ class Counted(Emulator):
 
 class Card(_Coded):
     on_card = True
-    copies = 64  # of the totals; neighbouring threads use different ones
+    copies = 64  # copies of the totals, so that neighbouring threads rarely add to the same one
 
     def __init__(self) -> None:
         try:
@@ -361,7 +361,7 @@ class Card(_Coded):
             ) from error
         self._context = self._do("cuDevicePrimaryCtxRetain", device)
         self._do("cuCtxSetCurrent", self._context)
-        self._stream = self._do("cuStreamCreate", 0)  # copies wait for it
+        self._stream = self._do("cuStreamCreate", 0)  # copies wait for this stream
         about = driver.CUdevice_attribute
         major, minor = (
             self._do("cuDeviceGetAttribute", getattr(about, f"CU_DEVICE_ATTRIBUTE_{key}"), device)

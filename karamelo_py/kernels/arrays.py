@@ -197,7 +197,7 @@ HOOK = np.dtype([
     ("begin", np.int64),  # range of members; a begin of -1: all
     ("end", np.int64),
     ("slot", np.int64),  # slot of the published total; -1: none
-    ("uses_before", np.int64),  # uses the formulas one step earlier, too
+    ("uses_before", np.int64),  # also needs values of the formulas one step earlier
     ("uses_share", np.int64),  # uses 1 / number of members with mass
     ("holds", np.int64),  # sets or bounds the velocity
     ("uses_place", np.int64),  # formulas depend on position
@@ -284,11 +284,11 @@ STEP = np.dtype([
     ("courant", np.float64),  # stable step * rate / cell size
     ("courant_moving", np.float64),  # once points have moved
     ("kept", np.float64),  # FLIP coefficient
-    ("kept_by_time", np.float64),  # its power per stable step, or 0 if constant
+    ("kept_by_time", np.float64),  # exponent of `kept` per stable step; 0: `kept` is constant
     ("first_limit", np.float64),  # initial stable step
     ("limit", np.float64),  # stable step
     ("over_limit", np.int64),  # consecutive steps above the limit
-    ("watch_limit", np.int64),  # 1: they stop the run
+    ("watch_limit", np.int64),  # 1: steps above the limit stop the run
 ])  # fmt: skip
 # Motion of points (`kernels.clock`, `run.tiles`): lengths in cells
 MOTION = np.dtype([
@@ -338,7 +338,7 @@ ENERGY = np.dtype([
     ("to_and_fro", np.float64),  # time for waves through all bodies and back
     ("time_of_look", np.float64),
     ("lost", np.float64),  # largest relative loss by crossing cells
-    ("crossed", np.float64),  # cells that stressed material moved through
+    ("crossed", np.float64),  # number of cells through which stressed material has moved
     ("supplied", np.float64),  # largest work, of either sign
     ("energy_floor", np.float64),  # round-off
     ("windows", np.int64),  # consecutive windows with growth

@@ -276,7 +276,7 @@ def _clear_total(hooks, h, control):
 
 @noinline
 def publish_total(hooks, h, control):
-    totals.carry(control.totals[totals.WORK])  # it accumulates over steps
+    totals.carry(control.totals[totals.WORK])  # the work accumulates over steps
     first, count = _published(hooks, h)
     if count > 0:
         totals.publish(control, first, count)

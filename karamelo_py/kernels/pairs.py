@@ -263,7 +263,7 @@ def _rub(push, bodies, i, contact):
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
-    slid = push.step if grip[i, d] > 0 else 0.0  # 0 if it was not in contact before
+    slid = push.step if grip[i, d] > 0 else 0.0  # 0 for a point without contact before
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
     force = rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
     for k in range(d):

@@ -347,7 +347,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # NaN replaces it, too
+            # written so that NaN is stored, too
             heat.T_low = T if not heat.T_low <= T else heat.T_low
             heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)

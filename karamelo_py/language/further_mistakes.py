@@ -93,7 +93,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
 
     def follows(error: ScriptError) -> bool:
         if error.code == "unknown-ID":
-            # If an ID was repeated by mistake, unknown names of this kind follow from it.
+            # A repeated ID causes errors about unknown names of its kind.
             twice = {other.kind for other in seen.values() if other.code == "already-used"}
             return error.kind in twice | dependents.kinds
         if error.code == "already-used":

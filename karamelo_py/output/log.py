@@ -116,7 +116,7 @@ class Log(Rhythmic):
             # Line buffered: rows reach the file even if the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            self._is_kept = path.is_file()  # not so for /dev/null
+            self._is_kept = path.is_file()  # False for /dev/null
             for claimed in [self.hub.folder.resolve(), *[path] * self._is_kept]:
                 if (lock := claim(claimed)) is None:
                     raise ScriptError(
@@ -151,7 +151,7 @@ def _is_log(path: Path) -> bool:
     except UnicodeDecodeError:
         return False
     except OSError:
-        return True  # the error is reported when it is opened
+        return True  # opening the log reports the error
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))

@@ -218,7 +218,7 @@ class Picture:
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(float(self.title.get_fontsize()) * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # shorter titles begin there, too
+        self._widest = max(self._widest, min(wide, whole))  # so that titles do not jump
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))

@@ -43,7 +43,7 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # it warns of numbers that are not used here
+        with warnings.catch_warnings(action="ignore"):  # about numbers not used here
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None

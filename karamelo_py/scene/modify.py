@@ -138,8 +138,8 @@ class Fix(Publisher):
     order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
     # True: Python hooks add no energy except summed work. Otherwise the balance is not monitored.
     conserves = False
-    # ``between_steps()``, which returns True if it deleted points, is called after steps whose
-    # number is a multiple of this (0: never).
+    # Steps between calls of ``between_steps()``, which returns True if it deleted points;
+    # 0: no calls.
     every = 0
     friction: float | None = None  # between its two `solids`, in contact on the grid
     solids: tuple = ()  # if it has no group

@@ -15,7 +15,7 @@ CLOSES_NOTHING = (
 _PUNCTUATION = re.compile(
     r'"[^"\n]*"|#[^\n]*|(?<!&)&(?=[ \t]*(?:#.*)?(?:\n|\Z))|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]'
 )
-# A C++ comment in the line that ends there.
+# A C++ comment at the end of the text.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
 # Beginning of a file of Abaqus: empty lines, comments, a keyword.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")

@@ -19,7 +19,7 @@ class Primitive(region.Region):
     """Base of shapes that are bounded by planes along some axes and round in the others."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
-    across: Sequence[int] = ()  # axes in which it is round
+    across: Sequence[int] = ()  # axes across which the shape is round
     centre: Sequence[float] = ()
     radius: float
 
@@ -35,7 +35,7 @@ class Primitive(region.Region):
         if not self.across:
             return float(np.prod(sides))
         if (sides < (self.box_hi - self.box_lo)[: self.dimension]).take(self.across).any():
-            return None  # the domain cuts it
+            return None  # cut by the domain
         n = len(self.across)
         ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * self.radius**n
         return ball * math.prod(float(sides[axis]) for axis, *_ in self.slabs)

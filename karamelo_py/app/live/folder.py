@@ -86,7 +86,7 @@ class FolderPage:
 
     def _add(self, path: Path, index: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
-        if not len(columns.get("x", ())):  # it has no points or no positions
+        if not len(columns.get("x", ())):  # no points, or no positions
             return
         self._columns = self._columns or [name for name in columns if name not in "xyz"]
         if not self._states:

@@ -399,7 +399,7 @@ def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
     """Call Python's gamma, as bits differ between C libraries."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
-    name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt it
+    name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt gamma
     result = llvm.call(builder, name, double.type, [double, *failure])
     return llvm.cast(builder, result, types.float64, kind)
 

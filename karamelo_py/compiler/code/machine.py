@@ -113,5 +113,5 @@ def is_known(name: str) -> bool:
 def publish_python(name: str, kind: type, function: Callable) -> None:
     """Make a Python function, which must not raise, callable by code."""
     callback = kind(function)
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # code may call it until the end
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # never freed: code may call it
     publish(name, ctypes.cast(callback, ctypes.c_void_p).value)

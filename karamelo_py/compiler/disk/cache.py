@@ -116,7 +116,7 @@ def _words(thing: Any) -> str:
     if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
         named = _names_in(thing.__module__).get(thing.__name__)
         if named is thing or (hasattr(named, "function") and named.function is thing):
-            return f"{thing.__module__}:{thing.__name__}"  # determined by its source
+            return f"{thing.__module__}:{thing.__name__}"  # its source determines it
     function = thing.definition if hasattr(thing, "definition") else thing  # for an intrinsic
     if not isinstance(function, python.FunctionType):
         raise Unknown(repr(thing))
@@ -134,7 +134,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    Raise `Unknown` for a class not found by its name, if from a plug-in or `by_name`.
+    A class that its module does not contain raises `Unknown` if `by_name`, or in a plug-in.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -185,7 +185,7 @@ class KernelFiles:
         unit = self._found(key)
         if unit is None:
             with lock.lock(files.folder() / f"{key}.lock"):
-                # another process may have compiled it meanwhile
+                # another process may have compiled the unit meanwhile
                 unit = self._found(key)
                 if unit is None:
                     unit = compiled()

@@ -179,7 +179,7 @@ class Lowering:
         key = id(parent), k
         if key not in self.read:
             value = item_of(self.builder, parent._kind, parent._value, k)
-            self.read[key] = self.wrapped(parent._kind[k], value), parent  # preserves its id
+            self.read[key] = self.wrapped(parent._kind[k], value), parent  # its id stays unique
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: Any = None) -> ir.Function:

@@ -296,7 +296,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
-            if single and scalar == types.float64:  # it depends on literals only
+            if single and scalar == types.float64:  # a function of literals only
                 scalar = types.float32
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))

@@ -82,7 +82,7 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start again")
     candidates = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
-    if code.co_name == "<lambda>":  # it may be one of several in a line, or nested
+    if code.co_name == "<lambda>":  # a line may have several lambdas, or nested ones
         candidates = sorted(
             (n for n in candidates if _has(n.body, code)), key=lambda n: -n.body.col_offset
         )

@@ -34,7 +34,7 @@ class Strain(Task):
     def updated(task, pt, total, totals, fastest):
         """Update the state; report the growth of the domain in cells, and the rate."""
         w, (gradient, ratio, mapped) = pt.w, total
-        if not len(gradient):  # `Move` has gathered it
+        if not len(gradient):  # `Move` has gathered the gradient
             gradient = totals[0][2]
         dl = increment_at(w.kin, pt, gradient)
         if task.of_last_step:

@@ -12,7 +12,7 @@ from karamelo_py.points.kinematics import gradient, product, vector
 
 class Along(NamedTuple):
     first: int  # node number
-    r: float  # distance from it, in cells
+    r: float  # distance from that node, in cells
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
     affine: tuple[float, ...]  # N D^-1 (X_I - x), D = sum N (X_I - x)^2

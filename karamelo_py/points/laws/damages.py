@@ -46,7 +46,7 @@ def initiation(damage, memory):
 # triaxiality below which most metals do not fail
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
-# Damage grows from 0 to 1 while sum(strain over failure strain) grows from 1 to 1 + 1/this.
+# Damage is this number times (sum of strain over failure strain, minus 1), at most 1.
 _BRITTLENESS = 10.0
 
 

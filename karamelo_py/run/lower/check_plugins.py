@@ -78,7 +78,7 @@ def _try_hook(setup: Setup, fix: Fix, moment: str, hook: CompiledHook) -> None:
         ):
             try:
                 result = results(sample.tag, sample, Member(p, law, state, values, 1.0))
-            except ArithmeticError:  # sample numbers may cause it
+            except ArithmeticError:  # sample numbers may be outside the range of the law
                 continue
         expected = len(hook.writes) + hook.publishes
         if not isinstance(result, tuple) or len(result) != expected:

@@ -141,7 +141,7 @@ class _Builder:
         after_contact = late and fix.brakes and apart
         stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
         self.rows.append((address, stage, begin, end, slot, *uses))
-        whole = hook.tag is not None  # its functions are for all directions
+        whole = hook.tag is not None  # functions for all directions
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))

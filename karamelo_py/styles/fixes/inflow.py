@@ -104,7 +104,7 @@ class Inflow(VelocityNodes):
         self.entered = 0
         self._fill(hub, until)
         super().__init__(hub, group, *v)
-        self.held_directions = ()  # it is no wall: splines are not modified there
+        self.held_directions = ()  # not a wall: splines are not modified there
 
     def _inlet(self, hub: Hub) -> Inlet:
         """Return the cells of the solid, and upstream cells that its points reach."""

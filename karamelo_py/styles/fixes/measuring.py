@@ -17,19 +17,19 @@ def momentum_rate(pt):
     return pt.v, pt.x, pt.mass * pt.v / pt.kick
 
 
-# For each quantity: when it is measured in a step, and how, at nodes or points.
+# For each quantity: the stage of the step, and the hook at nodes or points that measures it.
 HOOKS = {
     "internal_force": ("post_particles_to_grid", node_hook(force_of_nodes)),
     "force": ("post_update_grid_state", node_hook(force_of_nodes)),
     "momentum_before": ("initial_integrate", point_hook(momentum_rate)),
     "momentum_after": ("final_integrate", point_hook(momentum_rate)),
 }
-# These run before all other fixes, whatever their order in the script.
+# Fixes for these quantities act before all other fixes.
 COME_FIRST = ("internal_force", "momentum_before")
 
 
 class Measuring(Fix):
-    """Sum one of `HOOKS`, or the ``external_force`` of fixes on points."""
+    """Publish the sum of a quantity of `HOOKS`, or of the ``external_force`` of fixes on points."""
 
     published = ("x", "y", "z")
 

@@ -246,7 +246,7 @@ class RigidBody(Fix):
                 kept.v = self.state.v
             if self.is_initial[1]:
                 kept.spin = self.state.spin
-            if not self.hub.update.step:  # its points may have been moved
+            if not self.hub.update.step:  # points may have been moved
                 kept.x = self.state.x
             self.state[:] = kept
             self._spin_up()
