@@ -40,7 +40,7 @@ def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
 
 
 NEXT_TO_NOTHING = 1e-9  # fraction of a step
-ROUNDING = 1e-6  # fraction of a step that counts as nothing, for a million additions
+ROUNDING = 1e-6  # fraction of a step: round-off of a million additions
 
 # If dt drops suddenly (set_dt), the dt of the contact stiffness decreases by this fraction per
 # step, so that loaded springs stiffen over several periods.

@@ -570,7 +570,7 @@ def _touch_pair(bodies, control, i, j, where):
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    # For a free body, the work on the other body counts; the balance excludes dissipation.
+    # With a free rigid body, only the work on the other body counts, without this heat.
     free = contact.free[a] != contact.free[b]
     work = 0.0 if free else -heat  # work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)

@@ -11,7 +11,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while"})
 
 @dataclass
 class Record:
-    """Executed statements, except of commands that may differ (:func:`registry.may_differ`).
+    """Executed statements, except commands in `registry.may_differ`.
 
     `values` has the results of value(...) by statement number.
     """

@@ -129,8 +129,8 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change velocities and positions of the points in a block. The energy balance
-        counts the energy as work.
+        `prepare` may change velocities and positions of the points in a block. In the balance, this
+        energy is work of loads.
         """
         if self.comm.leads:  # the next sort sends them to their processes
             blocks = []

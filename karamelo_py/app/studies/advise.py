@@ -73,13 +73,13 @@ def forecast(
     x: float, xs: Sequence[float], rows: Sequence[Row], accuracy: str, cost: str, *,
     highest: float = 4.0,
 ) -> Forecast | None:  # fmt: skip
-    """Forecast a run at `x` from the runs at `xs`, coarse ones first; None without two errors, or
-    if the last run got worse.
+    """Predict error and cost at `x` from runs at `xs`, coarse ones first.
 
-    The error continues with the last order, within bounds by the least and largest order, at least
-    33 % above and half below it; a falling order may fall as much again, and one below 2 may reach
-    2. Errors small by chance count as `credible`. The time is steps times (a + b points), fitted;
-    other costs continue as between the last two runs.
+    None with fewer than two errors, or if the last error is larger than the one before. The error
+    follows the last order, its bounds the smallest and largest order, at least 33 % above and half
+    below it; an order that fell may fall as much again, one below 2 may reach 2. Errors small by
+    chance count as `credible`. The time is steps times (a + b points), fitted; others follow the
+    last two runs.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -128,7 +128,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
-    warnings: tuple[str, ...] = ()  # of its finest run
+    warnings: tuple[str, ...] = ()  # of the finest run
 
     @property
     def label(self) -> str:

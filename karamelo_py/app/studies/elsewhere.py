@@ -1,9 +1,9 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
 A case travels as data: its variables, and names and hashes of the script and its files. A machine
-that does not find them where they lie here asks once for their contents, and for kernels that
-others have compiled. The log, the record and the files named by `-keep` come back; if the machine
-sees the folder of the study, it moves them there.
+without these files at the same paths asks once for their contents, and for kernels that others have
+compiled. The log, the record and files named by `-keep` are returned, or moved to the folder of the
+study if the machine has the same disk.
 """
 
 import asyncio
@@ -57,7 +57,7 @@ class Parcel(NamedTuple):
     """The data of a study that go with each case."""
 
     study: str  # folder of the runs, if the machine has the same disk
-    mark: str  # file in it, by which a machine finds that out
+    mark: str  # file in this folder, by which a machine checks this
     root: str  # folder of all files
     script: str  # path below it
     files: tuple[tuple[str, str], ...]  # paths below it, and hashes of contents
@@ -287,7 +287,7 @@ class Elsewhere:
         self.kernels: dict[str, bytes] = {}
         self.sent: Any = None
         self.places: dict[str, str] = {}  # machines by names of folders
-        self.gone = False  # Dask accepts cases then, and never ends them
+        self.gone = False  # Dask then accepts cases, but never finishes them
         self.loop = asyncio.new_event_loop()
         self.loop.set_exception_handler(lambda *_: None)  # cases that are left at the end
         Thread(target=self.loop.run_forever, daemon=True).start()
@@ -308,7 +308,7 @@ class Elsewhere:
         tries, contents = 1, ()
         while not self.gone:
             chosen: dict[str, Any] = {}
-            if self.refusing:  # a preference: Dask would wait for ever for a worker that has gone
+            if self.refusing:  # preferred only: a worker may have ended
                 chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
             try:
                 sent = self.executor.submit(
@@ -339,7 +339,7 @@ class Elsewhere:
                     return self._received(result, folder)
                 if tries > TRIES:
                     return killed(f"lost {TRIES} times: {reason}")
-                self.sent = None  # it may be lost, too
+                self.sent = None  # the sent files may be lost, too
                 self.workers()  # an error if the scheduler has gone
             except Exception as error:  # the scheduler does not answer, or a full disk here
                 self.gone = True

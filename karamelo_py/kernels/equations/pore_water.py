@@ -120,9 +120,9 @@ class WaterUpdate(StepField):
 class Flux(Field):
     """Mass flux per area (d,), an outflow, two pressures, another outflow.
 
-    The first outflow, per volume, is for closed nodes, where points retain the water; the last, a
-    mass per time, leaves through open nodes. The pressures are the mean at the node, and the mean
-    of the unseen part.
+    The first outflow (per volume) is computed for closed nodes and does not leave the points; the
+    last (mass per time) leaves through open nodes. The pressures are the mean at the node, and
+    the mean of the part that nodes do not see.
     """
 
     shape = numbers(4, 1)
