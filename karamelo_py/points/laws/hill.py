@@ -180,7 +180,7 @@ class Hill(NamedTuple):
         shear modulus of the strength is not used.
     angle, tilt, spin
         Rotation of the axes of yielding from x, y, z in degrees: by `angle` about z, by `tilt`
-        about the new axis 1, by `spin` about the new axis 3. The elastic material has others.
+        about the new axis 1, by `spin` about the new axis 3. Elastic axes are separate.
     R
         R-values (R0, R45, R90): strain across over strain through a sheet that is pulled at 0, 45
         and 90 degrees to axis 1, the rolling direction; axis 3 is through the sheet.

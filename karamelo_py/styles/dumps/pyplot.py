@@ -73,7 +73,7 @@ class PyPlot(Dump):
     scale
         log: colours show the logarithm of the field.
     quantile
-        Choose colour limits so that this fraction of the values, such as 0.01, is beyond each.
+        Fraction of the values, such as 0.01, below the colour limits, and as many above.
     dpi
         Pixels per inch, by default 100. With 300, a width of 600 gives 1800 pixels.
     fontsize
@@ -342,7 +342,7 @@ class Movie(PyPlot):
     file
         File name ending in .gif or, if the program ffmpeg is installed, .mp4.
     vmin, vmax
-        Limits of the colours; else a range that grows. ``karamelo-py view`` has one for all frames.
+        Limits of the colours. By default the range grows; in ``karamelo-py view`` it is constant.
 
     Example
     -------

@@ -63,8 +63,8 @@ class ContactSurface(StiffTool):
     radius follows the stretch along the normal, and is smaller if a point overlaps the region at
     the start. The force acts at the surface of the sphere. At the depth p it is k p + 0.02 m p'/dt,
     directed out of the region and never a pull, where k = 0.5 m/dt^2 at the first contact and dt is
-    as in contact/minimize_penetration. Friction, at most mu times this force, stops and reverses
-    the slip on the region with the same stiffness: it displaces a point at rest by at most mu p.
+    as in contact/minimize_penetration. Friction is a spring of the same stiffness against the slip,
+    with at most mu times this force: it displaces a point at rest by at most mu p.
 
     The spring conserves energy. Damping and friction dissipate it (``lost by contact`` in the
     summary of the run), which the balance counts as work of the fix. A disk that hits a wall at 5
