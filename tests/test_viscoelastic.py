@@ -410,7 +410,7 @@ def test_relaxation_below_the_step_is_reported(run_interpreted, more):
     [
         ("prony, rubber", "g=..., tau=... are missing"),
         ("prony, rubber, g=0.3", "tau=... is missing"),
-        ("prony, rubber, g=(0.3, 0.1), tau=1", "there are 2 fractions g and 1 times tau"),
+        ("prony, rubber, g=(0.3, 0.1), tau=1", "there are 2 fractions g and 1 time tau"),
         ("prony, rubber, g=1.3, tau=1", "sum to 1.3"),
         ("prony, rubber, g=(0.3, 0.2), tau=(1, 0)", "0 is not a number above 0"),
         ("prony, rubber, g=(0.3, x), tau=(1, 2)", "x is not a number above 0"),

@@ -13,7 +13,7 @@ import numpy as np
 
 from karamelo_py.app.live.server import require_plotly
 from karamelo_py.app.studies import keeping, look, pictures, records, results, uncertainty
-from karamelo_py.app.studies.case import Row, command_of, worded
+from karamelo_py.app.studies.case import COLUMNS, Row, command_of, worded
 from karamelo_py.app.studies.curves import Family, Table, column, order, require, sizes
 from karamelo_py.app.studies.study import plain_table, shown, terminal
 from karamelo_py.app.studies.variables import add_axes, along, holds, names, out_file
@@ -34,6 +34,7 @@ Pareto front (runs that none beats in both). Prints the same as a table, with fi
   karamelo-py chart sweep.csv -keeps E -by basis,transfer -o E.md    is an energy conserved?
   karamelo-py chart a.csv b.csv -accuracy err -versus digits -o d.png  two values, scene by scene"""
 SUFFIXES = (*pictures.SUFFIXES, ".html")
+WANTED = ("accuracy", "y", "curve", "keeps", "distribution")
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -41,7 +42,7 @@ def add_options(parser: ArgumentParser) -> None:
         "tables", type=Path, nargs="+", metavar="table",
         help="what karamelo-py sweep has written; several with -versus",
     )  # fmt: skip
-    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted = parser.add_mutually_exclusive_group()
     wanted.add_argument("-accuracy", metavar="COLUMN", help="column of the error")
     wanted.add_argument(
         "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
@@ -83,6 +84,9 @@ def run(options: Namespace) -> int:
     options.cost = options.cost or "seconds"
     if options.axes and (options.keeps or not (options.o or options.curve)):
         raise ScriptError("-axes", expected="-curve, or -accuracy or -y with -o")
+    if not any(vars(options)[name] for name in WANTED):
+        hint = f"karamelo-py chart {options.tables[0]} -accuracy error -o chart.png"
+        raise ScriptError("no column is named", expected=f"-{', -'.join(WANTED)}", hint=hint)
     if (options.law or options.data) and not options.y:
         raise ScriptError("-law and -data are drawn with -y", expected="-y COLUMN -x NAME")
     if options.versus:
@@ -173,8 +177,9 @@ def side_by_side(options: Namespace) -> int:
         values = two
         pairs += more
     if out is not None:
-        cost = look.label(options.cost).removesuffix(" (s)")
-        labels = along(options, look.label(options.accuracy), f"{cost},\n{values[1]} / {values[0]}")
+        cost = COLUMNS.get(options.cost, options.cost).removesuffix(" (s)")
+        accuracy = COLUMNS.get(options.accuracy, options.accuracy)
+        labels = along(options, accuracy, f"{cost},\n{values[1]} / {values[0]}")
         sheet = pictures.Sheet(out, *labels, options.title or "")
         pictures.draw_pairs(pairs, values, options.accuracy, sheet)
     pictures.tell_pairs(pairs, values, options.accuracy, options.cost)

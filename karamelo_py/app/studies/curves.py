@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from karamelo_py.app.studies import look
-from karamelo_py.app.studies.case import Row
+from karamelo_py.app.studies.case import COLUMNS, Row
 from karamelo_py.app.studies.records import SIGNED, value
 from karamelo_py.app.studies.variables import ScriptFiles, title_of
 from karamelo_py.output.units import labelled
@@ -125,7 +124,8 @@ class Table(NamedTuple):
 
     def label(self, name: str) -> str:
         path = Path(self.made.get("script", ""))
-        return labelled(look.label(name), ScriptFiles(path).unit(name) if path.is_file() else "")
+        unit = ScriptFiles(path).unit(name) if path.is_file() else ""
+        return labelled(COLUMNS.get(name, name), unit)
 
 
 @dataclass

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from karamelo_py.app.studies.case import COLUMNS
 from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.terms import number_of
 
@@ -97,10 +96,6 @@ def contrast(rgb: Sequence[float] | np.ndarray) -> float:
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
-
-
-def label(name: str) -> str:
-    return COLUMNS.get(name, name)
 
 
 def log_ticks(low: float, high: float) -> list[float]:
