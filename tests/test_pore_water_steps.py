@@ -292,8 +292,13 @@ def test_tension_beyond_one_bar_is_doubted(run_script):
 
 
 @pytest.mark.full
-def test_undrained_triaxial_compression_of_cam_clay(run_script):
-    """Roscoe & Burland 1968: q = M p, p = p0 2^-(1 - kappa/lam)."""
+@pytest.mark.parametrize("drained", [False, True])
+def test_triaxial_compression_of_cam_clay(run_script, drained):
+    """Roscoe & Burland 1968: q = M p at the critical state.
+
+    Undrained p = p0 2^-(1 - kappa/lam); drained q = 3 M p0/(3 - M), and ln(J) of the volume is -lam
+    ln(J p/p0) - (lam - kappa) ln(2).
+    """
     sides = "left", "front", "bottom", "right", "back", "top"
     lines = []
     for k, side in enumerate(sides):
@@ -304,9 +309,11 @@ def test_undrained_triaxial_compression_of_cam_clay(run_script):
     for k, side in enumerate(sides[:3]):
         v = ", ".join("0" if i == k else "NULL" for i in range(3))
         lines += [f"fix({side}, velocity_nodes, {side}, {v})"]
+    steps, each, strain = (40, 1e9, 0.6) if drained else (20, 1, 0.3)
     log = last(
         run_script(
-            """
+            f"""
+            v = {strain / (steps * each)}
             method(tlmpm, FLIP, linear, 1)
             scheme(quasi-static)
             dimension(3, 0, 1, 0, 1, 0, 1, 1)
@@ -314,27 +321,35 @@ def test_undrained_triaxial_compression_of_cam_clay(run_script):
             material(clay, cam-clay, 1590, 4e6, 1.0, 0.1, 0.02, 1e5)
             pore_water(clay, n=0.4, permeability=1e-9)
             solid(clay, region, cube, 2, clay, 1, 0)
+            compute(pores, probe, all, porosity)
+            J = 0.6/(1 - pores)
             """
             + "\n".join(lines)
-            + """
-            fix(press, velocity_nodes, top, NULL, NULL, -0.015)
-            # 1e5 Pa on sides of the area sqrt(height)
-            fix(cell_x, force_nodes, right, -1e5*sqrt(1 - 0.015*time), NULL, NULL)
-            fix(cell_y, force_nodes, back, NULL, -1e5*sqrt(1 - 0.015*time), NULL)
+            + f"""
+            fix(press, velocity_nodes, top, NULL, NULL, -v)
+            # 1e5 Pa on sides of the area sqrt(J height)
+            fix(cell_x, force_nodes, right, -1e5*sqrt(J*(1 - v*time)), NULL, NULL)
+            fix(cell_y, force_nodes, back, NULL, -1e5*sqrt(J*(1 - v*time)), NULL)
+            {"fix(drain, pore_pressure, top, 0)" if drained else ""}
             compute(s, probe, all, s11, s22, s33, pore_pressure)
             q = s_s11 - s_s33
             p = -(s_s11 + s_s22 + s_s33)/3
-            log_modify(custom, step, time, q, p, s_pore_pressure)
-            set_dt(1)
-            set_output(20)
-            run(20)
+            log_modify(custom, step, time, q, p, s_pore_pressure, J)
+            set_dt({each})
+            set_output(1)
+            run({steps})
             """
         )
     )
-    end = 1e5 * 2**-0.8
+    end = 1.5e5 if drained else 1e5 * 2**-0.8
     assert abs(log["p"] / end - 1) < 5e-4
     assert abs(log["q"] / end - 1) < 5e-4
-    assert abs(log["s_pore_pressure"] / (1e5 + end / 3 - end) - 1) < 2e-3
+    if drained:
+        ln_J = -(0.1 * np.log(1.5) + 0.08 * np.log(2)) / 1.1
+        assert abs(log["J"] / np.exp(ln_J) - 1) < 1e-4
+        assert abs(log["s_pore_pressure"]) < 1
+    else:
+        assert abs(log["s_pore_pressure"] / (1e5 + end / 3 - end) - 1) < 2e-3
 
 
 def test_rain_seeps_to_a_water_table_as_gardner_has_it(run_script):
