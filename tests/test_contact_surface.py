@@ -38,8 +38,11 @@ SLOPE = """
 
 @pytest.mark.parametrize(
     ("mu", "way", "share"),
-    [(0.2, "", 1), (0, "", 0), (0.2, ", 9*time*c, -9*time*s", -1)],
-    ids=["rough", "smooth", "belt"],
+    [
+        pytest.param(0.2, "", 1, id="rough"),
+        pytest.param(0, "", 0, id="smooth", marks=pytest.mark.full),
+        pytest.param(0.2, ", 9*time*c, -9*time*s", -1, id="belt"),
+    ],
 )
 def test_a_block_slides_down(run_script, mu, way, share):
     """Acceleration g (sin - mu cos), or g (sin + mu cos) on a belt that moves faster downhill.

@@ -36,7 +36,7 @@ def _run(run_interpreted, transfer, scheme="musl", thickness=0.5):
     [
         ("APIC, linear", 0.5),
         ("TPIC, linear", 0.25),
-        ("MLS, linear", 0.5),
+        pytest.param("MLS, linear", 0.5, marks=pytest.mark.full),
         ("AFLIP, linear, 1", 0.1),
     ],
 )

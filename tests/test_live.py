@@ -532,7 +532,9 @@ def test_a_study_is_followed_and_stopped(tmp_path):
     page.server.close()
 
 
-def test_who_stops_a_study_on_its_page_interrupts_it(tmp_path, monkeypatch, capsys):
+def test_who_stops_a_study_on_its_page_interrupts_it(
+    tmp_path, monkeypatch, capsys, starts_are_cheap
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     (tmp_path / "in.bar").write_text(BAR + "n = 2\nrun(n)\n", encoding="utf-8")

@@ -4,6 +4,7 @@ import re
 from math import sqrt
 
 import pytest
+from selection import few
 
 C = 10.0  # speed of sound, sqrt(1e5 / 1000)
 SCRIPT = """
@@ -24,7 +25,7 @@ run(150)
 """
 
 
-@pytest.mark.parametrize("transfer", ["APIC", "MLS", "TPIC"])
+@pytest.mark.parametrize("transfer", few(("APIC", "MLS", "TPIC"), "MLS", "TPIC"))
 def test_the_own_step_of_what_flows_bears_a_lone_point(run_interpreted, transfer):
     """Below 2 / (c sqrt(d / D)) = 0.707 h/c, D = h^2 / 4 of quadratic splines (Jiang et al. 2017).
 

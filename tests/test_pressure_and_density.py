@@ -55,7 +55,8 @@ def test_pressure_and_density_of_every_law(run_interpreted, law, d):
     if d == 3 and law not in ("soil", "linear"):
         pytest.skip("the same")
     text, pressure = LAWS[law]
-    done = run_interpreted(square(text, d))
+    drawn = law == "soil"
+    done = run_interpreted(square(text, d).replace("dump(f,", "dump(f," if drawn else "# dump(f,"))
     rows = (done.folder / "d.5.txt").read_text().partition("ITEM: ATOMS ")[2].splitlines()
     names = rows[0].split()
     table = dict(zip(names, np.loadtxt(rows[1:]).T, strict=True))
@@ -68,7 +69,7 @@ def test_pressure_and_density_of_every_law(run_interpreted, law, d):
     assert log.p[-1] == pytest.approx(table["p"][2]) and log.rho[-1] == pytest.approx(
         table["rho"][2]
     )
-    assert (done.folder / "f.5.png").exists() and "column" not in done.err
+    assert (done.folder / "f.5.png").exists() == drawn and "column" not in done.err
 
 
 def test_a_variable_with_the_name_of_a_column(run_interpreted):
