@@ -33,7 +33,7 @@ class BasicFacts:
         self.d, self.corners = hub.domain.dimension, 2**hub.domain.dimension
         self.moves = self.method.frame.moves  # updated frame: points move through the grid
         affine = stores_moment(self.transfer)
-        self.moments = self.moves and affine  # of moving points, with velocity moments or gradients
+        self.moments = self.moves and affine  # points move with velocity moments or gradients
         # D of affine transfers vanishes at some positions in a cell.
         self.vanishing = self.moves and not self.basis.traits.steady_moment
         self.kept = 0.0 if affine else flip_coefficient(self.transfer)  # FLIP coefficient

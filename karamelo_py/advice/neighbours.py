@@ -22,7 +22,7 @@ STEPS = 500  # fewer steps give no warning; the earliest failure was after 800
 class Uneven(NamedTuple):
     heavy: str = ""
     light: str = ""
-    ratio: float = 1.0  # of densities
+    ratio: float = 1.0  # ratio of densities
     courant: float = 0.0  # Courant number at the nodes of mostly light mass
 
     @property

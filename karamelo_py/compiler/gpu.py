@@ -458,7 +458,7 @@ def card() -> Card | Emulator:
 class _There(NamedTuple):
     address: int
     size: int
-    array: np.ndarray  # in program memory
+    array: np.ndarray  # array in the memory of the program
     image: np.ndarray  # same shape and strides, at a device address
 
 

@@ -68,7 +68,7 @@ def _taken_apart(x):
     """Split x = m 2^e, with m between sqrt(1/2) and sqrt(2), and e as a real number."""
     made = types.UniTuple(x, 2)
     number, whole, short, mantissa, _ = _bits(x)
-    root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # of 1/2
+    root = 0x3FE6A09E667F3BCD if mantissa == 52 else 0x3F3504F3  # bits of sqrt(1/2)
 
     def codegen(builder, value):
         bits = builder.bitcast(value, whole)

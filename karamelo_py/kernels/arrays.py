@@ -143,9 +143,9 @@ class Buffers(NamedTuple):
 class Locations(NamedTuple):
     """Locations of points in a sweep, each (w, n)."""
 
-    where: np.ndarray  # for weights
-    x: np.ndarray  # before the move
-    y: np.ndarray  # after the move
+    where: np.ndarray  # positions at which weights are computed
+    x: np.ndarray  # positions before the move
+    y: np.ndarray  # positions after the move
 
 
 class Block(NamedTuple):
@@ -297,7 +297,7 @@ MOTION = np.dtype([
     ("common", np.float64, (1, 3)),  # reference velocity for speeds
     ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
     ("wave", np.float64),  # wave speed when `common` was measured
-    ("speed", np.float64),  # of the fastest point
+    ("speed", np.float64),  # speed of the fastest point
     ("move", np.float64),  # largest move of a point in this step
     ("new_move", np.float64),
     ("stride", np.float64),
@@ -312,7 +312,7 @@ MOTION = np.dtype([
 ENERGY = np.dtype([
     ("watch_energy", np.int64),  # 1: the work of all loads is known
     ("level", np.float64),  # weight of the present stored energy in the balance
-    ("work", np.float64),  # of fixes
+    ("work", np.float64),  # work of fixes
     ("kinetic", np.float64),
     ("stored", np.float64),  # includes dissipated energy
     ("born_with", np.float64),  # initial internal energy of gases
@@ -324,7 +324,7 @@ ENERGY = np.dtype([
     ("first_balance", np.float64),
     ("first_work", np.float64),
     ("sum_of_balance", np.float64),  # sum over a window
-    ("last_balance", np.float64),  # at the previous check
+    ("last_balance", np.float64),  # balance at the previous check
     ("last_but_one", np.float64),
     ("first_few", np.float64),  # mean of the first checks
     ("first_mean", np.float64),  # mean of the first window

@@ -49,7 +49,7 @@ from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 # Squared sine of the scatter of a body's outward directions about their mean:
-SCATTER = 0.003  # for a plane face
+SCATTER = 0.003  # scatter of a plane face
 EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 MEMORY = 100  # steps after a contact in which shapeless bodies approach a wall slowly
@@ -123,11 +123,11 @@ def turn(kin, nodes, n, change, again):
 
 
 class Where(NamedTuple):
-    node: int  # in the first field
+    node: int  # number of the node in the first field
     x: tuple  # (d,)
     h: float
     dt: float
-    step: int  # from 1
+    step: int  # number of the step, from 1
 
 
 class Touched(NamedTuple):

@@ -34,9 +34,9 @@ class TouchingSurface(NamedTuple):
     members: np.ndarray  # (N,) bool by id
     clear: np.ndarray  # (N,) by id: distance within which there is no face
     mu: float
-    slot: int  # of the force on points
-    torque: int  # of its torque, or 0
-    area: int  # of the area of contact
+    slot: int  # slot of the force on points
+    torque: int  # slot of the torque, or 0
+    area: int  # slot of the area of contact
     lost: int  # address of a function for points without a way out
 
 
@@ -189,7 +189,7 @@ def _give_to_points(body, s, block, number, measures):
                 elif nodes.sums[n, arrays.MASS] > 0 and not reaction:
                     change = arrays.of_change(kin) + c
                     if measures:
-                        # with the mean velocity in the step, as for loads
+                        # work by the mean velocity in the step, as for loads
                         work += impulse * (nodes.update[n, c] - 0.5 * nodes.update[n, change])
                     else:
                         nodes.update[n, c] += impulse / nodes.sums[n, arrays.MASS]

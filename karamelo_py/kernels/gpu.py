@@ -220,7 +220,7 @@ class Stage:
             out = pt.w._replace(nodes=nodes_for(pt.w.nodes, rooms))
             template = load_all(quantities, pt)  # only its shape is used
             for q in range(first, last):
-                behind = cells.order[min(q + 1, last - 1)]  # for prefetching
+                behind = cells.order[min(q + 1, last - 1)]  # next point, to be prefetched
                 here = pt._replace(p=p)
                 stencil = locate(out.basis, out.kin, out.grid, location(here))
                 seen = stencil if corners == 1 else of_corner(stencil, corner)

@@ -64,7 +64,7 @@ class Act(NamedTuple):
     hooks: NamedTuple
     h: int
     heavy: np.ndarray  # (hooks,) members with mass
-    copies: np.ndarray  # of the totals
+    copies: np.ndarray  # copies of the totals
 
 
 def _member(hooks, h, i):

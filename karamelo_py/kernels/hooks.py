@@ -120,7 +120,7 @@ class CompiledHook(NamedTuple):
     tag: Callable | None = None  # makes the tag of a whole-point function
     reads: tuple = ()
     writes: tuple = ()
-    internal: bool = False  # not for plug-ins, and not on GPUs
+    internal: bool = False  # True: neither for plug-ins nor on GPUs
 
     @property
     def on_nodes(self) -> bool:

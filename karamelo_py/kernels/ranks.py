@@ -17,7 +17,7 @@ _call = caller_of(CALL)
 
 
 class Linked(NamedTuple):
-    address: int  # of ``(request, a, b) -> number``
+    address: int  # address of ``(request, a, b) -> number``
     foreign: np.ndarray  # (N,) uint8: 1 if another process adds the terms of a node
 
 

@@ -45,7 +45,7 @@ GIVEN_BACK = 0.1  # fraction of a penetration that is removed per step
 SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual over momentum, both as sums of p^2 / m
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope over initial slope
 SLOW = 1e-9  # collisions slower than this fraction of the fastest one are ignored
-COLLISIONS = 50  # at most, per contact
+COLLISIONS = 50  # largest number per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
 LINK = np.dtype([
@@ -104,7 +104,7 @@ class Links(NamedTuple):
     constants: np.ndarray  # (B + 1,) motion.CONSTANTS: start, bound
     free: np.ndarray  # (B + 1, 6) int64: index of the unknown, or -1
     u: np.ndarray  # (B + 1, 6) velocities
-    old: np.ndarray  # before the step
+    old: np.ndarray  # velocities before the step
     jump: np.ndarray  # velocity change by collisions
     trial: np.ndarray
     rest: np.ndarray

@@ -52,10 +52,10 @@ CONSTANTS = np.dtype([
 ])  # fmt: skip
 CONTACT = np.dtype([
     ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
-    ("mass", *_NUMBER), ("v", *_VECTOR),  # of the other body
+    ("mass", *_NUMBER), ("v", *_VECTOR),  # mass and velocity of the other body
     ("mu", *_NUMBER), ("share", *_NUMBER),  # s
     ("impulse", *_VECTOR),
-    # of the last iteration:
+    # values of the last iteration:
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
     ("most", *_NUMBER),  # friction bound
     ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point and its force

@@ -71,7 +71,7 @@ class Context(NamedTuple):
     averaging: Tag
     grids: Grid
     nodes: Nodes
-    buffers: Nodes  # to scatter to
+    buffers: Nodes  # nodes to which points scatter
     now: int
     room: Number  # cells that points may still move within the box of their tile
     stride: Number

@@ -23,7 +23,7 @@ class NodeTable(NamedTuple):
     hub: Scene
     ids: np.ndarray
     kin: Any
-    arrays: dict[str, np.ndarray]  # by name, as in restart files
+    arrays: dict[str, np.ndarray]  # arrays by name, as in restart files
     brought: dict[str, np.ndarray]  # sums over points, by names in `BROUGHT`
     loaded: dict[str, int]  # number of nodes with mass, by ID of fixes with a total force
 

@@ -33,7 +33,7 @@ class LoadPath(Named):
 
     increments: int
     duration: float
-    strain: Mapping[str, float]  # by component
+    strain: Mapping[str, float]  # strains by component
     stress: Mapping[str, float]
     shear: Sequence[str] = ()  # components with simple instead of pure shear
     volumetric: float | None = None  # sum of normal strains, of which free ones get equal parts

@@ -38,7 +38,7 @@ class SceneState(Protocol):
     moved_in_step: bool  # whether arrays are replaced after the first stage of a step
     implicit: bool
     notes_temperatures: bool
-    flags: tuple[bool, ...]  # for restart files, in addition to arrays
+    flags: tuple[bool, ...]  # stored in restart files, in addition to arrays
 
     @property
     def hooks(self) -> Hooks | NoHooks: ...

@@ -37,7 +37,7 @@ class Domain:
     """
 
     thin = False
-    thickness = 1.0  # in 2D; cross-section in 1D
+    thickness = 1.0  # thickness in 2D, cross-section in 1D
     across: Any = None  # fix that prescribes the strain across a 2D scene
     mark: Mark | None = None
     periodic: tuple[int, ...] = ()  # directions

@@ -59,7 +59,7 @@ class Publisher:
     # Suffixes of published values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
-    unit = NUMBER  # of the published values
+    unit = NUMBER  # unit of the published values
     restrictions: Restrictions | None = None  # options of a scene that it does not support
 
     def publish(self, name: str, value: float) -> None:
@@ -142,7 +142,7 @@ class Fix(Publisher):
     # 0: no calls.
     every = 0
     friction: float | None = None  # between its two `solids`, in contact on the grid
-    solids: tuple = ()  # if it has no group
+    solids: tuple = ()  # solids of a fix without a group
 
     def __init__(self, hub: Scene, group: Any = None):
         self.hub = hub

@@ -32,7 +32,7 @@ class Placement(NamedTuple):
     lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray
     outside: float = 0
-    shape: str = "box"  # or a meshio cell type
+    shape: str = "box"  # "box" or a meshio cell type
     corners: np.ndarray | None = None  # (n, c, d) of domains other than boxes
     missed: float = 0
 

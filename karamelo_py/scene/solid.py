@@ -127,7 +127,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.kin.hoops:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # on the axis it would have no mass
+            if count and radius.min() <= 0:  # a point on the axis would have no mass
                 raise ScriptError(
                     f"points at x = {radius.min():g}: x is the radius here "
                     f"({self.domain.kin.word}), and points lie at x > 0",

@@ -28,7 +28,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-MOST_STEPS = 2500  # after which points may leave the domain
+MOST_STEPS = 2500  # number of steps after which points may leave the domain
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
 ALONE = 0.5  # a component above this fraction of a step limits it

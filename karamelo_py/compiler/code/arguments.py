@@ -20,11 +20,11 @@ from karamelo_py.compiler.trace.session import session
 class _Array(NamedTuple):
     """An array that is in use; NumPy does not resize arrays with references."""
 
-    alive: weakref.ref  # as ids are reused after deletion
+    alive: weakref.ref  # detects a reused id
     shape: tuple[int, ...]
     writeable: bool
     kind: int  # equal for arrays of the same type
-    words: tuple[int, ...]  # as in kernels
+    words: tuple[int, ...]  # as kernels get them
 
 
 def _array(array: np.ndarray) -> _Array:
@@ -70,7 +70,7 @@ class Plan(NamedTuple):
     text: struct.Struct
     tuples: tuple[tuple[int, int], ...]  # index of each nested tuple's word, and its start
     first: int  # start of the arguments themselves
-    types: tuple[types.Type, ...]  # of the arguments
+    types: tuple[types.Type, ...]  # types of the arguments
 
 
 class ArgumentBuffer:

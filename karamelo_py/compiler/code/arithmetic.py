@@ -175,7 +175,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
     bad = None
     if not safe:
         bad = builder.icmp_signed("==", y, zero)
-        if kind.signed:  # for the smallest number divided by -1
+        if kind.signed:  # the smallest number divided by -1 overflows
             least = builder.icmp_signed("==", x, x.type(kind.minval))
             bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
         y = builder.select(bad, one, y)

@@ -58,7 +58,7 @@ class LoopHeader(NamedTuple):
     block: Any
     phis: list[Phi]
     names: dict[str, Any]
-    paths: list[tuple]  # of the phis: a name, and indices in tuples
+    paths: list[tuple]  # values that phis join: a name, and indices in tuples
 
 
 def is_value(thing: Any) -> bool:

@@ -58,7 +58,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from vars(error).get("places", ())  # in the compiled text
+    yield from vars(error).get("places", ())  # places in the compiled text
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 

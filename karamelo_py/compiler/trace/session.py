@@ -31,7 +31,7 @@ class Session:
         self.arrays: dict[int, Any] = {}  # passed to kernels, by id
         self.array_types: dict[tuple, int] = {}
         self.numbers = itertools.count()  # safe in threads
-        self.waits = True  # for other processes that compile; False after a timeout
+        self.waits = True  # wait for other processes that compile; False after a timeout
 
 
 session = Session()

@@ -185,7 +185,7 @@ _WORDS = {
 class AstCompiler:
     def __init__(self, walked: AstFunction, names: dict[str, Any], free: dict[str, Any]):
         self.walked, self.names, self.free = walked, names, free
-        self.depth = 0  # of branches and loops in the kernel
+        self.depth = 0  # depth of branches and loops in the kernel
         self.yielded: list = []
         self.goes = True  # False after a return or raise
         self.returns: list[Edge] = []

@@ -28,7 +28,7 @@ class NodeColumns(NamedTuple):
     array: Any
     first: Callable  # functions of the kinematics
     count: Callable
-    end: Callable  # with padding to registers
+    end: Callable  # end of a record, with padding to registers
 
 
 def _zero(kin):
@@ -112,7 +112,7 @@ class Task(NamedTuple):
 class Report(NamedTuple):
     """Result of a task for a point; NaN or infinite if the point failed."""
 
-    moved: Number  # in cells
+    moved: Number  # distance in cells
     rate: Number  # largest so far
 
 

@@ -27,13 +27,13 @@ class Axis(NamedTuple):
     first: int  # number of the first node
     stride: int  # difference of node numbers
     count: int  # nodes along the axis
-    period: int  # in cells
+    period: int  # period in cells
 
 
 class Seam(NamedTuple):
-    axes: tuple  # of `Axis`
+    axes: tuple  # tuple of `Axis`
     joined: tuple  # axes along which images coincide with nodes
-    shear: tuple = ()  # or `sheared.Shear`
+    shear: tuple = ()  # a `sheared.Shear` in a sheared cell
 
 
 def position_on(axis, n):

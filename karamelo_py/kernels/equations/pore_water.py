@@ -190,10 +190,10 @@ def water_v(pt):
 
 
 class WetPoint(NamedTuple):
-    m: arrays.Number  # of the water
-    v: tuple  # of the water
+    m: arrays.Number  # mass of the water
+    v: tuple  # velocity of the water
     drag: arrays.Number  # per relative velocity
-    volumes: tuple  # of the point and of pores; times pressure and its unseen part
+    volumes: tuple  # of point and pores; their products with the pressure and its unseen part
     p: arrays.Number
     area: tuple  # the volume as a stress
 

@@ -16,7 +16,7 @@ class Along(NamedTuple):
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
     affine: tuple[float, ...]  # N D^-1 (X_I - x), D = sum N (X_I - x)^2
-    ends: tuple[tuple[int, float], ...] = ()  # of a box: cell from `first`, position in the cell
+    ends: tuple[tuple[int, float], ...] = ()  # box ends: cell from `first`, position in cell
 
 
 class Stencil(NamedTuple):

@@ -115,7 +115,7 @@ def with_cracks(law: Directional, R: np.ndarray, residual: float) -> Directional
 
 class _Strengths(NamedTuple):
     elastic: Directional
-    cracked: Directional  # with a broken matrix
+    cracked: Directional  # law with a broken matrix
     X: float
     Xc: float
     Y: float

@@ -391,9 +391,9 @@ def _advance_hill(law, kin, state, dl, dt):
 
 class Residual(NamedTuple):
     excess: Any  # q_trial - Y q_trial/q(x/Y)
-    slope: Any  # by x
-    by_limit: Any  # by Y
-    by_squares: tuple  # by rate z^2, where q = Y
+    slope: Any  # derivative by x
+    by_limit: Any  # derivative by Y
+    by_squares: tuple  # derivatives by rate z^2, where q = Y
 
 
 def residual(law, squares, before, x, dt):
@@ -411,7 +411,7 @@ def residual(law, squares, before, x, dt):
     squared = total(left)
     falls = total([w * part * r for w, part, r in zip(left, parts, rates, strict=True)])
     ratio = trial / sqrt(squared)
-    rise = ratio * falls / squared  # of the ratio, by g
+    rise = ratio * falls / squared  # derivative of the ratio by g
     by_limit = g * rise - ratio
     by_squares = tuple([0.5 * trial * part * part / squared for part in parts])
     return Residual(trial - limit * ratio, hardening * by_limit - rise, by_limit, by_squares)

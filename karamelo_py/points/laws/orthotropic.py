@@ -19,7 +19,7 @@ from karamelo_py.script.errors import ScriptError
 
 # Voigt's order
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
-INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # of components in Voigt's order
+INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # numbers of components in Voigt's order
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)

@@ -25,7 +25,7 @@ class Thin(NamedTuple):
     law: Any
 
     in_lanes = True
-    trials = 3  # for small increments
+    trials = 3  # enough for small increments
 
 
 class ThinInLargeIncrements(Thin):
@@ -34,7 +34,7 @@ class ThinInLargeIncrements(Thin):
 
 
 class State(NamedTuple):
-    whole: Any  # of the inner law
+    whole: Any  # memory of the inner law
     across: Any  # thickness over initial thickness
     left: Any  # largest stress across that the trials of a step have left
     largest: Any  # largest component of stress so far

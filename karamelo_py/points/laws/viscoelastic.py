@@ -224,7 +224,7 @@ class State(NamedTuple):
     branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
     gone: Any  # energy of the elastic law not stored, per reference volume
-    stiffness: Any  # in shear, of the last strain, over that at rest
+    stiffness: Any  # shear stiffness of the last strain over the stiffness at rest
 
 
 def at_rest(branches, kin):

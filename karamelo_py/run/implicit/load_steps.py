@@ -61,7 +61,7 @@ class LoadSteps:
         self.cached: dict[str, np.ndarray] = {}  # arrays of the last equations
         self.parts = 0
         self.failure = ""  # reason why a step has no equilibrium
-        self.unknowns = self.corrections = 0  # of the last equilibrium; of all steps
+        self.unknowns = self.corrections = 0  # number in the last equilibrium; number in all steps
         self.seconds: dict[str, float] = {}  # time by stage
 
     def advance(self, hooks: Tag, count: int) -> int:

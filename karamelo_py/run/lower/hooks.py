@@ -186,13 +186,13 @@ class ActingFixes:
     def __init__(self, simulation: SceneState, fixes: list[Fix]):
         self.simulation, self.fixes = simulation, fixes
         wet = is_wet(simulation.hub)
-        self.functions = [  # by row
+        self.functions = [  # functions by row
             hook.function
             for fix, _, hook in compiled_hooks(fixes)
             for _ in range(1 + (fix.accelerates and wet))
         ]
         self.compiled = lower_hooks(simulation.hub, fixes, simulation.mode, simulation.threads)
-        self.in_python: dict[int, list[tuple[Fix, Callable]]] = {}  # by stage
+        self.in_python: dict[int, list[tuple[Fix, Callable]]] = {}  # hooks by stage
         for fix in fixes:
             for name, hook in fix.hooks().items():
                 if not isinstance(hook, CompiledHook):

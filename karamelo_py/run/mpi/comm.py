@@ -59,8 +59,8 @@ class MpiComm(SerialComm):
         # With pkl5, messages may exceed 2 GB.
         self.world = world = pkl5.Intracomm(MPI.COMM_WORLD)
         self.rank, self.size = world.Get_rank(), world.Get_size()
-        self._aside = world.Dup()  # for agreement, independent of other messages
-        self._between = world.Dup()  # for messages within steps
+        self._aside = world.Dup()  # agreements, independent of other messages
+        self._between = world.Dup()  # messages within steps
         cores = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
         mine = socket.gethostname(), cores
         self.beside = self.allgather(mine).count(mine)

@@ -198,7 +198,7 @@ class MinPosition(MaxPosition):
     extreme = staticmethod(np.min)
 
 
-BITS = 8  # of a coordinate examined at a time
+BITS = 8  # number of bits of a coordinate examined at a time
 SIGN = np.uint64(1 << 63)
 
 

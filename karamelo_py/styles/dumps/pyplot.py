@@ -240,7 +240,7 @@ class PyPlot(Dump):
         volume = columns["volume"]
         if hoops := domain.kin.hoops:
             x = columns["x"]
-            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0)) ** hoops  # of a ring to area
+            volume = volume / np.maximum(x, 1e-3 * x.max(initial=0.0)) ** hoops  # area of a ring
         some = volume[columns["id"] % -(-self.hub.fields.count // SAMPLE) == 0]
         return float(np.median(some)) ** (1 / domain.dimension) if len(some) else 0.0
 

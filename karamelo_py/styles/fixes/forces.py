@@ -195,7 +195,7 @@ class PointForces(Fix):
     published: tuple[str, ...] = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = exerts = True
-    conserves = True  # apart from the work of the forces, which is summed
+    conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)

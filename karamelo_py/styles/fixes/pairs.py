@@ -41,7 +41,7 @@ class PairContact(Gripping):
     published = ("x", "y", "z")
     point_fields = (Force, WorkOfForces)
     point_by_point = exerts = True
-    conserves = True  # apart from the work of the forces, which is summed
+    conserves = True  # except the work of the forces, which is summed
 
     def __init__(self, hub: Hub, solid1: Solid, solid2: Solid):
         super().__init__(hub, ParticleGroup(hub, everything=True))

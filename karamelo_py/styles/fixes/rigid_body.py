@@ -364,7 +364,7 @@ class RigidBody(Fix):
             centre[0] = 0
         arm = x - centre
         side = (np.asarray(solid.volume0, float) / self.hub.domain.depth(solid.x0)) ** (1 / d)
-        about_centre = m * side**2 / 12  # of a square or cube, about each axis across
+        about_centre = m * side**2 / 12  # inertia of a square or cube
         square = np.einsum("n,ni,nj->ij", m, arm, arm)
         square[range(d), range(d)] += about_centre.sum()
         tensor = np.trace(square) * np.eye(3) - square

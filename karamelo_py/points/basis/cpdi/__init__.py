@@ -101,9 +101,9 @@ class Corner(NamedTuple):
 
 class CornerStencil(NamedTuple):
     corners: tuple[Corner, ...]
-    weights: tuple[float, ...]  # of corners
+    weights: tuple[float, ...]  # weights of corners
     gradients: tuple[Any, ...]
-    point: tuple[float, ...]  # in cells
+    point: tuple[float, ...]  # position in cells
     centre: Any  # sum_I N_I X_I in cells, a vector
     spread: tuple[float, ...]  # D of affine transfers: xx yy (zz) xy (xz yz)
     inv_r: float
