@@ -352,6 +352,7 @@ def _list_joint(links, joint, dt, kick):
         link = links.rows[links.count[0]]
         link.kind, link.first, link.second, link.constant = kind, a, b, 0.0
         link.slot, link.torque, link.sign = joint.slot, joint.torque, 1.0
+        link.mu = link.most = 0.0
         for c in range(3):
             link.at[c], link.hit[c] = ends[1][c], 0.0
             axis = motion.from_start(
@@ -622,13 +623,7 @@ def _solve(links, bodies):
             links.u[n, a] = body.solution.u[a]
     _iterate(links, bodies, True)
     for _ in range(motion.BOUNDS_AT_MOST):
-        change = largest = 0.0
-        for i in range(links.count[0]):
-            link = links.rows[i]
-            bound = link.mu * link.push if link.kind == CONTACT else 0.0
-            change, largest = max(change, abs(bound - link.most)), max(largest, bound)
-            link.most = bound
-        if change <= 1e-10 * largest:
+        if motion.bounds_are_settled(links.rows, links.count[0]):
             return
         _iterate(links, bodies, True)
     for body in bodies:

@@ -391,6 +391,18 @@ def _iterate(body, dt, bounded):
 
 
 @noinline
+def bounds_are_settled(contacts, count):
+    """Bound friction by the last normal impulses; return whether the bounds remain the same."""
+    change = largest = 0.0
+    for i in range(count):
+        c = contacts[i]
+        bound = c.mu * c.push
+        change, largest = max(change, abs(bound - c.most)), max(largest, bound)
+        c.most = bound
+    return change <= 1e-10 * largest
+
+
+@noinline
 def solve(body, dt):
     state = body.state[0]
     state.passes = 0
@@ -398,13 +410,7 @@ def solve(body, dt):
         return
     # With friction bounds by the previous normal impulses, the problem is convex.
     for _ in range(BOUNDS_AT_MOST):
-        change = largest = 0.0
-        for i in range(body.count[0]):
-            c = body.contacts[i]
-            bound = c.mu * c.push
-            change, largest = max(change, abs(bound - c.most)), max(largest, bound)
-            c.most = bound
-        if change <= 1e-10 * largest:
+        if bounds_are_settled(body.contacts, body.count[0]):
             return
         _iterate(body, dt, True)
     state.failed += 1
