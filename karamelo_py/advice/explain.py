@@ -171,8 +171,7 @@ def _wrong_point(hub: Hub, simulation: Simulation, smaller: str) -> Trouble:
         if simulation.steps.above_limit():
             seen = f"{name} at {where(old)} is thrown out of the domain"
             return Trouble(seen, smaller, "point-lost")
-        body = moved(hub).get(solid_with(hub, number))
-        if body is not None:
+        if body := moved(hub).get(solid_with(hub, number)):
             seen = f"the rigid body '{body.moves.id}' leaves the domain at {where(new)}"
             hint = "a larger domain, or a region that stops it, with fix contact/bodies"
             return Trouble(f"{seen} (point {number})", hint, "body-left")
