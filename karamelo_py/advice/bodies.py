@@ -115,7 +115,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
 def lag_of(facts: BasicFacts) -> Lag:
     """Return the lag of a free rotation in the total frame.
 
-    Nodes have the moment of inertia sum m r^2 of the points without sum m tr D.
+    The moment of inertia of the nodes is sum m r^2 of the points minus sum m tr D.
     """
     most = Lag()
     if facts.moves or facts.d == 1 or facts.hub.domain.kin.hoops:

@@ -191,7 +191,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
 
 
 def choose(hub: Hub) -> Chosen:
-    """Choose a row for this scene; raises ScriptError for later mistakes."""
+    """Choose a row for this scene; mistakes further on in the script raise ScriptError."""
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
         return Chosen(RESUMED, lines)  # a longer run may have another row
     if hub.rehearsing:

@@ -49,7 +49,7 @@ def accumulate(array: Any, i: int | Weighted, first: int, values: tuple) -> None
 
 
 def accumulate_affine(parts, nodes, weights):
-    """Add affine fields times the weights to nodes; () for weights of 1.
+    """Add affine fields times `weights` (() for 1) to the sums of nodes.
 
     A part is an array, its first component, the value at the first node, and increments
     ``slopes[d]`` from node to node along axis `d`, or () if it is constant. Nodes form a square or

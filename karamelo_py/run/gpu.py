@@ -204,7 +204,7 @@ class StepsOnCard:
             yield self.launch(gpu.order_cell, cells.cell.size, cells, come_from)
             tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
             room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
-            if room.nbytes < most:  # the memory of cell sums is not used meanwhile
+            if room.nbytes < most:  # else reuse the memory of cell sums
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
                 target = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)

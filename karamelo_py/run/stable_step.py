@@ -39,7 +39,7 @@ CORRECTED_TOTAL = 0.7
 # Instead of LONE: in splashes of a dam break with two points per cell, energy grew at 0.43 h/c, but
 # not at 0.38 h/c.
 CORRECTED_LONE = 0.55
-DAMPED = 0.5  # smallest default fraction with one point per cell, if a part of PIC damps
+DAMPED = 0.5  # smallest default fraction with one point per cell, if the transfer damps
 
 
 def one_a_cell(solid: Solid) -> bool:

@@ -86,7 +86,7 @@ def _stamp(name: str) -> str:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
-        if not one.startswith(__package__.partition(".")[0]):  # others obey the import contract
+        if not one.startswith(__package__.partition(".")[0]):  # a plug-in: imports are not known
             named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))

@@ -69,8 +69,8 @@ def point_function(
     They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, which select them at
     compile time. With ``otherwise`` the decorated function is the default.
 
-    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Those in
-    ``scalarised`` of a class, because they branch, are called point by point.
+    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Functions in
+    ``scalarised`` of a class, which branch, are called point by point.
     """
 
     def declare(stub: Callable) -> PointFunction:

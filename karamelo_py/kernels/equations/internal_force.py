@@ -78,9 +78,9 @@ def stretch_levers(pt, growth, mean):
 
 
 def follow_strain(pt, v, dt):
-    """Let contact depth and the work of forces follow the re-mapped velocity v (d,).
+    """Correct contact depth and the work of forces to the re-mapped velocity v (d,).
 
-    Points have moved with v*, but are strained by v, which differs by a part of dt f / m. A contact
+    Points have moved with v*, but v strains them; the difference is a part of dt f / m. A contact
     spring that followed v* would generate energy.
     """
     further = dt * v - (pt.y - pt.x)

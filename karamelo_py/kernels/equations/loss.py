@@ -28,8 +28,8 @@ from karamelo_py.points import laws, transfers
 from karamelo_py.points.transfers.xpic import Reflected, Series
 
 OnePoint = namedtuple("OnePoint", "mass v moment")  # for `transfers.nodal_momentum`
-# Fraction of the mass at its nodes (per dimension) above which a point loses its moment. With one
-# point per cell, at nodes, it is 0.594 with quadratic splines, and less with other bases.
+# A point with more than this fraction (per dimension) of the mass of its nodes loses its moment.
+# With one point per cell, at nodes, it is 0.594 with quadratic splines, less with other bases.
 ALONE = 0.6
 
 

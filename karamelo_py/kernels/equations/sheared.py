@@ -79,7 +79,7 @@ def _fold(images, nodes, array, n, fast):
 
 
 def _spread(images, nodes, array, n, first):
-    """Set an image's velocity times mass, in columns from `first` (along x) on."""
+    """Set velocity times mass of an image, from column `first` (along x) on."""
     sums, j = nodes.sums, _place(images.across, n)
     side = 0
     if j >= images.across.period:

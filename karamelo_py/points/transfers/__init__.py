@@ -54,7 +54,7 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, template):
-    """Return which fractions (2,) of the energy removed by mapping to the nodes and back are lost.
+    """Return the lost fractions (2,) of the energy that mapping to the nodes and back removes.
 
     Stored moments return the rest. If this is not defined, the loss is not recorded.
     """
