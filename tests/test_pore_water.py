@@ -374,3 +374,41 @@ def test_the_density_of_saturated_soil_is_doubted(run_interpreted):
     saturated = SCENE.format(**USUAL).replace("1590", "1990")
     assert "3.3 times as dense as water" in run_interpreted(saturated).err
     assert "as dense as water" not in run_interpreted(SCENE.format(**USUAL)).err
+
+
+@pytest.mark.full
+def test_a_drained_column_runs_out_as_dry_sand_does(run_script):
+    """Lube et al. 2005: (l - l0)/l0 = 1.2 for a height of half the width, at any density."""
+    script = """
+        g = 9.81
+        K = 1e5
+        nu = 0.3
+        l0 = 0.1
+        h = l0/10
+        method(ulmpm, FLIP, quadratic-spline, 0.999)
+        dimension(2, 0, 3*l0, 0, l0 + 2*h, h)
+        region(column, block, 0, l0, 0, l0)
+        eos(sand, linear, 1600, K)
+        strength(sand, mohr-coulomb, 3*K*(1 - 2*nu)/(2*(1 + nu)), 0, 31, 0)
+        material(sand, eos-strength, sand, sand)
+        pore_water(sand, n=0.4, permeability=0.1, K=2e6)
+        solid(column, region, column, 2, sand, h)
+        region(middle, block, -INF, 0, -INF, INF)
+        region(floor, block, -INF, INF, -INF, 0)
+        group(middle, nodes, region, middle, all)
+        group(floor, nodes, region, floor, all)
+        fix(middle, velocity_nodes, middle, 0, NULL)
+        fix(floor, velocity_nodes, floor, 0, 0)
+        fix(drain, pore_pressure, all, 0)
+        fix(weight, body_force, all, 0, -g)
+        K0 = nu/(1 - nu)
+        p = 2000*g*(l0 - y0)
+        fix(rest, initial_stress, all, -K0*p, -p, -K0*p, 0, 0, 0)
+        compute(toe, position_quantile, all, 0.995)
+        runout = (toe_x - l0)/l0
+        dt_factor(0.5)
+        set_output(100000)
+        log_modify(custom, step, runout)
+        run_time(0.6)
+    """
+    assert abs(last(run_script(script))["runout"] / 1.2 - 1) < 0.1
