@@ -88,6 +88,20 @@ def test_a_sphere_sinks_in_a_viscous_liquid(run_script, refine, within):
     assert late(log, "b_fy", 0.5) == pytest.approx(11 * 0.89 * 2 / 3, rel=0.02)  # weight per radian
 
 
+@pytest.mark.parametrize(
+    ("refine", "period"),
+    [(0.8, 0), *(pytest.param(*one, marks=FULL) for one in ((1, 0.2), (2, 0.1)))],
+)
+def test_a_sphere_heaves(run_script, refine, period):
+    """Zeros after 1.152, 3.414 and 5.609 s: CFD of NREL in IEA OES Task 10 (Wendt et al. 2017)."""
+    words = ("-var", "refine", f"{refine}", *(() if period else ("-var", "T", "1.5")))
+    log = run_script(INPUTS / "in.heave", *words).log
+    zeros = log.Time[np.flatnonzero(np.diff(np.sign(log.heave)))]
+    assert zeros[0] == pytest.approx(1.152, rel=0.15)
+    if period:
+        assert zeros[2] - zeros[0] == pytest.approx(5.609 - 1.152, rel=period)
+
+
 @pytest.mark.parametrize("refine", [1, pytest.param(1.5, marks=FULL)])
 def test_a_projectile_goes_through_a_plate(run_script, refine):
     """181.1 m/s remain (Borvik et al. 2002, unconfirmed), and of 350 what Recht & Ipson say."""
