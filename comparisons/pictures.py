@@ -60,7 +60,8 @@ def finish(axes: Any, about: str) -> None:
     title = about.splitlines()[0].partition(":")[0].rstrip(".")
     axes.set_title(fill(title, 70), fontsize=9)
     named = {line: str(line.get_label()).partition(",")[0] for line in axes.get_lines()}
-    known = {line: word for line, word in named.items() if look.has_number(word)}
+    styled = {word for family in look.FAMILIES for word in family}
+    known = {line: word for line, word in named.items() if word in styled}
     for line, method in known.items() if len({*known.values()}) == len(known) else ():
         line.set_color(look.PALETTE[look.number(method) or -1])  # black is what is exact
     for axis, ends in ((axes.xaxis, axes.dataLim.intervalx), (axes.yaxis, axes.dataLim.intervaly)):
