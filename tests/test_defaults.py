@@ -19,7 +19,8 @@ def test_script_is_whole(run_interpreted, name):
 
 def test_errors_of_the_page_are_shares_of_the_exact_numbers():
     """As far as numbers of four digits tell."""
-    rows = [line.split(" | ") for line in PAGE.read_text("utf-8").splitlines() if line.startswith("| `in.")]
+    lines = PAGE.read_text("utf-8").splitlines()
+    rows = [line.split(" | ") for line in lines if line.startswith("| `in.")]
     assert len(rows) == len(defaults.names())
     for scene, _, exact, default, error, *_ in rows:
         case = defaults.case(scene.strip("| `").removeprefix("in."))
