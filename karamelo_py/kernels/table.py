@@ -6,6 +6,7 @@ first scatter joins the last pass of the previous step; the text of `karamelo-py
 memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
 """
 
+from collections import namedtuple
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -75,9 +76,14 @@ class Gather(NamedTuple):
     of_last_step: bool = False  # uses the velocity before the update
 
 
-class Scatter(NamedTuple):
-    quantities: tuple
-    weights: NamedTuple = PresentWeights()
+class Scatter(namedtuple("Scatter", "quantities weights")):
+    """Quantities to the grid: a tuple of them, or a single one."""
+
+    __slots__ = ()
+
+    def __new__(cls, quantities: Any, weights: Any = PresentWeights()) -> "Scatter":  # noqa: B008
+        several = type(quantities) is tuple
+        return super().__new__(cls, quantities if several else (quantities,), weights)
 
 
 class NodeTask(NamedTuple):
@@ -278,9 +284,8 @@ def says(row: Any, setup: Any) -> str | None:
     """Describe a row with the parts that join it in a scene; None for a row without effect."""
     return _described.find((type(row),))(row, setup)
 
-    # Kinds of rows that are replaced before a step.
 
-
+# Kinds of rows that are replaced before a step.
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
@@ -504,7 +509,7 @@ SERIES = SceneTask(sum_series, "series of XPIC")
 BEGIN = AtPoints(arrays.INITIAL_INTEGRATE, 0)
 END = AtPoints(arrays.FINAL_INTEGRATE, 1)
 SUMS = Scatter((MassMomentum(), InternalForce()))
-MASS_AND_MOMENTUM = Scatter((MassMomentum(),))
+MASS_AND_MOMENTUM = Scatter(MassMomentum())
 # Nodal velocity before the forces, for schemes that strain first.
 VELOCITY_BEFORE = (
     MASS_AND_MOMENTUM,
@@ -513,7 +518,7 @@ VELOCITY_BEFORE = (
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_VELOCITY),
     CONTACT_BEFORE,
 )
-FORCE = Scatter((InternalForce(),), OldWeights())
+FORCE = Scatter(InternalForce(), OldWeights())
 # v* = v + dt f / m with loads, prescribed velocities and contact; heat flow.
 UPDATE = (
     SceneTask(sort_in_time),
@@ -538,7 +543,7 @@ MOVE = (
 )
 # Velocities of the moved points, mapped again.
 MOMENTUM_AGAIN = (
-    Scatter((MomentumAgain(),), OldWeights()),
+    Scatter(MomentumAgain(), OldWeights()),
     SEAM_AGAIN,
     NodeTask(nodes.MomentumToVelocity()),
     AXIS,
@@ -546,3 +551,14 @@ MOMENTUM_AGAIN = (
     CONTACT_AFTER,
     WorkOfLoads(again=True),
 )
+
+
+def shown_sums(rows: Iterable[Any]) -> tuple:
+    """List the quantities of `SUMS`, and others that a scheme scatters before the points move."""
+    found = {type(one): one for one in SUMS.quantities}
+    for row in rows:
+        if isinstance(row, Gather) and isinstance(row.task, Move):
+            break
+        if isinstance(row, Scatter):
+            found |= {type(one): one for one in row.quantities}
+    return tuple(found.values())

@@ -17,7 +17,7 @@ from karamelo_py.kernels.equations.node_updates import SumsToVelocity
 from karamelo_py.kernels.heat import SHOW, Conducting
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.kernels.sweep import Extent, Visit, sweep, sweep_nodes
-from karamelo_py.kernels.table import SEAM, SUMS
+from karamelo_py.kernels.table import SEAM, SUMS, shown_sums
 from karamelo_py.output.fields import Fields
 from karamelo_py.points.laws import law_kind
 from karamelo_py.points.laws.further import without_rate
@@ -238,9 +238,8 @@ class SceneArrays:
         self.sort_if_due()
         s = self.setup
         dt = step_size(s)
-        sweep(
-            s, self.mode, Visit((), SUMS.quantities, SUMS.weights), Extent(dt, False, True, False)
-        )
+        visit = Visit((), shown_sums(self.hub.update.scheme.rows), SUMS.weights)
+        sweep(s, self.mode, visit, Extent(dt, False, True, False))
         all_well(s)
         take_rows((SEAM,), s, self.mode, NoHooks())
         sweep_nodes(self.mode, SumsToVelocity(), s, dt)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real
 from karamelo_py.compiler.fields import SummedField, field, scalar, vector
 from karamelo_py.compiler.lanes import of_present
-from karamelo_py.compiler.tuples import flat
+from karamelo_py.compiler.tuples import flat, nested_as
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Nodes, Number, Tag, of_force
 from karamelo_py.kernels.records import accumulate
@@ -149,12 +149,20 @@ def affine_part(quantity, w, stencil, load):
 def _register(kind: Any) -> None:
     groups = [(array, (*sums,)) for array, sums in groupby(kind.gives, lambda one: one.into.array)]
     made, takes = namedtuple("Load", kind.takes), tuple(kind.takes.values())  # type: ignore[misc]
+    zero_in_gaps = kind.__module__.startswith(__name__)  # each of these takes a mass, or its like
+    for take in takes:
+        if not hasattr(take, "reads"):
+            says = f"put @eq.reads(...) before {take.__name__}, with the fields of points it reads"
+            raise TypeError(f'{kind.__name__}: {says}, as in @eq.reads("v")')
     names = [name for take in takes for name in take.reads]
     kind.reads = tuple(dict.fromkeys((*kind.also_reads, *names)))
 
     @load_of.on(kind)
     def load_of_point(quantity, pt):
-        return made(*[take(pt) for take in takes])
+        load = tuple([take(pt) for take in takes])
+        if not zero_in_gaps:
+            load = nested_as(load, [of_present(pt.p, number) for number in flat(load)])
+        return made(*load)
 
     @scattered.on(kind)
     def scatter(quantity, load, node):
