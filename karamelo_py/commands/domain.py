@@ -150,8 +150,8 @@ def boundary(
     rigid bodies or pore_water.
 
     With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
-    initial_velocity_particles), without F-bar. Momentum is conserved to round-off; energy is not
-    monitored.
+    initial_velocity_particles), without F-bar. Momentum is conserved to round-off. The energy
+    balance is not monitored.
 
     In tlmpm and tlcpdi, the command has no effect: the separate grids of solids have no edge.
 
@@ -365,8 +365,8 @@ def group(
     """Name a set of points or of nodes.
 
     Points are selected by their reference positions. Unless `solids` are named, a group of nodes
-    also includes nodes of the separate grids of solids defined later. A set of faces, edges or
-    nodes of a mesh selects points or nodes within half a cell. The group ``all`` always exists.
+    also includes nodes of the separate grids of solids defined later. A set of a mesh (faces, edges
+    or nodes) selects points or nodes within half a cell of it. The group ``all`` always exists.
 
     Parameters
     ----------

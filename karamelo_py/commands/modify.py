@@ -39,8 +39,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     their stress; with laws of the total deformation, the stress changes at once. The density
     (points have masses) and constants of the initial state, such as pc of cam-clay, are fixed.
 
-    ``material`` also changes constants of the parts of eos-strength, if only one part has that
-    name.
+    ``material`` also changes constants of parts of eos-strength, if only one part has that name.
 
     See Also
     --------

@@ -83,7 +83,8 @@ def pore_water(
 
     Use this command before the first solid of the material. It needs method ulmpm or tlmpm with
     FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a
-    scene in 1D, plane strain or 3D. With ulmpm and linear, strains above 10 % are less accurate.
+    scene in 1D, plane strain or 3D. With ulmpm and linear, results lose accuracy at strains above
+    10 %.
 
     See Also
     --------
@@ -95,7 +96,7 @@ def pore_water(
         raise ScriptError(message, argument="permeability", expected=expected)
     if not LEAST <= n <= MOST:
         message = f"the porosity is {n:g}"
-        expected = f"a number from {LEAST:g} to {MOST:g}: pores over the whole volume"
+        expected = f"a number from {LEAST:g} to {MOST:g}: volume of pores / whole volume"
         raise ScriptError(message, argument="n", expected=expected)
     if is_rigid(material.whole):
         raise ScriptError(

@@ -133,7 +133,8 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
         ``stop`` (default), or ``halve``: if a point fails, the step becomes unstable, or energy
         appears that no load supplied (only a warning with ``stop``), the run returns to its last
         good state and halves the step, at most five times. Log, dumps, curves and computes also
-        return to this state. Points that leave the domain without an energy gain stop the run.
+        return to this state. If points leave the domain although the step is stable and no energy
+        was gained, the run stops, because a smaller step would not help.
 
     Example
     -------

@@ -15,7 +15,7 @@ Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time for which t
 `kick` the time for which forces act.
 
 Heat function ``(pt: WarmPoint) -> (share, supply, T)``: `value` and `other` are the first and
-second formula, `face` the point's area, `supply` its heat per time, `share` the fraction it takes
+second formula, `face` the point's area, `supply` its heating power, `share` the fraction it takes
 of the nodal temperature change. The total is the heat supplied; if the hook holds, `other` is the
 target temperature. Node functions of heat get capacity, temperature before and after the step, and
 heat flow, in the order of `OneNode`.

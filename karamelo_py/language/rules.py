@@ -15,7 +15,7 @@ of a part, field or law::
 returns whether the rule applies, or numbers by name for its text, or a list of these, one per
 message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (the
 material of a law), such as ``{scene.turn:.2g}``. Two of the names have a meaning: ``mark`` is the
-location in the script, and ``share`` is noise over the tolerable amount.
+location in the script, and ``share`` is the noise divided by the tolerable amount.
 """
 
 import re
@@ -34,7 +34,7 @@ HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
 
 
 class Feature(NamedTuple):
-    """A choice of a scene by `name`, or an option, with an empty `name`."""
+    """A choice of a scene, such as a basis, by `name`; or an option, whose `name` is empty."""
 
     kind: str
     name: str
@@ -55,7 +55,7 @@ class Restrictions(NamedTuple):
     only
         Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
     without, but
-        Unsupported options, and those with another replacement than their own ``instead``.
+        Unsupported options; `but` gives for some a replacement that differs from their ``instead``.
     """
 
     option: str

@@ -9,8 +9,7 @@ define the arguments::
 Annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile, OutputFile,
 Argument (left to the callee), classes with a classmethod ``from_script(cls, hub, argument)``, and
 unions of these, with None for the word NULL. Annotated adds constraints. ``*args`` take any number,
-``**numbers`` are names for formulas; others may be written ``name=value``, keyword-only parameters
-must be.
+``**numbers`` are names for formulas; others may, keyword-only ones must, be named: ``name=value``.
 """
 
 import inspect

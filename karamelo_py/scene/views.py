@@ -387,7 +387,7 @@ class PointsView(View):
     heat_supply = Shown(
         lambda view: view._heat(Supply),
         lambda view, value: view._put(Supply, value[:, None]),
-        "(n,) heat per time of fixes; add to it in ``supply_heat``.",
+        "(n,) heating power of fixes; add to it in ``supply_heat``.",
     )
 
     def _heat(self, kind: type) -> np.ndarray:

@@ -20,7 +20,7 @@ from karamelo_py.script.errors import ScriptError, plural, unknown
 from karamelo_py.script.terms import number_of
 
 DESCRIPTION = """\
-Searches the values of variables that bring the log of a script nearest to measurements, by least
+Searches for values of variables that bring the log of a script nearest to measurements, by least
 squares, and prints how accurately the measurements determine them.
 
   karamelo-py fit in.file -var H=5e8,2e9 -var Y=3e8,5e8 -match S_22=test.csv:stress
@@ -28,7 +28,7 @@ squares, and prints how accurately the measurements determine them.
 
 A variable with several values is searched between the smallest and the largest, from three starts:
 the middle, 20 % and 80 % of each range. A variable with a single value is passed on. A measurement
-is a number, or a column of a file over its first column, the time. Differences are relative to the
+is a number, or a column of a file whose first column is the time. Differences are relative to the
 largest measured value. The true value is within +- with a probability of 95 %, if the remaining
 differences are independent. There is no +- if the three searches disagree, nor for a value at the
 end of its range, which has to be wider. A run that fails counts as a bad trial. Runs

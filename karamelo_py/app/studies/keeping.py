@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 from karamelo_py.script.errors import codes
 
-ENDS = 0.2  # of the run at both ends whose means are compared
+ENDS = 0.2  # fraction of the run at each end, whose means are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
 
@@ -20,11 +20,12 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict: ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step) ...
 
-    ``unknown``: given up or killed; a component of the energy ``falls`` or ``grows``.
+    ``unknown``: the run was killed or took too long. A component of the energy gets ``falls`` and
+    ``grows`` instead of ``damps`` and ``gains``.
     """
 
     word: str
-    number: float  # mean of the last part over the first; if stopped, its end
+    number: float  # mean of the last part / mean of the first; ``breaks``: the last x
     said: tuple[str, ...]  # causes or titles of warnings and of the error
     warned: bool  # or its error names a cause
 
@@ -48,7 +49,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Classify a run; values of the computes `parts` are not totals."""
+    """Classify a run; the computes `parts` are components of the energy, which may fall or grow."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -78,7 +79,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Make a Markdown table with rows by the variables `by`, and list silent failures.
 
-    Numbered messages follow. Variables in step with row variables are omitted.
+    Numbered messages follow. Variables that the row variables determine get no columns.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

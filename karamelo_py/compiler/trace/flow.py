@@ -26,7 +26,7 @@ IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):
-    """End of a branch: last block, variables, items read from held tuples."""
+    """End of a branch: its last block, its variables, items read from `HeldTuple`s in memory."""
 
     block: Any
     names: dict[str, Any]
@@ -74,7 +74,7 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """Numbers change type in a loop; `grown` maps name and tuple indices to type or number."""
+    """Numbers change type in a loop; `grown` maps the path of each to the type it becomes."""
 
     def __init__(self, grown: dict[tuple, Any]):
         super().__init__(f"a number becomes one of another type{IN_A_LOOP}")
@@ -182,7 +182,7 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Start a loop; return the variables, with phis for changing ones; `grown`: `Grows`."""
+        """Start a loop; return the variables, with a phi for each in `changed` (types: `grown`)."""
         phis: list[Phi] = []
         paths: list[tuple] = []
 

@@ -38,7 +38,7 @@ class Volume(StepField):
 
 
 class Supply(StepField):
-    """Heat per time that fixes supply to a point."""
+    """Heating power that fixes supply to a point."""
 
     columns = ("gamma",)
 

@@ -118,11 +118,11 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux per area (d,), an outflow, two pressures, another outflow.
+    """Mass flux (d,) per unit area, an outflow, two pressures, another outflow.
 
-    The first outflow (per volume) is computed for closed nodes and does not leave the points; the
-    last (mass per time) leaves through open nodes. The pressures are the mean at the node, and
-    the mean of the part that nodes do not see.
+    The first outflow (per unit volume) is computed for closed nodes and does not leave the points;
+    the last (a mass flow rate) leaves through open nodes. The pressures are the mean at the node,
+    and the mean of the part that nodes do not see.
     """
 
     shape = numbers(4, 1)
@@ -136,10 +136,10 @@ class GivenPressure(StepField):
 
 
 class GivenFlux(StepField):
-    """Water supplied to a node per time, by `WAYS`.
+    """Rates of water supply to a node, by `WAYS`.
 
     Values are per area of faces with an outward normal along each direction (lo, hi), per area of
-    any face, and per volume; after the step, the mass per time that each supplied.
+    any face, and per volume; after the step, the mass flow rate that each supplied.
     """
 
     shape = numbers(2, 2)
@@ -386,7 +386,7 @@ def _by_pressure(nodes, kin, n, rim):
 
 
 def _mass_given(nodes, kin, n, V):
-    """Return the mass of water that a node gets per time; store it by `WAYS`."""
+    """Return the mass flow rate of water into a node; store it by `WAYS`."""
     supply, sums, d = field(nodes.fields, GivenFlux), field(nodes.fields, WaterSums), kin.dimension
     whole, squared = real(0, V), real(0, V)
     if supply is None:

@@ -45,8 +45,7 @@ class QuadraticSpline(NamedTuple):
     """Quadratic B-splines, modified at the walls of the grid (Steffen, Kirby & Berzins 2008).
 
     Gradients are continuous: no cell-crossing error. A point has nine nodes in 2D (linear: four).
-    Linear extrapolation beyond a wall, phi(-1) = 2 phi(0) - phi(1), makes functions linear within
-    half a cell.
+    Linear extrapolation beyond a wall, phi(-1) = 2 phi(0) - phi(1), makes functions linear near it.
 
     Example
     -------

@@ -1,7 +1,7 @@
 """Damages: the lost fraction D of the strength of a point, a part of `eos_strength`.
 
-A damage is a NamedTuple; its memory is a tuple. Stress, except pressure, is scaled by 1 - D;
-equation of state and strength do not depend on it.
+A damage law is a NamedTuple; its history variables (`memory`) are a tuple. All of the stress except
+the pressure is scaled by 1 - D; equation of state and strength do not depend on D.
 """
 
 from typing import Any, NamedTuple
@@ -21,7 +21,7 @@ def initial_damage(damage, template):
 
 class FlowStep(NamedTuple):
     strain: Any  # increment of equivalent plastic strain
-    triaxiality: Any  # mean stress over von Mises stress
+    triaxiality: Any  # mean stress / von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
     stress: Any  # Cauchy, of intact material
@@ -46,7 +46,7 @@ def initiation(damage, memory):
 # triaxiality below which most metals do not fail
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
-# Damage is this number times (sum of strain over failure strain, minus 1), at most 1.
+# Damage is this number times (sum of strain increments / failure strain, minus 1), at most 1.
 _BRITTLENESS = 10.0
 
 
@@ -114,7 +114,7 @@ column(JohnsonCookDamage, "damage_init", damage_initiation)
 
 
 class Accumulated(NamedTuple):
-    w: Any  # sum of plastic strain over failure strain
+    w: Any  # sum of plastic strain increments / failure strain
 
 
 @initial_damage.on(JohnsonCookDamage)

@@ -417,8 +417,8 @@ class Holzapfel(NamedTuple):
     -----
     W = G/2 (I1 J^(-2/3) - 3) + K/2 (J - 1)^2 + k1/(2 k2) sum (exp(k2 <I - 1>^2) - 1), with the
     squared stretches I = I4, I6 of the fibres, which are slack in compression: <x> = max(x, 0)
-    (Holzapfel, Gasser & Ogden 2000, J. Elasticity 61, 1-48; with whole stretches, Nolan et al.
-    2014).
+    (Holzapfel, Gasser & Ogden 2000, J. Elasticity 61, 1-48; with full, not isochoric, stretches:
+    Nolan et al. 2014).
 
     See Also
     --------

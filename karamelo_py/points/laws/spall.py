@@ -185,7 +185,7 @@ class DamageFormula(ByRate, DamageFields):
     Parameters
     ----------
     rate
-        Growth of w per time: a formula of the largest principal stress s1, pressure p, von Mises
+        Growth rate of w: a formula of the largest principal stress s1, pressure p, von Mises
         stress q and triaxiality t = -p/q of intact material, plastic strain rate epdot, temperature
         T and w.
     brittleness

@@ -59,10 +59,10 @@ class FLIP(NamedTuple):
 
 
 class FLIPPerTime(NamedTuple):
-    """FLIP with damping per time, not per step: alpha applies to a stable step.
+    """FLIP with damping per unit time, not per step: alpha applies to a stable step.
 
     In a shorter step, alpha^(dt / stable dt) is used. With plain FLIP the fraction 1 - alpha is
-    removed in each step, so half the step doubles the damping per time.
+    removed in each step, so half the step doubles the damping rate.
 
     Parameters
     ----------

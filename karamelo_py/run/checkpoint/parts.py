@@ -7,8 +7,8 @@ A class names the attributes of its state, in addition to the names in its bases
 
 They may be numbers, texts, bytes, arrays, NumPy's random generators, lists, tuples, sets and
 dictionaries of these, and objects whose class has ``remembers``. The optional methods ``resumed()``
-and ``filed()`` are called after a part is restored and before a file stores it. In another script
-(read_restart), writers of files restore only the names in ``carries``.
+and ``filed()`` are called after a part is restored and before a file stores it. If another script
+reads a restart file, outputs begin new files and restore only the names in ``carries``.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve
-        self.halvings = self.returns = 0  # numbers of halvings; of returns here
+        self.halvings = self.returns = 0  # in the run; to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}
@@ -230,7 +230,7 @@ class RollbackPoint:
         return self._parts[self.step]
 
     def keep(self, simulation: SceneState, *, forget: bool = True) -> None:
-        """Make the present state the last good one; `forget` drops other states of parts."""
+        """Make the present state the last good one; `forget` drops earlier states of the parts."""
         self.arrays, self.step = simulation.snapshot(self.arrays), simulation.step
         others = {} if forget else self._parts
         self._parts = others | {self.step: PartStates.of(self.hub)}
@@ -252,7 +252,7 @@ class RollbackPoint:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps up to `end`, with the states that parts had; return the status."""
+        """Repeat the steps to `end`; restore states of parts at noted steps. Return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

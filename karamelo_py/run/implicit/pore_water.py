@@ -138,7 +138,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Return the volume (m,) given to nodes; store the mass per time, as `MakeFlux` does."""
+        """Return the volume (m,) given to nodes; store the mass flow rate, as `MakeFlux` does."""
         flux = field(self.equations.s.nodes.fields, GivenFlux)
         if flux is None:
             return np.zeros(self.m)

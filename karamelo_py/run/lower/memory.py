@@ -28,7 +28,7 @@ THERE = 1  # bytes per point in `present`
 class MemoryTaken(NamedTuple):
     touched: int
     copied: int  # bytes of the copy of the last good state
-    common: int  # bytes about the whole scene in each process
+    common: int  # bytes that each process holds of the whole scene (solids, regions, groups)
 
 
 def memory_of(simulation: SceneState, s: arrays.Setup, boxes: int) -> MemoryTaken:

@@ -1,4 +1,4 @@
-"""The division of a scene among processes, predicted by one process: memory and messages."""
+"""Predict in one process how a scene would be divided among several: memory and messages."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
-MAY_CHANGE = 1.25  # largest number of points over the mean
+MAY_CHANGE = 1.25  # largest number of points of a process divided by the mean
 
 
 class ProcessShare(NamedTuple):
@@ -26,8 +26,8 @@ class ProcessShare(NamedTuple):
     nodes: int
     others: int  # processes to which it sends
     sent: int  # bytes per step
-    memory: int  # bytes used in steps, and of the copy of the last good state
-    common: int  # bytes about the whole scene
+    memory: int  # bytes used in steps, including the copy of the last good state
+    common: int  # bytes that each process holds of the whole scene (solids, regions, groups)
 
 
 class _Sums(NamedTuple):

@@ -1,7 +1,6 @@
 """Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
-Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX CrunchiX
-manual).
+Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX manual).
 """
 
 import re

@@ -1,7 +1,6 @@
 """Meshes in LS-DYNA keyword decks: nodes, solids, shells, parts and sets.
 
-Numbers are in columns, in long columns or separated by commas (LS-DYNA Keyword User's Manual,
-volume I).
+Numbers are in columns, long columns or separated by commas (LS-DYNA Keyword User's Manual, vol. I).
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Meshes of MFEM of first and second order (https://mfem.org/mesh-format-v1.0)."""
+"""MFEM meshes of first and second order (https://mfem.org/mesh-format-v1.0)."""
 
 import re
 from pathlib import Path
@@ -34,9 +34,10 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Return numbers of second-order nodes, from `first` on, by the corners around them.
+    """Map the corners around each second-order node to its number, counted from `first`.
 
-    Nodes of edges come first, then of quadrilateral faces and of elements, in order of appearance.
+    Edge nodes come first, then nodes of quadrilateral faces, then nodes inside elements, each in
+    order of appearance.
     """
     numbers: dict[frozenset[int], int] = {}
     faces = {**FACES, "triangle": (), "quad": (), "line": ()}

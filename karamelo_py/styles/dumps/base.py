@@ -134,7 +134,8 @@ class OfPoints:
         stress), p (pressure), rho (density), volume, mass and so on.
     revolve
         For axisymmetric scenes: write a 3D body, with this number of copies of each point around
-        the axis. Positions, velocities, stress and strain are rotated, also by twist.
+        the axis. Positions, velocities, stress and strain are rotated to each copy. Under twist,
+        they include the rotation about the axis.
     """
 
     rows_are = "points"

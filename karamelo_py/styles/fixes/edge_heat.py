@@ -28,7 +28,7 @@ class EdgeHeat(OnEdge, HeatFix):
         return whole_faces(solid, self.region, ids) if filled else None
 
     def flows(self, points: PointsView, faces: Faces, values: list[np.ndarray]) -> np.ndarray:
-        """Return the heat per time (n,) into the points for `values` at the faces (m,)."""
+        """Return the heating power (n,) of the points for `values` at the faces (m,)."""
         raise NotImplementedError
 
     def supply_heat(self, points: PointsView) -> None:
@@ -66,8 +66,8 @@ class EdgeHeatFlux(EdgeHeat):
     edge, restrict the group, or set q to 0 elsewhere. Planes at the edge of the domain and symmetry
     planes are not loaded.
 
-    Publishes the heat per time as ID_s and the area as ID_area (in 2D per thickness, in axisymmetry
-    per radian).
+    Publishes the heating power as ID_s and the area as ID_area (in 2D per unit thickness, in
+    axisymmetry per radian).
 
     See Also
     --------
@@ -100,7 +100,7 @@ class EdgeConvection(EdgeHeat):
     -----
     Areas are as in edge_heat_flux. T is the temperature at the surface at the end of the step, so
     that points are not cooled below the temperature of the fluid, however large h is. Publishes the
-    heat per time into all points as ID_s, and the area as ID_area.
+    heating power of all points as ID_s, and the area as ID_area.
 
     See Also
     --------

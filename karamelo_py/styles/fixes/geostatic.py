@@ -22,7 +22,7 @@ class GeostaticStress(Fix):
     Parameters
     ----------
     k0
-        Horizontal over vertical effective stress, as a function of x, y, z, x0, y0, z0, such as
+        Horizontal divided by vertical effective stress, a function of x, y, z, x0, y0, z0, such as
         if(y0 < 5, 1.2, 0.5) for two layers.
     gravity
         Gravitational acceleration, positive, against the last direction (y in 2D, z in 3D).
@@ -37,8 +37,8 @@ class GeostaticStress(Fix):
     summed in columns as wide as the largest point. Layers may differ in material and in points per
     cell. A material with pore_water is saturated up to its highest point in the column, with
     hydrostatic pressure, and the stress is the effective stress. Under fix body_force, ground with
-    a level surface is then in equilibrium, and a slope nearly so. The material must accept a
-    stress: see initial_stress.
+    a level surface is then in equilibrium, and a slope nearly so. Hyperelastic materials are
+    refused, because their stress follows from the deformation.
 
     See Also
     --------

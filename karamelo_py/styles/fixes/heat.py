@@ -59,7 +59,7 @@ MANY = 1_000_000  # points of a solid above which the check is skipped
 
 
 def hold_node(node):
-    """Set T to the value; the published sum is the heat per time that this needs."""
+    """Set T to the value; the published sum is the heating power that this needs."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
@@ -79,7 +79,7 @@ class TemperatureNodes(HeatFix):
 
     Notes
     -----
-    Publishes the required heat per time as ID_s. If several such fixes include a node, the last one
+    Publishes the required heating power as ID_s. If several such fixes include a node, the last one
     applies and publishes the heat.
 
     See Also
@@ -178,9 +178,9 @@ class HeatFluxParticles(FacesOfPoints):
     Each point has one outer face, with the area of a side of a cube of its volume (in 1D the whole
     section). A point at a corner of the body, with two outer faces, needs two fixes. In axisymmetry
     the face is at the radius of the point, slightly inside the surface. On curved surfaces the
-    total area, which is printed, is 0.66 to 1.44 of the true area, depending on the layer of
-    points; edge_heat_flux uses the exact area. Publishes the heat per time (in 2D per thickness, in
-    axisymmetry per radian) as ID_s.
+    total area, which is printed, is 0.66 to 1.44 times the true area, depending on the layer of
+    points; edge_heat_flux uses the exact area. Publishes the heating power as ID_s (in 2D per unit
+    thickness, in axisymmetry per radian).
 
     See Also
     --------
@@ -224,7 +224,7 @@ class ConvectionParticles(FacesOfPoints):
 
     Notes
     -----
-    Faces are as in heat_flux_particles. Publishes the heat per time into all points as ID_s.
+    Faces are as in heat_flux_particles. Publishes the heating power of all points as ID_s.
 
     See Also
     --------

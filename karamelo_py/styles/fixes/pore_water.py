@@ -15,7 +15,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Return the pressure; publish the mass of water per time that has left."""
+    """Return the pressure; publish the rate of mass of water that leaves."""
     return (values[0], 0 * values[0]), flux[-1]
 
 
@@ -24,7 +24,7 @@ def give_one_way(flux, values, dt):
 
 
 def supply(given, values, dt):
-    """Return the flux; publish the negative mass per time that has entered."""
+    """Return the flux; publish the negative rate of mass of water that enters."""
     q, way, rho = values
     ways = range(len(given))
     gave = total([where(way == k, given[k], 0) for k in ways])
@@ -53,8 +53,8 @@ class PorePressure(Fix):
     -----
     Surfaces without this fix are impermeable. The group should contain the nodes at the surface,
     or, in ulmpm, on both sides of a surface that moves within a cell. The pressure does not load
-    the soil: add the weight of a lake on its bed by fix edge_traction. Publishes ID_s, the mass of
-    water per time that left in the previous step.
+    the soil: add the weight of a lake on its bed by fix edge_traction. Publishes ID_s, the mass
+    flow rate of the water that left in the previous step.
 
     See Also
     --------
@@ -107,11 +107,11 @@ class WaterFlux(Fix):
     Parameters
     ----------
     q
-        Volume of water that enters per time and area of the surface (negative: leaves), a function
-        of x0, y0, z0, time and published values.
+        Volume of water that enters per unit time and unit area (negative: leaves), a function of
+        x0, y0, z0, time and published values.
     through
         Faces through which the water enters, named by their outward direction, or any ``surface``.
-        ``volume``: q is per volume of the body instead.
+        ``volume``: q is per unit volume of the body instead.
 
     Example
     -------
@@ -121,8 +121,8 @@ class WaterFlux(Fix):
     Notes
     -----
     At nodes that are also open (fix pore_pressure, or an active fix seepage_face), the inflow
-    leaves at once: rain runs off. Publishes ID_s, the mass of water per time that left in the
-    previous step: negative if it entered.
+    leaves at once: rain runs off. Publishes ID_s, the mass flow rate of the water that left in the
+    previous step, negative if it entered.
 
     See Also
     --------

@@ -82,8 +82,7 @@ class ContactBodies(Fix):
 
     The fix works in every method, together with contact with deformable solids. Stacks come to
     rest, even with a heavy body on light ones. Momentum and angular momentum are conserved to
-    round-off. No collision adds energy. Collisions within a step are resolved singly, fastest
-    first.
+    round-off. No collision adds energy. Collisions in a step are resolved singly, fastest first.
 
     Disks and spheres are exact. Corners and edges of other shapes are rounded by balls of 0.05
     cells, in 3D one per cell along edges. A fixed region serves as a wall or a container, a body

@@ -15,8 +15,8 @@ class AngularVelocityNodes(Fix):
     Parameters
     ----------
     omega
-        Angular velocity in radians per time, positive from x to z, a function of x0, y0, time and
-        published values.
+        Angular velocity in radians per unit time, positive from x to z: a function of x0, y0, time
+        and published values.
 
     Example
     -------

@@ -1,8 +1,7 @@
 """Equations of state: pressure of a point from its volume, positive in compression.
 
 An equation of state is a NamedTuple of parameters with a `specific_volume`, a part of
-`eos_strength`. `j` = det F, `heat` is the temperature (`Warm`) or (). The memory is a tuple, mostly
-empty.
+`eos_strength`. `j` is det F, `heat` the temperature (`Warm`) or (), `memory` history variables.
 """
 
 from typing import Any, NamedTuple

@@ -53,8 +53,8 @@ class ByPressure:
     in_lanes = True
     start: ClassVar[int]
     p: ClassVar[Code]
-    slopes: ClassVar[tuple[Code, ...]]  # by J and E
-    linear: ClassVar[bool]  # in E
+    slopes: ClassVar[tuple[Code, ...]]  # derivatives of p with respect to J and E
+    linear: ClassVar[bool]  # p is linear in E
 
 
 class GasByPressure(ByPressure):
@@ -71,7 +71,7 @@ EosFields = namedtuple("EosFields", ("specific_volume", "initial", "initial_temp
 
 
 class EosFormula(NamedTuple):
-    """Pressure by a formula of volume and internal energy.
+    """Pressure from a formula of volume, internal energy and temperature.
 
     Parameters
     ----------
@@ -79,7 +79,8 @@ class EosFormula(NamedTuple):
         Density before deformation.
     p
         Pressure: a formula of J = rho0/rho, the internal energy E per initial volume, and the
-        temperature T. Script variables are numbers.
+        temperature T. Script variables are replaced by their present values; time and other varying
+        quantities are an error.
     E
         Initial internal energy.
     T
@@ -119,7 +120,7 @@ class EosFormula(NamedTuple):
 def eos_of(
     rho0: float, formula: Expression, initial: tuple, style: str, kind: type = ByPressure
 ) -> NamedTuple:
-    """Build the law with initial E and T; raise ScriptError for no value or stiffness at rest."""
+    """Build the law; at rest, p must be finite and the bulk modulus positive, else ScriptError."""
     term = plain(formula, "p")
     slopes = [derivative(term, name) for name in NAMES[:2]]
     rest = dict(zip(NAMES, (1.0, *initial), strict=True))

@@ -165,8 +165,7 @@ class IdealGas(NamedTuple):
     proportional to rho^(gamma - 1), exactly. Viscous work heats the gas, as does kinetic energy
     dissipated by PIC, FLIP, APIC, MLS and TPIC. For shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
-    A free surface expands from the first step. Fix initial_stress changes the energy at constant
-    volume.
+    A free surface expands from the first step. Fix initial_stress sets p by changing the energy.
 
     See Also
     --------

@@ -28,11 +28,11 @@ from karamelo_py.script.derivatives import derivative, to_power
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.reading import read_text
 
-STEEPEST = 1e6  # slope of a flow stress over G
+STEEPEST = 1e6  # largest slope of a flow stress / G
 
 
 class Tabulated(NamedTuple):
-    """Flow stress interpolated in a measured curve over plastic strain.
+    """Flow stress interpolated from a measured curve against plastic strain.
 
     Parameters
     ----------

@@ -58,8 +58,8 @@ class Viscous(NamedTuple):
 
     Notes
     -----
-    s = 2 mu dev(D), D the strain rate. Viscosity shortens the stable step unless 4/3 mu/(rho h) is
-    far below the speed of sound. Viscous work is dissipated.
+    s = 2 mu dev(D), with the strain rate D. Viscosity shortens the stable step unless
+    4/3 mu/(rho h), with cell size h, is far below the speed of sound. Viscous work is dissipated.
 
     See Also
     --------

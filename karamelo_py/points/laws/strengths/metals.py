@@ -253,7 +253,7 @@ def _flow_stress_swift(strength, before, increment, dt):
 
 
 class ZerilliArmstrong(NamedTuple):
-    """Flow stress of metals from dislocation motion, by strain, strain rate and temperature.
+    """Flow stress of metals from dislocation motion: strain, strain rate and temperature.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ class ZerilliArmstrong(NamedTuple):
     C5, n
         Hardening C5 ep^n that depends on strain alone (bcc metals).
     epsdot0
-        Unit of the plastic strain rate: 1/s in script units.
+        Reference plastic strain rate: 1/s, in the units of the script.
     T
         Absolute temperature, if neither the material nor its solid has one.
 

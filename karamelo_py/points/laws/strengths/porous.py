@@ -49,10 +49,11 @@ class CrushableFoamConstants(NamedTuple):
     Notes
     -----
     sqrt((q^2 + alpha^2 p^2)/(1 + alpha^2/9)) is at most Y + H ep + a ln(1/(1 - (ep/e)^beta)), with
-    alpha^2 = 9/2 (1 - 2 nu)/(1 + nu); flow is associated, and dep is the axial strain in uniaxial
-    compression (Deshpande & Fleck 2000, J. Mech. Phys. Solids 48, 1253-1283). The plastic volume
-    ratio is the dump column Jp. With eos p-alpha, strain increments must be below the elastic
-    strain at yield; in larger steps, pores reduce the pressure before the foam yields.
+    alpha^2 = 9/2 (1 - 2 nu)/(1 + nu). Flow is associated; the left side times the increment of the
+    plastic strain ep is the plastic work, so ep is the axial plastic strain in uniaxial stress
+    (Deshpande & Fleck 2000, J. Mech. Phys. Solids 48, 1253-1283). The plastic volume ratio is the
+    dump column Jp. With eos p-alpha, strain increments must be below the elastic strain at yield;
+    in larger steps, pores reduce the pressure before the foam yields.
 
     See Also
     --------

@@ -20,7 +20,8 @@ class MeldTool(ToolFix):
     Parameters
     ----------
     K
-        Force over depth and shear modulus of the point, a length. Numbers may be formulas of time.
+        Force divided by depth and by the shear modulus of the point; a length. All numbers may be
+        formulas of time.
     axis
         Direction of the axis.
     half_width

@@ -24,7 +24,7 @@ class Irradiate(Fix):
     group
         Group of points, or ``all``.
     intensity
-        Dose per time at x = 0.
+        Dose rate at x = 0.
     depth
         Where the intensity has fallen to 1/e.
 

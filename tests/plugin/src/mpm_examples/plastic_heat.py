@@ -17,7 +17,7 @@ class StrainBefore(Field):
 
 
 def heat(volume, stress, strain, before, supply, values, dt):
-    """Heat per time chi V q dep/dt, q the stress of von Mises; the sum is published."""
+    """Heating power chi V q dep/dt, with the von Mises stress q; the sum is published."""
     (chi,) = values
     power = chi * volume * von_mises(dev(stress)) * (strain - before) / dt
     return supply + power, strain, power
@@ -37,7 +37,7 @@ class PlasticHeat(Fix):
 
     Notes
     -----
-    For thermo-mechanical methods. Publishes the heat per time as ID_s.
+    For thermo-mechanical methods. Publishes the heating power as ID_s.
     """
 
     published = ("s",)
