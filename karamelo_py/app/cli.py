@@ -106,13 +106,13 @@ def _dispatch(arguments: list[str]) -> int:
     arguments = arguments or ["-h"]
     first = arguments[0]
     if first not in (*COMMANDS, "-h", "--help", "--version"):
-        close = nearest(first, COMMANDS)
+        close = meant(first, COMMANDS, "karamelo-py {}")
         alone = len(arguments) == 1 and "." in first
         if (close or first in OPTIONS) and not alone and not Path(first).exists():
             raise ScriptError(
                 f"there is no file {first} and no such subcommand",
                 expected="a script, or one of " + ", ".join(COMMANDS),
-                hint=f"did you mean 'karamelo-py {close or 'SCRIPT --' + first}'?",
+                hint=close or f"did you mean 'karamelo-py SCRIPT --{first}'?",
             )
         arguments = ["run", *arguments]
     if first == "help" and len(arguments) == 2 and arguments[1] in COMMANDS[1:]:

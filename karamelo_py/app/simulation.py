@@ -31,7 +31,7 @@ from karamelo_py.run.lower.card import take_card, use_card
 from karamelo_py.run.mpi.comm import launched
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.views import set_columns
-from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, instead, nearest
+from karamelo_py.script.errors import NoItem, Pause, Quit, ScriptError, instead, meant
 from karamelo_py.script.expressions import Expression, shown
 from karamelo_py.script.parser import parse, parse_text
 from karamelo_py.styles.fixes.python import called_as
@@ -374,10 +374,9 @@ class Simulation:
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         if name.startswith("_") or not registry.knows("command", name):
-            close = nearest(name, [*registry.names("command"), *dir(type(self))])
-            other = instead("command", name) or instead("fix", name)
-            hint = f"; did you mean '{close}'?" if close else f"; {other}" if other else ""
-            raise AttributeError(f"there is no command '{name}'{hint}")
+            names = [*registry.names("command"), *dir(type(self))]
+            hint = meant(name, names) or instead("command", name) or instead("fix", name)
+            raise AttributeError(f"there is no command '{name}'" + (f"; {hint}" if hint else ""))
 
         command = registry.find("command", name)
         gives = command.__annotations__.get("return") not in (None, "None")

@@ -37,7 +37,7 @@ from karamelo_py.output.point_table import (
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.laws import can, elastic_law, with_stress, with_temperature
 from karamelo_py.points.transfers import Moment
-from karamelo_py.script.errors import Mark, NoItem, ScriptError, blaming, nearest
+from karamelo_py.script.errors import Mark, NoItem, ScriptError, blaming, meant
 
 
 class Shown:
@@ -140,11 +140,8 @@ class View:
 
     def _unknown(self, name: str) -> AttributeError:
         names = [*self._fields, *(n for n in dir(type(self)) if not n.startswith("_"))]
-        close = nearest(name, names)
-        return AttributeError(
-            f"{type(self).__name__} has no {name}; "
-            + (f"did you mean {close}?" if close else f"it has {', '.join(sorted(names))}")
-        )
+        hint = meant(name, names) or f"it has {', '.join(sorted(names))}"
+        return AttributeError(f"{type(self).__name__} has no {name}; {hint}")
 
 
 NO_HEAT = "no heat flows: the method has to be thermo-mechanical"

@@ -162,10 +162,10 @@ def _width(character: str) -> int:
     return 2 if unicodedata.east_asian_width(character) in "WF" else 1
 
 
-def meant(name: str, names: Iterable[str]) -> str | None:
-    """Suggest ``did you mean '...'?`` with the most similar names."""
+def meant(name: str, names: Iterable[str], form: str = "{}") -> str | None:
+    """Suggest ``did you mean '...'?`` with the most similar names, each written in a form."""
     ratios = [(n, difflib.SequenceMatcher(None, n, name).ratio()) for n in nearest_few(name, names)]
-    close = [f"'{n}'" for n, ratio in ratios if ratio == ratios[0][1]]
+    close = [f"'{form.replace('{}', n)}'" for n, ratio in ratios if ratio == ratios[0][1]]
     return f"did you mean {' or '.join(close)}?" if close else None
 
 

@@ -15,7 +15,7 @@ from karamelo_py.app.studies.case import COLUMNS, CaseOutcome, Row
 from karamelo_py.app.studies.variables import NamesOfCase, ScriptFiles
 from karamelo_py.output.files import write_whole
 from karamelo_py.output.quantity import KEYWORDS
-from karamelo_py.script.errors import ScriptError, nearest, unknown
+from karamelo_py.script.errors import ScriptError, meant, unknown
 from karamelo_py.script.evaluation import evaluate
 from karamelo_py.script.functions import CONSTANTS
 from karamelo_py.script.parser import parse_text
@@ -40,8 +40,7 @@ class Reduction:
         self.level = None if level is None else number_of(level)
         reductions = [*REDUCTIONS, "when"]
         if reduction not in reductions:
-            close = nearest(reduction, reductions)
-            hint = f"did you mean '{close}:{self.column}'?" if close else None
+            hint = meant(reduction, reductions, f"{{}}:{self.column}")
             message = f"-record {word}: unknown word '{reduction}'"
             raise ScriptError(message, expected=_WORDS, hint=hint)
         if not column or (reduction == "when") == (self.level is None):

@@ -19,7 +19,7 @@ from karamelo_py.scene.group import AnyGroup, NodeGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import misfit
-from karamelo_py.script.errors import FAILURES, ScriptError, nearest
+from karamelo_py.script.errors import FAILURES, ScriptError, meant
 
 MOMENTS = tuple(STAGES)
 DATA = (
@@ -60,9 +60,8 @@ class PythonFunction:
             ) from error
         if not callable(vars(imported).get(function)):
             functions = [key for key, value in vars(imported).items() if callable(value)]
-            close = nearest(function, functions)
             message = f"the module {module} has no function '{function}'"
-            hint = no_file or (f"did you mean '{module}.{close}'?" if close else None)
+            hint = no_file or meant(function, functions, f"{module}.{{}}")
             raise ScriptError(message, mark=argument.mark, hint=hint)
         return getattr(imported, function)
 
