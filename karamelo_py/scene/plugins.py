@@ -34,7 +34,13 @@ from karamelo_py.points import laws
 from karamelo_py.points.basis import BasisTraits
 from karamelo_py.points.kinematics import KINEMATICS
 from karamelo_py.points.laws import LawTraits, law_traits
-from karamelo_py.points.transfers import TransferTraits, updated_velocity
+from karamelo_py.points.transfers import (
+    Moment,
+    TransferTraits,
+    add_moment,
+    updated_velocity,
+    zero_moment,
+)
 from karamelo_py.scene.modify import Fix
 from karamelo_py.schemes.traits import SchemeTraits
 from karamelo_py.script.errors import FAILURES, Mark
@@ -191,6 +197,8 @@ def check_part(hub: Scene, name: str, plugin: Any) -> None:
         error = _wrong_traits(kind, kind.traits, TRAITS[family])
     if family == "transfer" and not updated_velocity.defined(kind):
         error = error or f"updated_velocity is not defined for {kind.__name__}"
+    if family == "transfer" and add_moment.defined(kind) and not zero_moment.defined(kind):
+        error = error or f"{kind.__name__} defines add_moment, but not zero_moment"
     if family == "scheme" and not error:
         strange = [row for row in kind.rows if untaken([row], table.Processor)]
         if strange:
@@ -200,6 +208,8 @@ def check_part(hub: Scene, name: str, plugin: Any) -> None:
     if error:
         raise faults.fault(name, error, hub.mark)
     check_fields(hub, name, plugin, hub.mark)
+    if zero_moment.defined(kind) and Moment not in fields_of(plugin, "point_fields"):
+        raise faults.fault(name, "it defines zero_moment: add Moment to point_fields", hub.mark)
 
 
 def _wrong_traits(kind: type, traits: object, wanted: type) -> str:
