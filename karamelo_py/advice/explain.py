@@ -3,6 +3,7 @@
 import numpy as np
 
 from karamelo_py.advice import energy
+from karamelo_py.advice.known_failures import FASTER
 from karamelo_py.advice.step_size import own_step_instead, step_by_script
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
@@ -28,12 +29,12 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
     """Explain a failed step; `smaller` is the time step to suggest."""
     if status == ABOVE_LIMIT:
         return _above_limit(hub, simulation)
-    if status == SHRUNK:
-        return _shrunk(hub, simulation)
     smaller, too_large = _smaller_step(hub, simulation, smaller), simulation.steps.too_large
     if status in (GAINED, HEATED):
         result = (_gained if status == GAINED else _heated)(hub, simulation)
         result = result._replace(fix=smaller) if too_large else result
+    elif status == SHRUNK:
+        result = _shrunk(hub, simulation)
     elif simulation.failure:
         message = f"{simulation.failure} ({when(simulation, 1)})"
         fix = "smaller load steps; above the limit load there is no equilibrium"
@@ -47,6 +48,10 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
             result = result._replace(message=result.message + seen, fix=fix, cause=cause)
         else:
             result = result._replace(message=f"{result.message} ({when(simulation, 1)})")
+    early = [name for name in hub.update.warned_of if name.startswith(FASTER)]
+    if early and not result.cause and result.code in ("inside-out", "step-collapsed"):
+        units = "check the units of modulus, density and velocity"
+        return result._replace(cause=early[0].removeprefix(FASTER), fix=f"{units}; {result.fix}")
     if result.mark is None and not result.cause and (too_large or simulation.steps.above_limit()):
         return result._replace(cause=_above_limit_as_cause(hub, simulation))
     return result

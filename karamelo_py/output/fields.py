@@ -386,6 +386,14 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
         tensor = "e" if component[1] in ("e", "eps", "strain") else "s"
         error.alike = f"{tensor}{i}{j}"
         error.hint = f"did you mean '{error.alike}'?"
+    if re.fullmatch("displacements?(_?[xyz123])?|(u|disp)(_?[xyz123])?", name.lower()):
+        if "ux" not in names:
+            error.alike = None
+            error.hint = "fix(u, displacement, all), before it, gives the columns ux, uy, uz"
+        else:
+            component = name[-1].translate(str.maketrans("123", "xyz"))
+            error.alike = f"u{component}" if component in "xyz" else "ux"
+            error.hint = f"did you mean '{error.alike}'?"
     if name[:2] in ("v_", "c_"):  # names of LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error
