@@ -249,6 +249,8 @@ COMMANDS = [
     ("viscosity(m, prony, g=(0.1), tau=(1))", 11, "hint: viscosity(prony, m, ...)"),
     ("run(0.6)", 5, "hint: run_time(T) runs for a time T"),
     ("set_output(0.05)", 12, "hint: time(0.05) is a time"),
+    ("compute(p, probe, all, ux)", 24, "hint: fix(u, displacement, all), before it, gives"),
+    ("compute(p, probe, all, displacement_x)", 24, "hint: fix(u, displacement, all), before"),
     ("material(m2, linear, 1000, 1e6, 0,3)", 35, "hint: with a decimal point: 0.3"),
     ("pore_water(m, k=1e-4)", 15, "hint: write permeability=..."),
     ("material(c, johnson-cook, 1, 2)", 13, "'johnson_cook' is a style of strength: material("),

@@ -164,6 +164,17 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("run_time(2*tim)", "set it first: tim = ..."),
         ("run_time(2*Pi)", "did you mean 'PI'?"),
         ('run("100")', "write numbers without quotes: 100"),
+        ("region(b, sphere, 0.5, 0.6, 0.5, 0.2)", "for 3D; here region(b, sphere, 0.5, 0.6, 0.2)"),
+        ("region(b, sphere, 0,5, 0,6, 0,2)", "with a decimal point: 0.5, 0.6, 0.2"),
+        ("run_time(0,1)", "with a decimal point: 0.1"),
+        ("contact/surface(all, walls)", "fix(ID, contact/surface, group, region"),
+        ("neo-hookean(rubber, 1, 1e5, 0.4)", "material(ID, neo-hookean, rho, E, nu"),
+        ("modify(rubber, E=2e5)", "the kind comes first: modify(material, ID, name=value)"),
+        ("method(Auto)", "did you mean 'auto'?"),
+        ("E = 100kPa", "numbers have no units: 100e3"),
+        ("run(1_000)", "digits are not grouped: 1000"),
+        ("if(1 > 0, run(20))", "if(...) chooses one of two values"),
+        ("region(b, terrain, hill.xyz)", "the style heights"),
     ],
 )  # fmt: skip
 def test_lines_of_other_programs_say_what_to_write(run_interpreted, line, hint):

@@ -86,6 +86,9 @@ def run(options: argparse.Namespace) -> int:
             expected="the name of a log, and then the columns",
             hint=f"karamelo-py plot log.mpm {options.log}",
         )
+    if not options.log.exists():
+        message = f"there is no log {options.log}"
+        raise ScriptError(message, hint="run the script first: its log is log.mpm")
     rows = read_rows(options.log / "log.mpm" if options.log.is_dir() else options.log)
     columns = list(dict.fromkeys(name for row in rows for name in row))
     if not options.columns and not options.right:

@@ -65,6 +65,11 @@ class Forms:
         if fitting and got:
             verb = "is" if got == 1 else "are"
             other = f"{plural(got, 'argument')} {verb} the form for {fitting[0]}D"
+            longer = self.names[fitting[0]]
+            if not missing and set(names) <= set(longer):
+                pairs = zip(longer, arguments, strict=True)
+                kept = [argument for name, argument in pairs if name in names]
+                hint = self._own_line(hub, kept, dimension)
             hint = other if missing else f"{other}; here {hint}"
         mark = gap.mark if gap else None if missing else arguments[len(names)].mark
         hint = f"is a comma missing in '{gap.text}'?" if gap else hint

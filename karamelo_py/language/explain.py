@@ -131,19 +131,35 @@ def swapped(
     return None
 
 
-def comma_in_number(arguments: Sequence[Argument]) -> str | None:
-    """Suggest 0.5 for 0,5, and how to write 12,500, in a line with blanks after other commas."""
+def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | None:
+    """Suggest 0.5 for 0,5, and how to write 12,500.
+
+    The line has blanks after other commas, or its only surplus arguments are such decimals.
+    """
     adjacent = [
         (one, two) for one, two in pairwise(arguments)
-        if one.mark.column + one.mark.length + 1 == two.mark.column and ", " in one.mark.text
-        and one.text.lstrip("+-").isdigit() and two.text[:1].isdigit()
+        if one.mark.column + one.mark.length + 1 == two.mark.column
+        and one.text.lstrip("+-").isdigit() and two.text.isdigit()
     ]  # fmt: skip
-    if any(re.fullmatch(r"\d{3}", two.text) and int(one.text) for one, two in adjacent):
-        return "commas separate arguments: a million is 1e6 or 1000000"
-    if len(adjacent) != 1:  # none, or 0,1, 0,1
+    surplus = re.search(r"(\w+) arguments? too many", error.message)
+    exact = bool(surplus) and len(adjacent) == int(surplus[1].replace("one", "1"))
+    if not adjacent or not (exact or ", " in adjacent[0][0].mark.text):
         return None
-    one, two = adjacent[0]
-    return f"with a decimal point: {one.text}.{two.text}"
+    if not exact and any(
+        re.fullmatch(r"\d{3}", two.text) and int(one.text) for one, two in adjacent
+    ):
+        return "commas separate arguments: a million is 1e6 or 1000000"
+    if len(adjacent) != 1 and not exact:  # 0,1, 0,1
+        return None
+    return "with a decimal point: " + ", ".join(f"{one.text}.{two.text}" for one, two in adjacent)
+
+
+def in_parentheses(arguments: Sequence[Argument]) -> str | None:
+    """Suggest velocity=(0, -2) for velocity=0, -2."""
+    for one, two in pairwise(arguments):
+        if (named := one.keyword()) and NUMBER.fullmatch(two.text):
+            return f"in parentheses: {named[0]}=({named[1].text}, {two.text})"
+    return None
 
 
 def misfit(

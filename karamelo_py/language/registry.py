@@ -160,7 +160,8 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         return styles[name]
     if of_module := _of_module(family, name):
         return [of_module]
-    hint = instead(family, name) or meant(name, styles)
+    shown = [*names(family), *["auto"] * (family == "method")]
+    hint = instead(family, name) or meant(name, shown)
     same = {name, name.replace("-", "_"), name.replace("_", "-")}
     others = {f: one for f in families() if f != "command" for one in same if knows(f, one)}
     if hint is None and others:
@@ -173,7 +174,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
         code="unknown-style",
         name=name,
         kind=family,
-        expected=one_of(name, names(family), family) if styles else f"no {family} is installed",
+        expected=one_of(name, shown, family) if styles else f"no {family} is installed",
         hint=hint,
     )
 

@@ -96,6 +96,12 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
             hint="mod(sin(12.9898*x0 + 78.233*y0)*43758.5453, 1) gives "
             "pseudo-random numbers between 0 and 1",
         )
+    code = script.statement.raw.code if script.statement else ""
+    head = re.match(r"\s*([a-z][\w-]*(?:/[\w-]+)*)\s*\(", code)
+    if head and re.search("[-/]", head[1]) and (line := as_style(script, head[1])):
+        return ScriptError(
+            f"'{head[1]}' is no command", mark=mark, hint=line, code="unknown-command"
+        )
     published = [value for value in script.hub.values.names() if value not in SEEDS]
     hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])
     return ScriptError(

@@ -22,7 +22,7 @@ from karamelo_py.scene.domain import Domain, no_domain
 from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.plugins import attributed
 from karamelo_py.schemes.musl import MUSL
-from karamelo_py.script.errors import Mark, ScriptError, meant, render_message
+from karamelo_py.script.errors import Mark, ScriptError, meant, nearest, render_message
 from karamelo_py.script.values import Values
 
 
@@ -51,6 +51,9 @@ class Catalogue(dict):
                 code="already-used",
                 kind=self.kind,
                 expected="another ID",
+                hint=f"modify({self.kind}, {ID}, name=value) changes its constants"
+                if self.kind in ("material", *PARTS)
+                else None,
             )
 
     def refuse_unnameable(self, ID: str) -> None:
@@ -67,6 +70,9 @@ class Catalogue(dict):
         other = next((c.kind for c in self.hub.catalogues if ID in c and c.kind != self.kind), None)
         below = line_below(self.hub.interpreter, self.kind, ID)
         hint = meant(ID, names)
+        if self.kind == "group" and (near := nearest(ID, [*self.hub.solids, *self.hub.regions])):
+            kind = "solid" if near in self.hub.solids else "region"
+            hint = f"{near} is a {kind}, not a group; all is the group of all points"
         if self.kind == "group" and other in ("region", "solid"):
             who = f"{ID}, all" if other == "region" else f"regionID, solid, {ID}"
             hint = f"group({ID}, particles, region, {who}) makes a group of a {other}"

@@ -262,6 +262,13 @@ def _side_by_side(at: _Stop) -> Mistake:
         hint = f"{before}*{here}; a name cannot start with a digit"
         if re.fullmatch(r"[xX]10", here):
             hint = f"a power of 10 is written {before}e6"
+        elif re.fullmatch(r"(_\d+)+", here):
+            hint = f"digits are not grouped: {before}{here.replace('_', '')}"
+        elif (
+            unit := re.fullmatch("([kMG]|m(?=.))?(Pa|N|m|s|J|W|Hz|K)", here)
+        ) and "e" not in before:
+            factor = {"k": "e3", "M": "e6", "G": "e9", "m": "e-3"}.get(unit[1], "")
+            hint = f"numbers have no units: {before}{factor}"
         return Mistake(message, start, end, "an operator, such as *", hint)
     if len(at.before) == 1 and before.type == "NAME":
         words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]

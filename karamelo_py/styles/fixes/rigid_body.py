@@ -154,7 +154,9 @@ class RigidBody(Fix):
                 f"solid '{solid.id}' deforms: its material '{solid.material.id}' is not rigid",
                 argument="solid",
                 expected="a solid of material rigid",
-                hint=f"material({solid.material.id}, rigid, density)",
+                hint=f"did you mean '{near}'?"
+                if (near := next((one.id for one in hub.solids.values() if one.rigid), ""))
+                else f"material({solid.material.id}, rigid, density)",
             )
         if kin.hoops and d == 1:
             expected = "a domain in 1D, 2D or 3D, or axisymmetric"
