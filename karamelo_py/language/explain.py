@@ -142,7 +142,7 @@ def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | 
         and one.text.lstrip("+-").isdigit() and two.text.isdigit()
     ]  # fmt: skip
     surplus = re.search(r"(\w+) arguments? too many", error.message)
-    exact = bool(surplus) and len(adjacent) == int(surplus[1].replace("one", "1"))
+    exact = surplus is not None and len(adjacent) == int(surplus[1].replace("one", "1"))
     if not adjacent or not (exact or ", " in adjacent[0][0].mark.text):
         return None
     if not exact and any(

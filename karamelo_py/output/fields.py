@@ -324,7 +324,7 @@ class ColumnFormula:
             message = f"'{min(clash)}' names both a group or solid and a column or value"
             raise ScriptError(message, mark=argument.mark, hint="rename the group or solid")
         names = [*columns, *(name for name in sets if name not in of_both)]
-        self.hub, self.text = hub, argument.text
+        self.hub, self.text = hub, argument.text.strip('"')
         self.formula = Expression(argument.value_with(names))
         self.columns = sorted(self.formula.names & set(names))
         for name in self.columns:
@@ -391,8 +391,8 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
             error.alike = None
             error.hint = "fix(u, displacement, all), before it, gives the columns ux, uy, uz"
         else:
-            component = name[-1].translate(str.maketrans("123", "xyz"))
-            error.alike = f"u{component}" if component in "xyz" else "ux"
+            last = name[-1].translate(str.maketrans("123", "xyz"))
+            error.alike = f"u{last}" if last in "xyz" else "ux"
             error.hint = f"did you mean '{error.alike}'?"
     if name[:2] in ("v_", "c_"):  # names of LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"

@@ -142,8 +142,10 @@ def _function(node: syntax.FunctionCall, raw: syntax.Raw, scope: NameScope) -> V
         wanted = "at least " * (signature.most > signature.least)
         wanted += plural(signature.least, "operand")
         message = f"{node.name} takes {wanted}, not {count}"
-        hint = "if(...) chooses one of two values; run_while(condition) ends a run by a condition"
-        hint = hint if node.name == "if" else None
+        chooses = (
+            "if(...) chooses one of two values; run_while(condition) ends a run by a condition"
+        )
+        hint = chooses if node.name == "if" else None
         mark, form = mark_of(raw, node), usage(node.name)
         raise ScriptError(message, mark=mark, expected=form, hint=hint, code="arguments")
     if node.name == "if":

@@ -56,6 +56,8 @@ def run(options: Namespace) -> int:
         "record": [item.text for item in items], "computes": plan.script.computes(),
         "timed": options.time, "repeat": repeat, **drawn,
     }  # fmt: skip
+    if not items and not options.time:
+        print("note: without -record NAME no result is recorded, only how the runs end")
     study = open_study(options, plan, out, items, title=str(options.script), facts=facts)
     rows = study.run(combinations)
     write(out, rows)
@@ -84,3 +86,6 @@ def tell(rows: Sequence[Row], study: Study) -> None:
     refused = dict.fromkeys(row["reason"] for row in rows if row["status"] == "refused")
     if refused and done:
         print(f"refused before any step, by a mistake of the script: {'; '.join([*refused][:3])}")
+    failed = dict.fromkeys(row["reason"] for row in rows if row["status"] == "failed")
+    for reason in [*failed][:3] if done else ():
+        print(f"failed: {reason}")

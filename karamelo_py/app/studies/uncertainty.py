@@ -81,10 +81,16 @@ def _tell_of(rows: Sequence[Row], results: Sequence[str], fails: str | None) -> 
     if table.row_count:
         terminal().print(table)
     if lost := len(rows) - len(done):
-        print(f"{plural(lost, 'run')} without results are left out")
+        print(f"{plural(lost, 'run')} without results {'is' if lost == 1 else 'are'} left out")
     if fails and done:
         seen = sum(_happens(fails, row) for row in done)
         print(f"probability of {fails}: {probability(seen, len(done))}; {seen} of {len(done)} runs")
+        if lost:
+            print(
+                f"  with the {plural(lost, 'run')} without a result: between {seen} and "
+                f"{seen + lost} of {len(rows)}, {seen / len(rows):.3g} to "
+                f"{(seen + lost) / len(rows):.3g}"
+            )
 
 
 def check(condition: str, names: Sequence[str]) -> None:

@@ -15,6 +15,7 @@ from karamelo_py.run.implicit.inertia import Motion, Rest
 from karamelo_py.run.implicit.pore_water import Seepage
 from karamelo_py.run.implicit.rigid_bodies import MovingBodies
 from karamelo_py.run.implicit.tools import PushingTool
+from karamelo_py.script.errors import plural
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # relative, for sums of some dozens of terms
 SINGULAR = "the equations are singular"
@@ -118,7 +119,9 @@ class Newton:
                 u += self._correction(balance, jump, residual)
                 jump = np.zeros_like(jump)
                 self._respond(u)
-        raise Failed(f"after {scheme.iterations} corrections {residual:.1e} of the forces are left")
+        raise Failed(
+            f"after {plural(scheme.iterations, 'correction')} {residual:.1e} of the forces are left"
+        )
 
     def balance(self, u: np.ndarray) -> np.ndarray:
         forces = self.external - self.inner

@@ -16,7 +16,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid, named
-from karamelo_py.script.errors import ScriptError
+from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.tools.base import begin_behind
@@ -312,7 +312,7 @@ class RigidBody(Fix):
         if len(components.items) != len(ways):
             noun = "formulas" if len(ways) != 1 else "formula"
             expected = f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here"
-            raise _wrong(components.argument, f"{len(components.items)} components", expected)
+            raise _wrong(components.argument, plural(len(components.items), "component"), expected)
         parts = components.argument.listed()
         for way, item, part in zip(ways, components.items, parts, strict=True):
             items[way % 3] = item

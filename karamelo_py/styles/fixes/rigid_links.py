@@ -12,7 +12,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import Mark, ScriptError
+from karamelo_py.script.errors import Mark, ScriptError, plural
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.rigid_body import Components, RigidBody
 
@@ -259,7 +259,9 @@ class Joint(Fix):
         numbers = components.numbers()
         if len(numbers) != d:
             raise ScriptError(
-                f"{len(numbers)} components", mark=components.argument.mark, expected=f"{d} numbers"
+                plural(len(numbers), "component"),
+                mark=components.argument.mark,
+                expected=f"{d} numbers",
             )
         return np.array([*numbers, 0.0, 0.0][:3])
 
