@@ -38,14 +38,14 @@ def compare(run, axes, full):
         here, there = loads(space, press), loads(flat, press)
         yield Row(f"load at {press:.0%} (kN)", there, here, 0.03, SOURCE)
     for press in (0.2, 0.4):
-        name = f"load at {press:.0%} over a cylinder's"
+        name = f"load at {press:.0%} divided by a cylinder's"
         ratio = loads(flat, press) / uniform(press)
         yield Row(name, (1, sticking(press)), ratio, 0.01, "limit analysis (Siebel 1923)")
     yield Row("largest radius at 60 % (mm)", flat.radius[-1], space.radius[-1], 0.03, SOURCE)
     spent, there = 4 * space.lost[-1], 2 * np.pi * flat.lost[-1]
     yield Row("plastic work (J)", there, spent, 0.03, SOURCE)
-    yield Row("energy over work of the platen", 1.0, energy(space, 4), 0.03, "balance")
-    yield Row("energy over work, axisymmetric", 1.0, energy(flat, 2 * np.pi), 0.03, "balance")
+    yield Row("energy / work of the platen", 1.0, energy(space, 4), 0.03, "balance")
+    yield Row("energy / work, axisymmetric", 1.0, energy(flat, 2 * np.pi), 0.03, "balance")
     press = np.linspace(0, 0.6)
     axes.plot(flat.press, flat.load, lw=0.8, label="axisymmetric")
     axes.plot(space.press, space.load, lw=0.8, label="in 3D")

@@ -49,7 +49,7 @@ def compare(run, axes, full):
     for log, what in ((flat, "axisymmetric"), (solid, "in 3D")):
         # The transfer loses a hundredth of what differs between points and grid in each step.
         total = (log.kinetic[-1] + log.spent[-1] + log.stored[-1]) / ENERGY
-        yield Row(f"final over initial energy, {what}", (0.85, 1), total, 0.0, "balance")
+        yield Row(f"final / initial energy, {what}", (0.85, 1), total, 0.0, "balance")
     cut = b.y0 < 1.5 * b.y0.min()  # the layer of points beside a plane of symmetry
     x, y = np.append(a.x, -b.x[cut]), np.append(a.y, b.z[cut])
     heat = np.append(a["T"], b["T"][cut])

@@ -1,4 +1,4 @@
-"""Error over cost: implicit runs beside explicit ones."""
+"""Error against cost: implicit and explicit runs."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping

@@ -30,7 +30,7 @@ def compare(run, axes, full):
     there, here = np.interp(20, time, speed), np.interp(20, t, log.vd_y)
     yield Row("velocity of the disk at 20 us (m/s)", there, here, 0.03, SOURCE)
     yield Row("kinetic energy at 40 us (kJ/m)", kinetic[-1], log.Ek[-1] / 1e3, 0.05, SOURCE)
-    yield Row("final over initial energy", 1.0, log.Etot[-1] / log.Etot[0], 0.02, "exact")
+    yield Row("final / initial energy", 1.0, log.Etot[-1] / log.Etot[0], 0.02, "exact")
     yield Row("sideways speed of the disk (m/s)", 0.0, log.vd_x[-1], 1e-6, "symmetry")
     axes.plot(time, depth, "k--", lw=1, label=SOURCE)
     axes.plot(t, log.depth, lw=1, label="von Mises 367 MPa")

@@ -43,10 +43,10 @@ def compare(run, axes, full):
     water = [s.mass[(s.type == 1) & (s.x < 0.1)].sum() / RHO for s in last]
     fall = np.sqrt(2 * G * DEPTH)
     speed = np.hypot(last[1].vx, last[1].vy)[last[1].type == 1]
-    name = "speed of 99 of 100 points over Torricelli's"
+    name = "speed of 99 of 100 points / Torricelli's speed"
     yield Row(name, (0.5, 1), np.quantile(speed, 0.99) / fall, 0.1, "Torricelli")
     least = 1 - log.uy.max() / 1e3 * fall * log.Time[-1] / (0.1 * DEPTH)
-    name = "water in the tank at 0.3 s over the initial amount"
+    name = "water in the tank at 0.3 s / initial amount"
     yield Row(name, (least, 1), water[-1] / water[0], 0.0, "Torricelli, at the widest opening")
     axes.plot(log.Time, log.ux, label="end of the gate, sideways")
     axes.plot(log.Time, log.uy, label="upwards")

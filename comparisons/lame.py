@@ -33,7 +33,7 @@ def compare(run, axes, full):
     fine = np.linspace(A, B, 200)
     for k, (name, (found, exact)) in enumerate(stresses.items()):
         off = abs(found - exact).max() / PRESSURE
-        yield Row(f"largest error of the {name}, over the pressure", 0.0, off, 0.01, SOURCE)
+        yield Row(f"largest error of the {name} / pressure", 0.0, off, 0.01, SOURCE)
         axes.plot(r, found / PRESSURE, "os^"[k], ms=4, mfc="none", label=name)
     for exact in (1 - B**2 / fine**2, 1 + B**2 / fine**2, np.full_like(fine, 2 * NU)):
         axes.plot(fine, exact * share / PRESSURE, "k-", lw=0.7)

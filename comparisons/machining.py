@@ -35,7 +35,7 @@ def compare(run, axes, full):
         yield Row(f"cutting force (GPa){cells}", ends, force, 0.1, "Merchant 1945")
         work = np.trapezoid(-log.force * 1e9 * 0.15e-3 * 50, log.Time)
         spent = (log.Ek[-1] + log.Es[-1] + log.lost[-1]) / work
-        yield Row(f"energy over work of the tool{cells}", (0.7, 1.0), spent, 0.05, "balance")
+        yield Row(f"energy / work of the tool{cells}", (0.7, 1.0), spent, 0.05, "balance")
         last = result.snapshots("machining")[-1]
         cut = (last.y0 > 0.1e-3) & (last.x0 > 1e-3 - 50 * TIME)
         broken = np.average(last.damage[cut] > 0.99, weights=last.mass[cut])

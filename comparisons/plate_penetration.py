@@ -21,12 +21,12 @@ def compare(run, axes, full):
     there = (log.Time > 0.7 * THROUGH) & (log.Time < 1.4 * THROUGH)
     # Artificial viscosity and the heat of shear are in it, too.
     yield Row("pressure behind the shock (GPa)", PRESSURE, log.p[there].mean(), 0.2, "Hugoniot")
-    yield Row("momentum over the ball's", 1.0, -log.P_z[5] / (MASS * V), 0.03, "exact")
+    yield Row("momentum / momentum of the ball", 1.0, -log.P_z[5] / (MASS * V), 0.03, "exact")
     # Later, what splashes back leaves the domain.
     kept = log.P_z[log.Time < 5e-6][-1] / log.P_z[0]
-    yield Row("momentum at 5 us over initial momentum", 1.0, kept, 1e-6, "exact")
+    yield Row("momentum at 5 us / initial momentum", 1.0, kept, 1e-6, "exact")
     total = (log.Ek + log.Es + log.lost) / log.Ek[0]
-    yield Row("final over initial energy", 1.0, total[-1], 0.03, "exact")
+    yield Row("final / initial energy", 1.0, total[-1], 0.03, "exact")
     last = result.snapshots("plate_penetration")[-1]
     # It is free to spread sideways, too, which a plane shock does not know.
     plug = (last.type == 2) & (np.hypot(last.x0, last.y0) < 3e-3)
@@ -34,7 +34,7 @@ def compare(run, axes, full):
     yield Row("speed of the plug (m/s)", V, speed, 0.15, "2 x speed behind the shock")
     ahead = -last.z[last.type == 2].min() / (15e-6 * V)
     yield Row(
-        "position of the front over v t", (0.9, 1.1), ahead, 0.05, "2 x speed behind the shock"
+        "position of the front / (v t)", (0.9, 1.1), ahead, 0.05, "2 x speed behind the shock"
     )
     cut = last.y < 1e-3  # a cell beside a plane of symmetry, and its image in the other
     along, across, speed = (1e3 * a[cut] for a in (-last.z, last.x, -last.vz / 1e6))

@@ -15,8 +15,8 @@ def compare(run, axes, full):
         energy = log.Ek + log.Es
         name = f"steps of {courant} h/c"
         off = np.abs(log.v_x - log.exact).max() / log.exact[0]
-        yield Row(f"{name}: largest error over the initial velocity", 0.0, off, 5e-3, SOURCE)
-        yield Row(f"{name}: final over initial energy", 1.0, energy[-1] / energy[0], within,
+        yield Row(f"{name}: largest error / initial velocity", 0.0, off, 5e-3, SOURCE)
+        yield Row(f"{name}: final / initial energy", 1.0, energy[-1] / energy[0], within,
                   "exact")  # fmt: skip
         axes.plot(log.Time, log.v_x, mark, ms=3, lw=0.8, label=name)
     axes.plot(log.Time, log.exact, "k-", lw=0.7, label="trapezoidal rule, 100 h/c")

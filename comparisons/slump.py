@@ -41,12 +41,12 @@ def compare(run, axes, full):
     still = slip(last)
     yield Row("distance between the slip surfaces (m)", 0.0, distance(FAILURE, still), 2.5, SOURCE)
     # A slice that turns like a rigid body slips on a circle (Fellenius 1936).
-    yield Row("distance from a circle over radius", 0.0, roundness(still), 0.01, "rotation")
+    yield Row("distance from a circle / radius", 0.0, roundness(still), 0.01, "rotation")
     if full:
         # Nothing of this is published: softening widens the slide, and leaves it where it was.
         soft = run(c_residual=8e3).snapshots("slump")[-1]
         further = soft.x[soft.y > GROUND + 0.6].max() / last.x[slid].max()
-        name = "toe with residual cohesion 8 kPa over toe without"
+        name = "toe with residual cohesion 8 kPa / toe without"
         yield Row(name, (1, 1.1), further, 0.0, "softer")
         line = slip(soft)
         name = "distance between the slip surfaces with softening (m)"

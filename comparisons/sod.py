@@ -31,7 +31,7 @@ def compare(run, axes, full):
     log = result.log
     lost = abs(log.total).max() / log.Ek[-1]
     # What is left is of the order of the step; without the heat of what TPIC takes it is 3 %.
-    yield Row("energy lost over kinetic energy", 0.0, lost, 0.01, "conservation of energy")
+    yield Row("energy lost / kinetic energy", 0.0, lost, 0.01, "conservation of energy")
     axes.plot(last.x, density, "o", ms=2.5, mfc="none", label="density")
     axes.plot(last.x, p, "s", ms=2.5, mfc="none", label="pressure")
     x = np.linspace(0.25, 0.85, 2000)

@@ -23,10 +23,10 @@ def compare(run, axes, full):
         kept = log.Lz_z[-1] / log.Lz_z[0]
         source = "exact" if transfer == "APIC" else "bounds"
         yield Row(
-            f"final over initial angular momentum, {transfer}", momentum, kept, within, source
+            f"final / initial angular momentum, {transfer}", momentum, kept, within, source
         )
         energy = log.Ek + log.Es
         kept = energy[-1] / energy[0]
-        yield Row(f"final over initial energy, {transfer}", energies, kept, 0.001, "bounds")
+        yield Row(f"final / initial energy, {transfer}", energies, kept, 0.001, "bounds")
         axes.plot(log.Time, log.Lz_z / log.Lz_z[0], lw=1, label=transfer)
     axes.set(xlabel="time (s)", ylabel="angular momentum / first")

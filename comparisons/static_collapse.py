@@ -14,8 +14,8 @@ def compare(run, axes, full):
     source = "explicit steps"
     for soil, refine, within in (("clay", 1, 0.05), ("clay", 2, 0.02), ("sand", 1, 0.09)):
         here, twin = (run(soil=soil, refine=refine, **how) for how in ({}, IN_TIME))
-        for name, column in (("settlement of the centre of gravity over the height", "sunk"),
-                             ("position of the front over the initial one", "front")):  # fmt: skip
+        for name, column in (("settlement of the centre of gravity / height", "sunk"),
+                             ("position of the front / initial position", "front")):  # fmt: skip
             value, other = (result.log[column][-1] for result in (here, twin))
             yield Row(f"{soil}, {8 * refine} cells: {name}", other, value, within, source)
         if refine == 2:

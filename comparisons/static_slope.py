@@ -22,7 +22,7 @@ def compare(run, axes, full):
     N, line = spiral_slip(radians(45), radians(20))
     for refine, within in ((1, 0.09), (2, 0.03))[: 1 + full]:
         result = run(refine=refine)
-        name = f"weight times height over cohesion, {10 * refine} cells to the height"
+        name = f"weight times height / cohesion, {10 * refine} cells to the height"
         yield Row(name, N, limit(result.log), within, "Chen 1975 (bound from above)")
     last = result.snapshots("static_slope")[-1]
     strain = "plastic strain (%)"

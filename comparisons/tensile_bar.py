@@ -58,7 +58,7 @@ def compare(run, axes, full):
     point = np.argmin(np.hypot(even.x0, even.y0))
     fails = D1 + D2 * exp(D3 / 3)
     yield Row(
-        "plastic strain over damage, before the neck",
+        "plastic strain / damage, before the neck",
         fails,
         even.ep[point] / even.damage_init[point],
         0.03,
@@ -68,7 +68,7 @@ def compare(run, axes, full):
     yield Row("largest damage at the end", 1.0, last.damage.max(), 0.0, "a crack")
     # Five cells across the bar leave a ring of points at the surface that breaks last.
     left = stress[-1] / stress[best]
-    yield Row("stress at the end over the largest", 0.0, left, 0.1 if full else 0.3, "a crack")
+    yield Row("stress at the end / largest stress", 0.0, left, 0.1 if full else 0.3, "a crack")
 
     axes.plot(fem_strain, fem_stress, "k--", lw=1, label="finite elements")
     axes.plot(even_strain, even_stress, "r:", lw=1, label="without a neck")

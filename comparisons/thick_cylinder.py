@@ -17,18 +17,18 @@ def compare(run, axes, full):
     for refine in (0.25, 0.5, 1, 2) if full else (1,):
         result = run(refine=refine)
         pressure, cells = result.log.pressure, int(16 * refine)
-        name = f"limit pressure of the wall, over the yield stress, {cells} cells"
+        name = f"limit pressure of the wall / yield stress, {cells} cells"
         yield Row(name, BEARS, pressure[-1], 0.01 / refine, source)
         axes.plot(result.log.Time / 30 * 4, pressure, label=f"{cells} cells")
         if refine == 1:
             share = pressure[1] / (E / (1 + NU) * 4 / 30 / E / ((1 - 2 * NU) + 4) * 3)
-            yield Row("first step over the elastic solution", 1.0, share, 0.002, "Lame 1852")
+            yield Row("first step / elastic solution", 1.0, share, 0.002, "Lame 1852")
             last = result.snapshots("cylinder")[-1]
             # Sums over the points of a cell: inside one the strain of linear functions is constant.
             order = np.argsort(last.x)
             r, radial = (column[order].reshape(-1, 4).mean(1) for column in (last.x, last.s11))
             off = np.abs(radial + 2 / sqrt(3) * Y * np.log(B / r)).max()
-            yield Row("largest error of the radial stress, over the yield stress", 0.0, off, 0.01,
+            yield Row("largest error of the radial stress / yield stress", 0.0, off, 0.01,
                       source)  # fmt: skip
     axes.axhline(BEARS, color="k", lw=0.7, label="2/sqrt(3) Y ln(b/a)")
     axes.set(xlabel="displacement inside / (a Y/E)", ylabel="pressure / Y")

@@ -31,7 +31,7 @@ def compare(run, axes, full):
     energy = log.Ek + log.Es
     first, last = energy[log.Time < 10].mean(), energy[log.Time > 90].mean()
     yield Row(
-        "final over initial energy",
+        "final / initial energy",
         (0.98, 1.002),
         last / first,
         0.0,

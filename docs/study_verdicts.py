@@ -299,7 +299,7 @@ def tables(groups: Mapping[str, Mapping[str, Scene]]) -> str:
         for word in WORDS:
             if said := [one for one in wide if one.word == word]:
                 words.append([title, word, str(len(said)), counted(said), within(said)])
-    heads = ["scene", "difficulty", "target", "advice", "its error", "cost over the lowest"]
+    heads = ["scene", "difficulty", "target", "advice", "its error", "cost / lowest cost"]
     heads_of_words = ["scenes", "word", "targets", "verdicts", "below the upper bound"]
     heads_of_next = ["scenes", "between the bounds", "of forecasts called `not sure`"]
     parts = ([*heads, "verdict"], rows), (heads_of_words, words), (heads_of_next, next_runs)

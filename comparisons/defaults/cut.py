@@ -3,7 +3,7 @@
 from comparisons.defaults import Case
 
 CASE = Case(
-    quantity="weight times height over cohesion at failure",
+    quantity="weight times height / cohesion at failure",
     exact=3.78,
     measure=lambda result: result.log.N[-1],
     source="bounds of limit analysis, Pastor et al. 2000",

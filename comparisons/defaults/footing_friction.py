@@ -14,7 +14,7 @@ def load(result: Result) -> float:
 
 
 CASE = Case(
-    quantity="limit load over cohesion",
+    quantity="limit load / cohesion",
     exact=prandtl_load(1, radians(20)),
     measure=load,
     source="Prandtl 1920, 20 degrees",

@@ -18,13 +18,13 @@ from karamelo_py.script.expressions import POINT_SEEDS
 
 SLOW = 0.01  # fraction of the wave speed; no slower drift was seen to gain energy
 TORN = 9.0, 14.0  # tolerable rotation with one point per cell, radians: FLIP, affine transfers
-# Mean squared distance of a point from its nodes, weighted by N, per direction and over h^2: for
+# Mean squared distance of a point from its nodes, weighted by N, per direction, divided by h^2: for
 # the linear basis with two points per cell, and for second-order bases.
 SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 
 class Noise(NamedTuple):
-    share: float  # noise over the tolerable amount
+    share: float  # noise / tolerable amount
     speed: float  # speed of the body or its rim, over the wave speed
     cells: float  # path of the body or its rim, in cells
     angle: float = 0.0

@@ -61,12 +61,12 @@ class SceneFacts(BasicFacts):
     driven = cached_property(settling.driven)
     settling, uneven = cached_property(settling.expected), cached_property(uneven)
     bent_row, parting = cached_property(bent_row), cached_property(parting)
-    # The step over the stable step; and over the limit for neighbours of different density.
+    # Step / stable step, and step / limit for neighbours of different density.
     fraction = property(lambda self: self.simulation.dt / self.simulation.steps.limit)
     fraction_of_uneven = property(lambda self: self.fraction * self.uneven.of_step)
     fastest = cached_property(lambda self: self.simulation.fastest())  # largest velocity component
     turns = property(lambda self: self.turn > TURN)
-    # Largest velocity over the wave speed; strain due to impacts and weight.
+    # Largest velocity / wave speed; strain due to impacts and weight.
     speed = property(lambda self: self.fastest / self.waves if self.waves > 0 else 0.0)
     strain = property(lambda self: max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag))
     # All bodies deform evenly, so that no single cell is constrained.
@@ -122,7 +122,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def impact(self) -> float:
-        """Half of the largest velocity difference over wave speed."""
+        """Half of the largest velocity difference / wave speed."""
         if not (self.motions and self.waves > 0):
             return 0.0
         fast = np.max([motion.fast for motion in self.motions], axis=0)
@@ -160,7 +160,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def falls(self) -> float:
-        """Duration of the run over sqrt(L/g)."""
+        """Duration of the run / sqrt(L/g)."""
         sizes = [np.maximum(motion.high - motion.low, 1e-300) for motion in self.motions]
         rates = (np.abs(g) / np.max(sizes, axis=0) for g in self.weights)
         return self.duration * max((sqrt(rate.max()) for rate in rates), default=0.0)

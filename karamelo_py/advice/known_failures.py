@@ -30,9 +30,9 @@ from karamelo_py.script.expressions import POINT_SEEDS
 
 PEEK = 100  # steps; a shorter run is only an inspection of a scene
 ENDLESS = 1e8
-MIXED = 300  # step over the stable step above which wrong units are likelier
+MIXED = 300  # step / stable step above which wrong units are likelier
 DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases are not checked
-IMPOSSIBLE = 30.0  # speed over wave speed (mm/s instead of m/s is a factor of 1000)
+IMPOSSIBLE = 30.0  # speed / wave speed (mm/s instead of m/s is a factor of 1000)
 SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # density; moduli, in m, kg, s and mm, t, s
 SPEEDS = 1.0, 5e4  # wave speeds in m/s, from jelly to above diamond
 REST = "a scene at rest"

@@ -43,7 +43,7 @@ from karamelo_py.scene.solid import Solid
 
 NO_LAYERS = 0, (0.0, 0.0)
 SAMPLES = 1000  # positions that are tested for whether a solid is a prism
-THIN = 0.2  # thickness over the smallest width of a plate in plane stress
+THIN = 0.2  # thickness / smallest width of a plate in plane stress
 
 
 def lesser_models(hub: Hub, _: object = None) -> Words:
@@ -188,7 +188,7 @@ def _flows(hub: Hub) -> bool:
 
 
 def _longer(hub: Hub, d: int) -> float:
-    """Return the stable step of a thin body in `d` dimensions over its step in 3D."""
+    """Return the stable step of a thin body in `d` dimensions / its step in 3D."""
     ratios, space, thin = [], Space(), KINEMATICS[d]()
     for solid in hub.solids.values():
         law = law_on(solid.material.whole, solid.h, solid.T0)

@@ -109,7 +109,7 @@ def acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
-    """Return words for the cost of a scene over its cost in `d` dimensions.
+    """Return words for the cost of a scene relative to its cost in `d` dimensions.
 
     The cost of a point is proportional to its number of nodes; a step may be `longer` there.
     """

@@ -12,7 +12,7 @@ from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
-SLENDER = 4.0  # length over thickness above which a body bends
+SLENDER = 4.0  # length / thickness above which a body bends
 # Limits of c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Of two vibrating blocks
 # (usl, linear basis, 1 to 3 points per cell), 3.2 and 5.9 fail within 3000 steps, 1.9 does not.
 BREAKS, HOLDS = 2.5, 1.9

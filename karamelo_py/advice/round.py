@@ -30,7 +30,7 @@ from karamelo_py.script.values import TIME
 
 SAMPLES = 4000  # positions that are tested for whether a shape is round
 SAME = 1e-9  # relative difference of loads that are equal around an axis
-WIDE = 1.5  # radius of a square plate over the radius of the body on it
+WIDE = 1.5  # radius of a square plate / radius of the body on it
 ROTATING = "velocity_nodes", "initial_velocity_particles"
 
 
@@ -178,7 +178,7 @@ def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
 
 
 def _points_by_radius(solids: list[Solid], middle: Middle) -> float:
-    """Return the number of points of the bodies over the number in their section."""
+    """Return the number of points of the bodies / number in their section."""
     many = 0.0
     for solid in solids:
         size = solid.h / (solid.ppc or 1)

@@ -7,7 +7,7 @@ from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-LOST = 2.05  # step over the stable step above which every run failed
+LOST = 2.05  # step / stable step above which every run failed
 EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (points alone in cells)"}
 
 

@@ -63,7 +63,7 @@ def cylindrical(hub: Hub, active: bool) -> None:
     Notes
     -----
     Use this command before the first solid, in a 1D domain with x >= 0. The hoop strain is the
-    radial displacement over r (component 22); there is no strain along the axis (33). Points carry
+    radial displacement / r (component 22); there is no strain along the axis (33). Points carry
     the volume and mass of one radian and of unit length, r dr: multiply by 2 pi for the whole ring.
     A node at x = 0 does not move.
 
@@ -85,7 +85,7 @@ def spherical(hub: Hub, active: bool) -> None:
     Notes
     -----
     Use this command before the first solid, in a 1D domain with x >= 0. The hoop strains,
-    components 22 and 33, are the radial displacement over r. Points carry the volume and mass of
+    components 22 and 33, are the radial displacement / r. Points carry the volume and mass of
     one steradian, r^2 dr: multiply by 4 pi for the whole sphere. A node at x = 0 does not move.
     Materials must behave alike in y and z. At a Poisson's ratio near 0.5, and in plastic flow of
     metals, a linear basis locks: use anti_volumetric_locking(true).

@@ -74,7 +74,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     dt
-        The time step. A run warns above the stable step, the cell size over wave speed plus
+        The time step. A run warns above the stable step, the cell size divided by wave speed plus
         velocity (less with usl), and stops at once above four times the limit of heat conduction.
 
     Example

@@ -31,9 +31,9 @@ def plane_stress(hub: Hub, active: bool, *, thickness: Annotated[float, Positive
     Notes
     -----
     Use this command before the first material. Each law finds the strain across the plate for which
-    szz vanishes. The column ``thickness`` is the present thickness over the initial one;
-    ``stress_left`` is the largest remaining szz of any step over the largest stress, and above 2 %
-    a run warns. Masses, forces and energies refer to the whole thickness.
+    szz vanishes. The column ``thickness`` is the present thickness divided by the initial one;
+    ``stress_left`` is the largest remaining szz of any step divided by the largest stress: a run
+    warns above 2 %. Masses, forces and energies refer to the whole thickness.
 
     Liquids, gases and loose grains are refused, since they have no strength unless confined, and
     anti_volumetric_locking, since plane stress does not lock. With a thickness other than 1, fixes

@@ -80,7 +80,7 @@ class SeparateFields(NamedTuple):
     torques: np.ndarray  # (values,) slot of the torque of the force in each slot, or 0
     memory: np.ndarray  # (F,) steps that a contact is remembered
     fluid: np.ndarray  # (F,) bool
-    surface: np.ndarray  # (F, k) distance to the surface over mean position, in cells
+    surface: np.ndarray  # (F, k) distance to the surface against mean position, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet
     partners: np.ndarray  # (F,) int64 scratch: contacts of each field
     change: np.ndarray  # (F, k) scratch: velocity changes

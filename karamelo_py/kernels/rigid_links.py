@@ -42,8 +42,8 @@ from karamelo_py.kernels.surfaces import (
 
 SOFT = 1e-5
 GIVEN_BACK = 0.1  # fraction of a penetration that is removed per step
-SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual over momentum, both as sums of p^2 / m
-SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope over initial slope
+SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual / momentum, both as sums of p^2 / m
+SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope / initial slope
 SLOW = 1e-9  # collisions slower than this fraction of the fastest one are ignored
 COLLISIONS = 50  # largest number per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)

@@ -44,7 +44,7 @@ class Touch(NamedTuple):
 
 
 def direction_of(falls, step):
-    """Return the unit direction of depth differences over two steps; 0 if depth is constant."""
+    """Return the unit direction of depth differences in two steps; 0 if depth is constant."""
     size = sqrt(falls.squared())
     return (1 / size if size > LEVEL * step else 0.0) * falls
 
@@ -65,7 +65,7 @@ def ball_at_first(ball, within, closer):
 
 
 def spring_rate(before, now, within, reach):
-    """Return stiffness over mass, constant from the first touch on to conserve energy.
+    """Return stiffness / mass, constant from the first touch on to conserve energy.
 
     A larger stiffness would add energy, and a much smaller one would let points through.
     """

@@ -40,14 +40,14 @@ FEW = 3  # number of first checks that are compared before a window is full
 LOOKS = 10  # checks per window
 GROWTH = 0.01  # growth per window for a warning
 WITHIN = 0.1  # growth since the start for a warning
-DRIFTING = 1e-3  # smallest unit over drift energy; relevant vibrations exceed it
-BOUND = 10.0  # gain over initial energy plus work of loads above which a run stops
+DRIFTING = 1e-3  # smallest unit / drift energy; relevant vibrations exceed it
+BOUND = 10.0  # gain / (initial energy + work of loads) above which a run stops
 ROUND_OFF = 1e-14  # fraction of m c^2 below which energy is noise
 COARSE = 1000.0  # strain in units of round-off below which it is noise
 ENERGIES, OF_SOLID = 3, 5  # columns of tile reports
 HEAT_NOISE = 1e-4  # tolerated fraction of a uniform temperature
-OVERSHOOT = 0.1  # overshoot over the range of source temperatures above which a run stops
-# Tolerated step over the stable step of conduction, up to which null-space temperatures decay
+OVERSHOOT = 0.1  # overshoot / range of source temperatures above which a run stops
+# Tolerated step / stable step of conduction, up to which null-space temperatures decay
 # (measured with 2 points per cell: 4, and 5.8 without convection).
 BORNE = 4.0
 

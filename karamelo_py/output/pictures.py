@@ -71,7 +71,7 @@ class Options(NamedTuple):
     log: bool = False  # logarithmic colours; values <= 0 get the lowest colour
     quantile: float = 0.0  # fraction of values at each end beyond the limits
     fontsize: float = 9.0
-    pointsize: float = 1.0  # diameter over the size of a material point
+    pointsize: float = 1.0  # diameter / size of a material point
     outlines: bool = False
 
 

@@ -18,7 +18,7 @@ class DriftLimits(NamedTuple):
     averaged: tuple[float, float]  # as `drift`, with usavg
     rim: tuple[float, float]  # rotating body, musl and usf
     rim_averaged: tuple[float, float]  # usavg
-    fastest: float = inf  # drift over wave speed above which no noise is added
+    fastest: float = inf  # drift / wave speed above which no noise is added
     damps: bool = False  # in 3D, a faster drift damps vibrations
 
 

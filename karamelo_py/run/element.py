@@ -80,8 +80,8 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
 DIVISIONS = 8  # halvings of an increment that does not converge
-TOLERANCE = 1e-10  # residual over the stress, or over its change in elastic increments
-UNRESOLVED = 1e-13  # stress over modulus below which it is round-off
+TOLERANCE = 1e-10  # residual / stress, or / its change in elastic increments
+UNRESOLVED = 1e-13  # stress / modulus below which it is round-off
 
 
 class Unreachable(Exception):

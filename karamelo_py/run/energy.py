@@ -133,7 +133,7 @@ class EnergyWatch:
         return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
-        """Return the energy lost since the first step (gained: negative) over the largest one."""
+        """Return the energy lost since the first step (gained: negative) / the largest energy."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))

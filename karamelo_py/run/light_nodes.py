@@ -38,7 +38,7 @@ class _Line(NamedTuple):
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
-    """Return the stable step over h/c for the nodes of all solids; inf if it is unknown.
+    """Return the stable step / (h/c) for the nodes of all solids; inf if it is unknown.
 
     It is rounded down to four digits, so that it does not depend on the order of sums.
     """
@@ -134,7 +134,7 @@ def _line(basis: Tag, kin: Tag, grid: Tag, places: np.ndarray, direction: int) -
 
 
 def _shear_share(law: Tag, kin: Tag) -> float:
-    """Return shear modulus over P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
+    """Return shear modulus / P-wave modulus, at most 1/2 (Poisson's ratio 0)."""
     strength = parameter(law, "strength", None)
     G = parameter(law, "G", None) or (shear_modulus(strength) if strength else inf)
     stiffness = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)

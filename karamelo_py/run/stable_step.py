@@ -1,4 +1,4 @@
-"""The stable step over h/c, and its default fraction."""
+"""The stable step / (h/c), and its default fraction."""
 
 from math import inf, sqrt
 
@@ -31,7 +31,7 @@ from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 BOX_WEIGHT = 6.0  # weight of the common velocity in steps with domains that are boxes
-SLOWED = 1.2  # viscous over elastic wave speed above which viscosity limits the step
+SLOWED = 1.2  # viscous / elastic wave speed above which viscosity limits the step
 LONE = 0.9  # fraction of an isolated point's stable step, as expanded points are stiffer
 # With mass=corrected in the total frame, blocks with one point per cell gain energy at 0.73 times
 # the stable step.
@@ -92,7 +92,7 @@ def _flows(law: Tag) -> bool:
 
 
 def lone_point(hub: Hub) -> float:
-    """Return the stable step over h/c of an isolated point that stores a moment.
+    """Return the stable step / (h/c) of an isolated point that stores a moment.
 
     The pressure accelerates the stored velocity gradient L by dL/dt = -p / (rho D). This is an
     oscillator of frequency c sqrt(d / D), which is stable up to dt = 2 sqrt(D / d) / c. If points
@@ -155,7 +155,7 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step over h/c; `longer`: of points that remain in their cells.
+    """Return the stable step / (h/c); `longer`: of points that remain in their cells.
 
     In the total frame, it is limited by nodes of thin and round bodies if points have moments.
     """
@@ -195,7 +195,7 @@ def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
 
 
 def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
-    """Return the stable step over h/c and the default fraction of it.
+    """Return the stable step / (h/c) and the default fraction of it.
 
     `still`: no point has moved as far as `STILL`.
     """

@@ -30,7 +30,7 @@ NO_STRIDE = 1e9  # path in cells that points never reach
 
 
 class StepPolicy(NamedTuple):
-    still: tuple[float, float]  # stable step over h/c, and the fraction of it, at rest
+    still: tuple[float, float]  # stable step / (h/c), and the fraction of it, at rest
     moving: tuple[float, float]
     weight: float  # weight of the common velocity
     fixed_dt: float  # 0: the step is adapted to the fastest point

@@ -17,7 +17,7 @@ PLANE = 0.01  # tolerated distance of the surface from a plane, over box size
 EDGE = 0.05  # the same for the smallest sub-boxes
 SHEET = 0.01  # the same for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
-NOTHING = 1e-9  # round-off over box size
+NOTHING = 1e-9  # round-off / box size
 # Fraction of a box that consists of smallest sub-boxes with a surface that is not plane: 1/3 of
 # ROUGH at a corner in 2D or an edge in 3D, more in thin sheets.
 ROUGH = 0.025

@@ -22,7 +22,7 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# Of the last step: number of corrections, residual over forces, number of substeps.
+# Of the last step: number of corrections, residual / forces, number of substeps.
 PUBLISHED = "iterations", "residual", "parts"
 
 
@@ -40,7 +40,7 @@ class QuasiStatic(NamedTuple):
     Parameters
     ----------
     tolerance
-        Residual over nodal forces at which a step has converged, from 1e-14 to 0.01.
+        Residual / nodal forces at which a step has converged, from 1e-14 to 0.01.
     iterations
         Number of corrections after which a step that has not converged is halved.
     solver

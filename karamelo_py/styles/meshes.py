@@ -30,7 +30,7 @@ UNITS = {
     1 / 0.0254: "a file in metres, a script in inches",
     1 / 25.4: "a file in millimetres, a script in inches",
 }
-CURVED = 0.01  # distance from the straight edge over its length, as in a circle of 80 elements
+CURVED = 0.01  # distance from the straight edge / its length, as in a circle of 80 elements
 
 
 def _tell_of_curved_edges(hub: Hub, file: MeshFile, bulge: float) -> None:

@@ -19,7 +19,7 @@ class Heights(Enclosed):
     Parameters
     ----------
     file
-        In 3D a raster of z over x and y: an ESRI ASCII grid (.asc), or GeoTIFF (.tif, with the
+        In 3D a raster of z against x and y: an ESRI ASCII grid (.asc), or GeoTIFF (.tif, with the
         package rasterio); or a cloud of points (with SciPy): a table of x, y and z (.xyz, .csv), or
         a file that meshio reads (.ply, .vtk, .vtu). In 2D a profile: a file with two columns, x
         and height y.

@@ -1,4 +1,4 @@
-"""karamelo-py chart: errors over cost, convergence, maps over two variables, curves of logs."""
+"""karamelo-py chart: errors against cost, convergence, maps of two variables, curves of logs."""
 
 import base64
 import html
@@ -22,12 +22,12 @@ from karamelo_py.output.plots import tick_texts
 from karamelo_py.script.errors import ScriptError
 
 DESCRIPTION = """\
-Draws the table of a sweep: errors over costs on logarithmic axes, a line for each choice, and the
-Pareto front (runs that none beats in both). Prints the same as a table, with fitted orders.
+Draws the table of a sweep: errors against costs on logarithmic axes, a line for each choice, and
+the Pareto front (runs that none beats in both). Prints the same as a table, with fitted orders.
 
   karamelo-py chart sweep.csv -accuracy err -cost seconds -by basis,transfer -o chart.png
-  karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors over a variable
-  karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  over two variables
+  karamelo-py chart sweep.csv -accuracy err -x N -o orders.svg       errors against a variable
+  karamelo-py chart sweep.csv -accuracy err -heat N,ppc -o heat.pdf  against two variables
   karamelo-py chart sweep.csv -accuracy err -o chart.html            a page of runs
   karamelo-py chart sweep.csv -y runout -x a -law "1.2*a" -data seen.csv -o runout.png   a result
   karamelo-py chart sweep.csv -curve Ek -x Time -o curves.png        columns of the logs
@@ -48,7 +48,7 @@ def add_options(parser: ArgumentParser) -> None:
         "-curve", metavar="COLUMN", help="draw a log column of each run over -x (Time)"
     )
     wanted.add_argument(
-        "-y", metavar="A,B", help="draw results over the variable -x, a line per value of -by"
+        "-y", metavar="A,B", help="draw results against the variable -x, a line per value of -by"
     )
     wanted.add_argument(
         "-keeps", metavar="COLUMN",
@@ -57,15 +57,15 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     wanted.add_argument(
         "-distribution", metavar="COLUMN",
-        help="draw the distribution of a result of sweep -sample, and it over each variable",
+        help="draw the distribution of a result of sweep -sample, and it against each variable",
     )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
     parser.add_argument(
         "-by", action="append", default=[], metavar="A,B", help="variables with a line per value"
     )
     kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("-x", metavar="NAME", help="draw errors over this variable, not over cost")
-    kinds.add_argument("-heat", metavar="A,B", help="draw errors over two variables, as colours")
+    kinds.add_argument("-x", metavar="NAME", help="draw errors against this variable, not cost")
+    kinds.add_argument("-heat", metavar="A,B", help="draw errors against two variables, as colours")
     kinds.add_argument(
         "-versus", metavar="NAME", help="compare its two values in each of the tables"
     )

@@ -96,8 +96,8 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
     """Sizes of errors without reductions by chance.
 
-    They are at least the change since the last run over the reduction by the order `highest`, and
-    the error of each finer run.
+    They are at least the change since the last run, divided by the reduction by the order
+    `highest`, and at least the error of each finer run.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -181,7 +181,7 @@ class Family:
         require("-cost", [cost], rows[0])
         require("-by", by, variables)
         require("-x", [along] if along else [], variables)
-        self.convergence = bool(along)  # errors over `along`, not over cost
+        self.convergence = bool(along)  # errors against `along`, not against cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [

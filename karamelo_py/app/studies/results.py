@@ -1,4 +1,4 @@
-"""karamelo-py chart -y: a result of a sweep over a variable, with a law or measured points."""
+"""karamelo-py chart -y: a result of a sweep against a variable, with a law or measured points."""
 
 from argparse import Namespace
 from collections.abc import Mapping, Sequence

@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DESCRIPTION = """\
-Maps where a script is stable over one or two of its variables. The classes of runs: stable, damped
-(spurious energy loss), growing (spurious energy gain), left (a point left the domain, which says
-nothing about the step), short (too few steps to see whether energy grows), and failed, with the
-reason. The energy is kinetic + stored + dissipated energy less the work of loads, or a log column
-with a bound. An error in the script ends the study. Edges between classes are found by bisection,
-from coarse to fine: cells between two of the same class are not run: "run 7 of at most 400" means
-about 100 runs. Each word (basis, transfer, scheme) has a row that is searched separately. The table
-next to the picture (map.csv) says which cells were run. -var with one value is passed on. -accuracy
-shades the stable cells by an error.
+Maps where a script is stable, against one or two of its variables. The classes of runs: stable,
+damped (spurious energy loss), growing (spurious energy gain), left (a point left the domain, which
+says nothing about the step), short (too few steps to see whether energy grows), and failed, with
+the reason. The energy is kinetic + stored + dissipated energy less the work of loads, or a log
+column with a bound. An error in the script ends the study. Edges between classes are found by
+bisection, from coarse to fine: cells between two of the same class are not run: "run 7 of at most
+400" means about 100 runs. Each word (basis, transfer, scheme) has a row that is searched
+separately. The table next to the picture (map.csv) says which cells were run. -var with one value
+is passed on. -accuracy shades the stable cells by an error.
 
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var xi=0:1:20 -o map.png
   karamelo-py stability in.file -var dt_factor=0.1:2:20 -var basis=linear,cubic-spline -accuracy err
@@ -78,7 +78,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("-energy", metavar="COLUMN", help="log column that must not grow")
     parser.add_argument(
         "-bound", type=above_zero, default=2.0,
-        help="growth of -energy over the mean of the first tenth of the log (2)",
+        help="growth of -energy relative to the mean of the first tenth of the log (2)",
     )  # fmt: skip
     parser.add_argument(
         "-accuracy", metavar="COLUMN", help="error that shades the stable part: err, off=abs(...)"
@@ -147,7 +147,7 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Largest running mean (10 % of the rows) over the first; inf for NaN.
+    """Largest running mean (10 % of the rows) / the first; inf for NaN.
 
     If the first is 0, the median replaces it.
     """
@@ -179,7 +179,7 @@ def in_short(row: Row, code: str) -> str:
 
 
 class Map:
-    """Stability over one or two `axes` of the variables in `values`.
+    """Stability against one or two `axes`, variables of `values`.
 
     A run grows if the log column `energy` grows by more than the factor `bound`; without a column,
     by the energy balance. The column `error` shades stable cells. A variable has the index of its

@@ -28,7 +28,7 @@ class Lever(Field):
     """Contact at the surface of a point: sqrt(f r) n (d,), 0 without contact, and the distance r.
 
     The force f n at x - r n is equivalent to a force at x and the stress f r n n / V. Further
-    components are stiffness over mass, depth, the damping part of f, the depth due to
+    components are stiffness / mass, depth, the damping part of f, the depth due to
     `follow_strain`, and the last increment of strain along n.
     """
 

@@ -33,7 +33,7 @@ def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(typed=True)
 def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
-    """Tabulate the distance of a plane surface from a node over the points' mean position.
+    """Tabulate the distance of a plane surface from a node against the points' mean position.
 
     Points of equal mass lie in layers below the surface, the first at half their size. Distances
     are in cells along the outward normal; row k is for a mean of k / ENTRIES - 3 (after Nairn 2013,

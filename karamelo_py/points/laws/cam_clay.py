@@ -36,7 +36,7 @@ class CamClayConstants(NamedTuple):
     M
         Critical state ratio q/p; 6 sin(phi)/(3 - sin(phi)) in triaxial compression.
     lam
-        Slope of -ln(volume) over ln(p) in virgin consolidation: about lambda/(1 + e).
+        Slope of -ln(volume) against ln(p) in virgin consolidation: about lambda/(1 + e).
     kappa
         The same slope in swelling, below lam.
     p0

@@ -56,8 +56,8 @@ class JohnsonCookDamage(NamedTuple):
     Parameters
     ----------
     d1, d2, d3
-        Failure strain d1 + d2 exp(d3 t) at the reference rate, with t the mean stress over the von
-        Mises stress.
+        Failure strain d1 + d2 exp(d3 t) at the reference rate, with t = mean stress / von Mises
+        stress.
     d4
         Rate coefficient; 0 for none.
     d5
@@ -75,9 +75,9 @@ class JohnsonCookDamage(NamedTuple):
     -----
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
     Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate, the
-    third without a temperature. w (dump column damage_init) sums plastic strain over failure
-    strain. Beyond w = 1, D (dump column damage) is 10 (w - 1), up to 1. There is no failure for t
-    below -3. d1 may be negative; failure strains are at least 1e-6.
+    third without a temperature. w (dump column damage_init) is the sum of plastic strain
+    increments / failure strain. Beyond w = 1, D (dump column damage) is 10 (w - 1), up to 1. There
+    is no failure for t below -3. d1 may be negative; failure strains are at least 1e-6.
 
     sigma = (1 - D) s - p I, with p times 1 - D in tension. Stored energy that is lost by damage
     counts as dissipated.

@@ -133,7 +133,7 @@ class Transverse(NamedTuple):
     E, nu
         Young's modulus and Poisson's ratio in planes normal to the direction.
     E3, nu3
-        Young's modulus along the direction, and lateral contraction over stretch along it.
+        Young's modulus along the direction, and lateral contraction / stretch along it.
     G3
         Shear modulus of planes that contain the direction.
     angle, tilt
@@ -202,7 +202,7 @@ def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 def fastest(C: np.ndarray) -> float:
-    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l over all n."""
+    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l for any n."""
     z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)

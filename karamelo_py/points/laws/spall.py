@@ -43,7 +43,7 @@ class TulerButcher(NamedTuple):
     -----
     A point fails when the integral of (s1 - sigma0)^exponent over time reaches K, with the largest
     principal stress s1 of intact material (Tuler & Butcher 1968, Int. J. Fract. Mech. 4, 431-437).
-    It then sustains pressure only. Dump columns: damage, and damage_init, the integral over K.
+    It then sustains pressure only. Dump columns: damage, and damage_init, the integral / K.
 
     See Also
     --------
@@ -63,7 +63,7 @@ column(TulerButcher, "damage_init", damage_initiation)
 
 
 class Pulled(NamedTuple):
-    w: Any  # integral over K
+    w: Any  # integral / K
 
 
 @initial_damage.on(TulerButcher)
@@ -107,7 +107,7 @@ class CochranBanner(NamedTuple):
     Tension is at most sigma0 (1 - (w/D0)^(2/3)) (Cochran & Banner 1977, J. Appl. Phys. 48,
     2729-2737). At that bound the opening w grows by the volume strain times the cell size. The lost
     fraction D of the stress of intact material never decreases. Dump columns: damage, and
-    damage_init, w over D0.
+    damage_init, w / D0.
 
     See Also
     --------
@@ -130,7 +130,7 @@ column(CochranBanner, "damage_init", damage_initiation)
 
 
 class Opened(NamedTuple):
-    w: Any  # opening over D0
+    w: Any  # opening / D0
     left: Any  # lost fraction of the stress
 
 

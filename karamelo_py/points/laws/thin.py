@@ -35,7 +35,7 @@ class ThinInLargeIncrements(Thin):
 
 class State(NamedTuple):
     whole: Any  # memory of the inner law
-    across: Any  # thickness over initial thickness
+    across: Any  # thickness / initial thickness
     left: Any  # largest stress across that the trials of a step have left
     largest: Any  # largest component of stress so far
 
@@ -146,7 +146,7 @@ def _with_stress_thin(law, kin, state, stress):
 
 @laws.number
 def thickness(law, kin, state):
-    """Return the thickness over the initial thickness."""
+    """Return the thickness / initial thickness."""
     return state.across
 
 

@@ -30,9 +30,9 @@ from karamelo_py.points.laws.parameters import MaterialArgument
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError, plural
 
-ENOUGH = 1e3  # strain increment over round-off above which its stiffness is known
-LEAST = 0.01  # smallest stiffness over stiffness at rest that is used
-SMALL = 0.01  # step over relaxation time below which a series is exact
+ENOUGH = 1e3  # strain increment / round-off above which its stiffness is known
+LEAST = 0.01  # smallest stiffness / stiffness at rest that is used
+SMALL = 0.01  # step / relaxation time below which a series is exact
 
 
 class ElasticMaterial(MaterialArgument):
@@ -52,7 +52,7 @@ class ElasticMaterial(MaterialArgument):
 
 
 def strained(law: Any, component: int) -> Any:
-    """Return stress over strain after a small increment of one component of F from rest."""
+    """Return stress / strain after a small increment of one component of F from rest."""
     space, size = Space(), 1e-6
     dl = tensor(space, [size * (component == k) for k in range(9)])
     state = laws.advance(law, space, laws.initial_state(law, space, 1.0), dl, 1.0)
@@ -115,7 +115,7 @@ DECADES = 30.0  # largest shift, as the formula has a pole at T = Tr - C2
 
 
 def shifted(shift, dt, T):
-    """Return the step dt over the shift of times at temperature T."""
+    """Return the step dt / shift of times at temperature T."""
     if isinstance(shift, Absent):
         return dt
     above = T - shift.Tr
@@ -128,7 +128,7 @@ class Branch(NamedTuple):
 
     g: float  # relaxing fraction of stiffness
     tau: float
-    softness: float  # 1/(4 g G): stored energy over stress squared
+    softness: float  # 1/(4 g G): stored energy / stress squared
     rest: Any
 
 
@@ -224,7 +224,7 @@ class State(NamedTuple):
     branches: Any  # h of the first branch, and of the rest
     loss: Any  # dissipated energy per reference volume
     gone: Any  # energy of the elastic law not stored, per reference volume
-    stiffness: Any  # shear stiffness of the last strain over the stiffness at rest
+    stiffness: Any  # shear stiffness of the last strain / stiffness at rest
 
 
 def at_rest(branches, kin):
@@ -273,7 +273,7 @@ def decayed(branches, memory, dl, added, dt):
 
 
 def stiffness_along(branches, added, strain, last):
-    """Return shear stiffness along a strain increment over stiffness at rest, or the `last` one."""
+    """Return shear stiffness along a strain increment / stiffness at rest, or the `last` one."""
     square = inner(strain, strain)
     known = square > (ENOUGH * round_off(square)) ** 2
     # 1/(2 G) at rest is 2 g softness

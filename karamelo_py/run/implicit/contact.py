@@ -16,7 +16,7 @@ from karamelo_py.kernels.contact import Bodies, ListedPairs, list_pairs
 from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.run.implicit.equations import Equations
 
-STIFF = 1e3  # stiffness of the penalty spring over stiffness of a cell of the softer body
+STIFF = 1e3  # stiffness of the penalty spring / stiffness of a cell of the softer body
 LIGHT = 0.01  # fraction of an inner node's mass below which there is no contact
 SLIPPERY = 0.05  # the same, below which there is no friction
 CLOSE = 1e-4  # gap in cells below which contact is assumed at first

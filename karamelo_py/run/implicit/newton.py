@@ -19,7 +19,7 @@ from karamelo_py.script.errors import plural
 
 ROUNDING = 50 * float(np.finfo(float).eps)  # relative, for sums of some dozens of terms
 SINGULAR = "the equations are singular"
-ASTRAY = 1e4  # displacement over the largest allowed one above which the solution has diverged
+ASTRAY = 1e4  # displacement / largest allowed one above which the solution has diverged
 
 
 @contextmanager

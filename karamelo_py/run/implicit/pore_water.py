@@ -33,7 +33,7 @@ from karamelo_py.run.implicit.equations import Equations, interpolation, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
-OUTLET = 1e3  # conductance of a seepage face over the conductance of its cells
+OUTLET = 1e3  # conductance of a seepage face / conductance of its cells
 CAVITATION = -1e5  # Pa
 NUMBERS = "n", "drag", "K", "rho", "suction"
 EPS = 50 * float(np.finfo(float).eps)

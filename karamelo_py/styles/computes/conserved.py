@@ -141,10 +141,10 @@ class EnergyBalance(Compute):
     Notes
     -----
     Publishes ID, kinetic + stored + dissipated energy - work; ID_total, the same without the work;
-    and ID_drift, the change of ID since the first output over the largest of these energies and the
-    work so far. Velocities lag positions by half a step, so ID_drift has an error of order dt (up
-    to 33 % in a body of a few cells). The energy line at the end of a run has no such error. Energy
-    stored within points by affine transfers is not included.
+    and ID_drift, the change of ID since the first output divided by the largest of these energies
+    and the work so far. Velocities lag positions by half a step, so ID_drift has an error of order
+    dt (up to 33 % in a body of a few cells). The energy line at the end of a run has no such error.
+    Energy stored within points by affine transfers is not included.
 
     See Also
     --------

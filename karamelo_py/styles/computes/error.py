@@ -164,7 +164,7 @@ class Error(Compared, Compute):
 
     Publishes ID, the present error; ID_max, the largest error so far; and ID_history, the norm over
     all points and outputs so far, with each output weighted by the time since the previous output.
-    With ``relative``, ID_history is the norm of all differences over the norm of all exact values,
+    With ``relative``, ID_history is the norm of all differences / norm of all exact values,
     so exact values may be 0 at times.
 
     See Also
@@ -227,8 +227,8 @@ class Reference(Compared, Compute):
     Parameters
     ----------
     subject
-        A value (``v_x``, a variable, a formula), compared over time, or a group of points, compared
-        over a coordinate.
+        A value (``v_x``, a variable, a formula), compared as a function of time, or a group of
+        points, compared as a function of a coordinate.
     file
         Columns separated by commas, semicolons or blanks, with names in the first row (else 1, 2,
         ...); # begins a comment line. The first column is the time for a value. For points its name

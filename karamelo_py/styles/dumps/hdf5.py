@@ -1,4 +1,4 @@
-"""dump hdf5 and grid/hdf5: arrays over time and id."""
+"""dump hdf5 and grid/hdf5: arrays by time and id."""
 
 import os
 import re

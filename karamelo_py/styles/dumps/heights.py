@@ -24,7 +24,7 @@ class HeightsDump(Dump):
         Cell size of the raster: at least twice the point spacing, otherwise cells inside the
         deposit are empty.
     of
-        ``depth``: volume of the points in a cell over the area of the cell. ``top``: height of the
+        ``depth``: volume of the points in a cell / area of the cell. ``top``: height of the
         upper face of the highest point in a cell; -9999 (NODATA) in empty cells.
 
     Example

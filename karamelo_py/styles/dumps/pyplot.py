@@ -37,7 +37,7 @@ SAMPLE = 1 << 16  # points that are sampled for the typical size
 class PyPlot(Dump):
     """Draw a picture of the points, coloured by a field or by their solid.
 
-    In 1D the field is drawn as a curve over x.
+    In 1D the field is drawn as a curve against x.
 
     Parameters
     ----------

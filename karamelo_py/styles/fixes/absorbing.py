@@ -137,7 +137,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return P and S wave speeds; in saturated soil, rho c over the dry density."""
+    """Return P and S wave speeds; in saturated soil, rho c / dry density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

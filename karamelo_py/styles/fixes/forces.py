@@ -379,7 +379,7 @@ class Detonation(InitialFix):
     Parameters
     ----------
     t
-        Time at which a point ignites (distance from the detonator over the detonation speed), a
+        Time at which a point ignites (distance from the detonator / detonation speed), a
         function of x, y, z, x0, y0, z0.
 
     Example

@@ -70,7 +70,7 @@ class ContactBodies(Fix):
     mu
         Coefficient of friction (Coulomb).
     restitution
-        Normal relative speed after a collision over the speed before, from 0 to 1.
+        Normal relative speed after a collision divided by the speed before, from 0 to 1.
 
     Example
     -------

@@ -105,7 +105,7 @@ class LinearPressure(NamedTuple):
 
     Notes
     -----
-    p = K (1 - J), with J the volume over the volume before deformation; positive in compression.
+    p = K (1 - J), with J = volume / volume before deformation; positive in compression.
 
     See Also
     --------

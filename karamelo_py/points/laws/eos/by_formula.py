@@ -197,7 +197,7 @@ class MieGrueneisen(NamedTuple):
     c0
         Speed of sound without shear, at zero pressure.
     S
-        Slope of the shock speed U = c0 + S u over the material speed u after the shock.
+        Slope of the shock speed U = c0 + S u against the material speed u after the shock.
     Gamma
         Grueneisen parameter; Gamma rho is constant.
     Q1, Q2

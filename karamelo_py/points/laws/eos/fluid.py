@@ -64,7 +64,7 @@ class Tait(NamedTuple):
     scalarised = ("compression_energy",)
 
     specific_volume: float
-    K: float  # bulk modulus over gamma
+    K: float  # bulk modulus / gamma
     gamma: float
     tension: float = inf  # largest tension; the formula itself limits it to K
 

@@ -32,7 +32,7 @@ class PAlphaConstants(NamedTuple):
     solid
         ID of the equation of state of the material without voids.
     alpha0
-        Initial distension: density of the solid over density with voids.
+        Initial distension: density of the solid / density with voids.
     pe
         Pressure at which voids begin to be crushed.
     ps

@@ -33,7 +33,7 @@ class ShockConstants(NamedTuple):
     c0
         Speed of sound without shear, at zero pressure.
     S
-        Slope of the shock speed U = c0 + S u over the material speed u after the shock.
+        Slope of the shock speed U = c0 + S u against the material speed u after the shock.
     Gamma
         Grueneisen parameter, at the density before deformation.
     cv

@@ -69,7 +69,7 @@ class JohnsonHolmquist2(NamedTuple):
     The von Mises stress is at most sHEL (si - D (si - sf)), where the intact and broken strengths
     si and sf get the factor 1 + C ln(rate/epsdot0), P* = P/PHEL, T* = T/PHEL and sHEL = 3/2 (HEL -
     PHEL) (Johnson & Holmquist 1993, AIP Conf. Proc. 309, 981-984). The damage D is the sum of
-    plastic strain over failure strain, up to 1, and 1 at once if the failure strain is 0. Beyond a
+    plastic strain / failure strain, up to 1, and 1 at once if the failure strain is 0. Beyond a
     tension of T (1 - D), gaps open. In compression, if the strength decreases in a step, the
     fraction beta of the lost shear energy becomes pressure. The rate is the total strain rate. Dump
     columns: ep, damage, bulking (the added pressure), opened (the volume ratio of gaps).
@@ -122,7 +122,7 @@ class Concrete(NamedTuple):
     G
         Shear modulus.
     A, B, N
-        Strength over fc: A (1 - D) + B P*^N, with P* = P/fc.
+        Strength / fc: A (1 - D) + B P*^N, with P* = P/fc.
     C
         Rate coefficient; 0 for none.
     epsdot0

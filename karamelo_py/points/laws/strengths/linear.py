@@ -77,7 +77,7 @@ class Viscous(NamedTuple):
         return cls(mu, 0.0)
 
 
-SIGNIFICANT = 0.05  # numerical viscosity over viscosity of the fluid, for a warning
+SIGNIFICANT = 0.05  # numerical viscosity / viscosity of the fluid, for a warning
 
 
 def _viscosity(strength, scene):

@@ -91,7 +91,7 @@ known_failure(
 )
 
 
-SLOW = 0.05  # numerical viscosity over viscosity of the grains, for a warning
+SLOW = 0.05  # numerical viscosity / viscosity of the grains, for a warning
 
 
 def _slows(strength, scene):

@@ -20,7 +20,7 @@ from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
 MOST_PASSES = 80  # Newton's method with bisection
-DENSE = 0.999999  # largest strain over the strain of densification
+DENSE = 0.999999  # largest strain / strain of densification
 NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
 
@@ -180,7 +180,7 @@ def grown(strength, memory, flow):
 
 @point_function(otherwise=True)
 def most_recovered(strength, memory):
-    """Return the largest elastic volume ratio after a step over the ratio of the trial."""
+    """Return the largest elastic volume ratio after a step / the ratio of the trial."""
     return inf
 
 

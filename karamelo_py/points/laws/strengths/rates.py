@@ -131,7 +131,7 @@ class Norton(NamedTuple):
     A, n
         The creep rate is A q^n, with the von Mises stress q.
     Q
-        Activation temperature (energy over the gas constant): the factor exp(-Q/T).
+        Activation temperature (energy / gas constant): the factor exp(-Q/T).
     T
         Temperature, if neither the material nor its solid has one.
 
@@ -258,7 +258,7 @@ class Mts(NamedTuple):
     sa
         Athermal stress.
     k
-        Boltzmann's constant over the cube of the Burgers vector: 0.823e6 Pa/K for copper.
+        Boltzmann's constant / cube of the Burgers vector: 0.823e6 Pa/K for copper.
     g0, rate0, p, q
         Normalized activation energy, reference rate and exponents of the obstacles.
     theta
