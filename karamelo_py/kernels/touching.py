@@ -13,7 +13,15 @@ from karamelo_py.compiler import caller_of, importable, kernel, noinline, point_
 from karamelo_py.compiler.fields import field, increase, load_vector, store
 from karamelo_py.kernels import hooks
 from karamelo_py.kernels.arrays import vector_at
-from karamelo_py.kernels.equations.internal_force import ContactLoss, Force
+from karamelo_py.kernels.equations.internal_force import (
+    DAMPING,
+    DEPTH,
+    FOLLOWED,
+    RADIUS,
+    RATE,
+    ContactLoss,
+    Force,
+)
 from karamelo_py.kernels.surfaces import depth, slopes
 from karamelo_py.kernels.views import volume_of
 from karamelo_py.points.bodies import FrictionMemory, along, radius, rub
@@ -87,17 +95,17 @@ class NearPoint(NamedTuple):
 
 def reach_of(lever, p, whole, d):
     """Return the radius, and the depth due to `follow_strain`."""
-    if lever[d + 1, p] > 0:
-        return float(lever[d, p]), float(lever[d + 4, p])
+    if lever[d + RATE, p] > 0:
+        return float(lever[d + RADIUS, p]), float(lever[d + FOLLOWED, p])
     return whole, 0.0
 
 
 def leave(memory, p, near):
     (lever, grip, _), d, none = memory, len(near.x), near.x - near.x
-    if lever[d + 1, p] > 0:
+    if lever[d + RATE, p] > 0:
         ball, aside = reach_of(lever, p, near.whole, d)
         kept = 1.0 if near.within > -near.whole else 0.0
-        depths = kept * ball, kept * lever[d + 1, p], near.within + ball + aside, 0.0
+        depths = kept * ball, kept * lever[d + RATE, p], near.within + ball + aside, 0.0
         store(lever, p, (*none, *depths, kept * aside, 0.0))
     if grip is not None and grip[d, p] != 0:
         store(grip, p, (0.0,) * (2 * d + 2))
@@ -113,15 +121,15 @@ def push(terms, memory, p, near):
     mu, reach, dt, contact_dt, contact_kick, kick = terms
     d, last_dt, closer = len(x), dt, dt * dot(slip, normal)
     ball, aside = reach_of(lever, p, whole, d)
-    rate = spring_rate(lever[d + 1, p], STIFF / (contact_dt * contact_kick), within, reach)
-    if lever[d + 1, p] > 0:  # by positions, as velocities are noisy
-        closer, last_dt = within + ball + aside - float(lever[d + 2, p]), 2 * kick - dt
+    rate = spring_rate(lever[d + RATE, p], STIFF / (contact_dt * contact_kick), within, reach)
+    if lever[d + RATE, p] > 0:  # by positions, as velocities are noisy
+        closer, last_dt = within + ball + aside - float(lever[d + DEPTH, p]), 2 * kick - dt
     else:
         ball = ball_at_first(ball, within, closer)
     pressed = within + ball + aside
     spring = mass * rate * pressed
     load = max(spring + mass * DAMPED / contact_kick * closer / last_dt, 0.0)
-    lost = 0.5 * (load - spring + lever[d + 3, p]) * closer
+    lost = 0.5 * (load - spring + lever[d + DAMPING, p]) * closer
     store(lever, p, (*(sqrt(load * ball) * normal), ball, rate, pressed, load - spring))
     if grip is None:
         increase(losses, p, (lost,))

@@ -48,6 +48,10 @@ class RunLoop:
     signalled = 0  # number of a signal to this process
     resumed_from: Path | None = None
     interrupted = 0  # number of a signal that ends all processes
+    first_step: int = field(init=False)
+    first_time: float = field(init=False)
+    last_step: float = field(init=False)
+    ruined: bool = field(init=False)  # whether the step was too large before a restart file
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)

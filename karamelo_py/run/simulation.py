@@ -95,7 +95,7 @@ class Simulation(SceneArrays):
         self.steps.begin(end_time)
         begun_before = len(self.begun)
         self._make_ready()
-        self.steps.begun()
+        self.steps.choose_first()
         self.energy_watch.begin(set_anew=len(self.begun) > begun_before or self.begins)
 
     def go_on(self, end_time: float, halvings: int) -> None:

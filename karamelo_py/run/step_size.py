@@ -39,13 +39,13 @@ class StepPolicy(NamedTuple):
     @classmethod
     def of(cls, hub: Hub) -> StepPolicy:
         update = hub.update
-        fixed, heat = update.fixed_dt or float(update.scheme.traits.implicit), update.dt_factor
+        fixed = update.fixed_dt or float(update.scheme.traits.implicit)  # implicit: 1 by default
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
             return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
         # Fractions that scripts set refer to h/(c + |v|), also at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
-        return cls(asked, asked, 1.0, fixed, heat or DEFAULT_SHARE)
+        return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
         """Return clock fields for points that have moved by a `path` in cells."""
@@ -92,18 +92,18 @@ class StepSize:
 
     def begin(self, end_time: float) -> None:
         self.policy = StepPolicy.of(self.simulation.hub)
-        self._ask(0)
+        self._set_limits(0)
         self.step.end_time = end_time
         self.step.over_limit = 0
         self._choose()
 
-    def begun(self) -> None:
+    def choose_first(self) -> None:
         """Choose the first step again, as initial values may change the fastest point."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
             motion.path = np.inf
-            self._ask(0)
+            self._set_limits(0)
         self._choose()
         if not np.isfinite(simulation.dt):
             if not np.isfinite(simulation.fastest()):
@@ -120,7 +120,7 @@ class StepSize:
         step, self.policy = self.step, StepPolicy.of(self.simulation.hub)
         other_end, step.end_time = step.end_time != end_time, end_time
         over_limit = step.over_limit
-        if self._ask(halvings):
+        if self._set_limits(halvings):
             self._choose()
             self._watch_limit()
         elif other_end:
@@ -128,7 +128,7 @@ class StepSize:
             step.over_limit = over_limit
 
     def halve(self, times: int) -> None:
-        self._ask(times)
+        self._set_limits(times)
         choose_dt(self.control)
         self._watch_limit()
 
@@ -153,7 +153,7 @@ class StepSize:
             for name, value in before.items():
                 self.step[name] = value
 
-    def _ask(self, halvings: int) -> bool:
+    def _set_limits(self, halvings: int) -> bool:
         simulation, step, motion = self.simulation, self.step, self.motion
         numbers = self.policy.numbers(float(motion.path), halvings)
         numbers["first_kick"] = 0.5 if simulation.hub.update.half_start else 1.0
@@ -166,8 +166,8 @@ class StepSize:
         return numbers != before or motion.stride != stride
 
     def _choose(self) -> None:
+        # A measured rate is used again, so that several runs take the same steps as one.
         if not self.measured:
-            # Use the rate of the last step, so that several runs take the same steps as one.
             simulation, motion = self.simulation, self.motion
             self._measure(float(motion.weight))
             motion.wave = motion.speed = 0.0
@@ -208,7 +208,7 @@ class StepSize:
 
     @property
     def too_large(self) -> bool:
-        """True if the step has exceeded the stability limit from the start."""
+        """True if the step was above the stability limit when it was chosen."""
         return not self.step.watch_limit and not self.simulation.implicit
 
     def _watch_limit(self) -> None:

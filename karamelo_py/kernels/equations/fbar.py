@@ -83,8 +83,11 @@ class Volumes(eq.NodalQuantity):
     gives = (eq.Sum(eq.whole(NodalMean), lambda pt, node: tuple([node.N * V for V in pt.volumes])),)
 
 
+@eq.reads()
 def mean_stress(pt):
-    """Return volume times mean Kirchhoff stress, and present volume."""
+    """Return volume times mean Kirchhoff stress, and present volume; () without F-bar."""
+    if not isinstance(pt.w.averaging, FBar):
+        return ()
     law, state = pt.law_and_state
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state).mean_of_stretching()

@@ -9,7 +9,7 @@ from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, StepField, increase, load_vector, unknowns
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
-from karamelo_py.kernels.equations.fbar import FBar, NodalStress, mean_stress
+from karamelo_py.kernels.equations.fbar import NodalStress, mean_stress
 from karamelo_py.points import laws
 from karamelo_py.points.basis.product import inverse_spread
 from karamelo_py.points.frames import force_stress
@@ -25,14 +25,17 @@ class Force(StepField):
 
 
 class Lever(Field):
-    """Contact at the surface of a point: sqrt(f r) n (d,), 0 without contact, and the distance r.
+    """Contact at the surface of a point: sqrt(f r) n (d,), 0 without contact, and `OF_LEVER`.
 
-    The force f n at x - r n is equivalent to a force at x and the stress f r n n / V. Further
-    components are stiffness / mass, depth, the damping part of f, the depth due to
-    `follow_strain`, and the last increment of strain along n.
+    The force f n at x - r n is equivalent to a force at x and the stress f r n n / V.
     """
 
-    shape = staticmethod(lambda kin: kin.dimension + 6)
+    shape = staticmethod(lambda kin: kin.dimension + len(OF_LEVER))
+
+
+# After the vector: distance r, stiffness over mass, depth, the damping part of f, the depth due to
+# `follow_strain`, the last increment of strain along n.
+OF_LEVER = RADIUS, RATE, DEPTH, DAMPING, FOLLOWED, GROWTH = tuple(range(6))
 
 
 class ContactLoss(Field):
@@ -50,7 +53,7 @@ def minus_V_stress(pt):
     volume = eq.mass(pt) * laws.specific_volume(law)
     tau = laws.kirchhoff_stress(law, pt.kin, state)
     if levers := _levers(pt):
-        V_tau = volume * tau
+        V_tau = volume * tau  # before the frame's map, since levers are V times a stress
         for lever in levers:
             arm = load_vector(pt.kin, lever, pt.p)
             V_tau = V_tau + sym(outer(arm, arm))
@@ -71,10 +74,10 @@ def stretch_levers(pt, growth, mean):
         arm = load_vector(pt.kin, lever, pt.p)
         d, square = len(arm), arm.squared()
         rate = dot(arm, growth.planar() @ arm) / where(square > 0, square, 1)
-        acting = 0.5 * (rate + lever[d + 5, pt.p]) if mean else rate
+        acting = 0.5 * (rate + lever[d + GROWTH, pt.p]) if mean else rate
         increase(pt.of(WorkOfForces), pt.p, (-square * acting,))
-        lever[d, pt.p] = lever[d, pt.p] * (1 + rate)
-        lever[d + 5, pt.p] = rate
+        lever[d + RADIUS, pt.p] = lever[d + RADIUS, pt.p] * (1 + rate)
+        lever[d + GROWTH, pt.p] = rate
 
 
 def follow_strain(pt, v, dt):
@@ -88,7 +91,7 @@ def follow_strain(pt, v, dt):
     for lever in _levers(pt):
         arm = load_vector(pt.kin, lever, pt.p)
         d, size = len(arm), sqrt(arm.squared())
-        lever[d + 4, pt.p] -= dot(arm, further) / where(size > 0, size, 1)
+        lever[d + FOLLOWED, pt.p] -= dot(arm, further) / where(size > 0, size, 1)
 
 
 @point_function(otherwise=True)
@@ -108,12 +111,6 @@ def force_on_point(pt):
     return force + around if len(around) else force
 
 
-@eq.reads()
-def V_mean_stress(pt):
-    """Return V times mean Kirchhoff stress, and present volume, for F-bar; else ()."""
-    return mean_stress(pt) if isinstance(pt.w.averaging, FBar) else ()
-
-
 def force_at(pt, node):
     force = pt.minus_V_stress.dot(node.strain_N)
     return node.N * pt.force + force if len(pt.force) else force
@@ -131,7 +128,7 @@ def affine_force(pt, w):
 class InternalForce(eq.NodalQuantity):
     not_at_corners = ("moments",)
     says = "internal force"
-    takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_on_point, mean=V_mean_stress)
+    takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_on_point, mean=mean_stress)
     gives = (
         eq.Sum(eq.FORCE, force_at, affine_force),
         eq.Sum(eq.whole(NodalStress), lambda pt, node: tuple([node.N * a for a in pt.mean])),

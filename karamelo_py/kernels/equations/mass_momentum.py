@@ -66,20 +66,20 @@ class MassMomentum(eq.NodalQuantity):
     )
 
 
-def mapped_moment(pt, moment):
+def for_second_mapping(pt, moment):
     return (
         mapped_again(pt.w.basis, pt.w.grid, moment) if len(moment) and pt.w.frame.moves else moment
     )
 
 
 @eq.reads("moment")
-def moment_again(pt):
-    return mapped_moment(pt, eq.moment(pt))
+def moment_for_second_mapping(pt):
+    return for_second_mapping(pt, eq.moment(pt))
 
 
 class MomentumAgain(eq.NodalQuantity):
     not_at_corners = ("moments",)
     records = "velocity"
     says = "momentum to grid"
-    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=moment_again)
+    takes = eq.of_point(mass=eq.mass, v=eq.v, moment=moment_for_second_mapping)
     gives = (eq.Sum(eq.VELOCITY, momentum, affine_momentum),)

@@ -30,7 +30,7 @@ from karamelo_py.kernels.equations.internal_force import (
     minus_V_stress,
 )
 from karamelo_py.kernels.equations.loss import OnePoint
-from karamelo_py.kernels.equations.mass_momentum import mapped_moment
+from karamelo_py.kernels.equations.mass_momentum import for_second_mapping
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
 from karamelo_py.kernels.equations.strain import increment, increment_at, velocity_gradient
 from karamelo_py.kernels.records import row
@@ -122,7 +122,7 @@ def radius_after(pt):
 @eq.reads("mass", "radius after move", "velocity around", "moment around")
 def rotation_again(pt):
     made = rotation(pt, pt.of(RadiusAfterMove)[0, pt.p])
-    return made._replace(moment=mapped_moment(pt, made.moment))
+    return made._replace(moment=for_second_mapping(pt, made.moment))
 
 
 def angular_momentum(pt, node):
