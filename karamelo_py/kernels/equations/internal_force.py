@@ -16,6 +16,10 @@ from karamelo_py.points.frames import force_stress
 from karamelo_py.points.kinematics import dot, outer, sym, zero_vector
 from karamelo_py.points.transfers import forces_by_arms
 
+# Components of a `Lever` after its vector: distance r, stiffness over mass, depth, the damping part
+# of f, the depth due to `follow_strain`, the last increment of strain along n.
+RADIUS, RATE, DEPTH, DAMPING, FOLLOWED, GROWTH = OF_LEVER = tuple(range(6))
+
 
 class Force(StepField):
     """Force of fixes; with twist, the third component acts around the axis."""
@@ -31,11 +35,6 @@ class Lever(Field):
     """
 
     shape = staticmethod(lambda kin: kin.dimension + len(OF_LEVER))
-
-
-# After the vector: distance r, stiffness over mass, depth, the damping part of f, the depth due to
-# `follow_strain`, the last increment of strain along n.
-OF_LEVER = RADIUS, RATE, DEPTH, DAMPING, FOLLOWED, GROWTH = tuple(range(6))
 
 
 class ContactLoss(Field):
