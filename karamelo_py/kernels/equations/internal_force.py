@@ -16,7 +16,7 @@ from karamelo_py.points.frames import force_stress
 from karamelo_py.points.kinematics import dot, outer, sym, zero_vector
 from karamelo_py.points.transfers import forces_by_arms
 
-# Components of a `Lever` after its vector: distance r, stiffness over mass, depth, the damping part
+# Components of a `Lever` after its vector: distance r, stiffness / mass, depth, the damping part
 # of f, the depth due to `follow_strain`, the last increment of strain along n.
 RADIUS, RATE, DEPTH, DAMPING, FOLLOWED, GROWTH = OF_LEVER = tuple(range(6))
 
