@@ -15,7 +15,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.arrays import Setup, Tag
 from karamelo_py.kernels.clock import take_reports
-from karamelo_py.kernels.equations import fbar, loss, sheared, strain, xpic
+from karamelo_py.kernels.equations import NodalQuantity, fbar, loss, sheared, strain, xpic
 from karamelo_py.kernels.equations import node_updates as nodes
 from karamelo_py.kernels.equations.corrected_acceleration import (
     Acceleration,
@@ -82,8 +82,8 @@ class Scatter(namedtuple("Scatter", "quantities weights")):
     __slots__ = ()
 
     def __new__(cls, quantities: Any, weights: Any = PresentWeights()) -> "Scatter":  # noqa: B008
-        several = type(quantities) is tuple
-        return super().__new__(cls, quantities if several else (quantities,), weights)
+        single = isinstance(quantities, NodalQuantity)
+        return super().__new__(cls, (quantities,) if single else tuple(quantities), weights)
 
 
 class NodeTask(NamedTuple):
