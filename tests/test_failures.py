@@ -297,7 +297,13 @@ def test_a_step_that_shrinks_to_nothing(run_interpreted):
     # Squeezed to nothing: the cells, and with them the step, are gone at the end.
     said = run_interpreted(script.format(1), status=1, folder="squeezed").err
     assert "limit of the time step has fallen to" in said
-    assert "less than a millionth of the first" in said
+    assert "less than a millionth of the first" in said and "likely cause" not in said
+    # From the start twice as fast as waves, of the speed 1.
+    start = "fix(v, initial_velocity_particles, all, -2*x0)\n    set_output"
+    fast = script.replace("set_output", start).format(2)
+    said = run_interpreted(fast, status=1, folder="fast").err
+    assert "likely cause: at the start, points move 1.88 times as fast as the waves" in said
+    assert "fix: check the units of modulus, density and velocity; " in said
 
 
 def test_a_step_that_is_given_may_be_large_beside_what_moves(run_interpreted):

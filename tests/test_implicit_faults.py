@@ -294,6 +294,17 @@ def test_a_share_of_a_step_that_has_no_limit(run_interpreted):
     assert result.err.count("warning:") == 1 and "dt_factor has no effect: load steps" in result.err
 
 
+def test_a_load_that_is_full_in_the_first_step(run_interpreted):
+    """Load steps are 1 without set_dt, which would spread the load."""
+    load = "fix(b, body_force, all, 0, -1e-6*min(time, 1))\n    run(4)"
+    text = coarse().replace("run(4)", load)
+    result = run_interpreted(text)
+    assert "load steps of 1, as the script has no set_dt: '-1e-06*min(time, 1)' has" in result.err
+    assert "fix: set_dt(0.25)" in result.err
+    spread = text.replace("run(4)", "set_dt(0.25)\n    run(4)")
+    assert run_interpreted(spread, folder="spread").err == ""
+
+
 def test_explicit_steps_have_no_iterations(run_interpreted):
     """Columns of load steps are 0 in steps of another scheme."""
     then = "run(1)\n    scheme(musl)\n    set_dt(1e-5)\n    run(1)"

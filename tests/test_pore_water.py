@@ -351,7 +351,8 @@ def test_water_without_weight_is_told_before_the_run(run_interpreted, scheme):
 
     def told(tail):
         script = COLUMN.replace("N = 16", "N = 4").replace("dt_factor", "# dt_factor") + tail
-        script = script.replace("dimension", f"scheme({scheme})\ndimension", 1)
+        step = "set_dt(1)" if scheme == "quasi-static" else ""
+        script = script.replace("dimension", f"scheme({scheme})\n{step}\ndimension", 1)
         err = run_interpreted(script, command="check").err
         assert err.count("warning:") == ("has no weight" in err)
         return err if "has no weight" in err else ""

@@ -157,6 +157,17 @@ def test_indices_of_a_fit():
         assert [one.value for one in pair] == pytest.approx(known, abs=0.07)
 
 
+def test_failed_runs_bound_a_probability(capsys):
+    """All, or none, of the runs without a result may be events."""
+    rows = [{"status": "done", "v": float(k)} for k in range(15)] + [{"status": "failed"}] * 5
+    uncertainty.tell(rows, [], "v > 11.5")
+    out = capsys.readouterr().out
+    assert (
+        "; 3 of 15 runs\n  with the 5 runs without a result: between 3 and 8 of 20, 0.15 to" in out
+    )
+    assert "5 runs without results are left out" in out
+
+
 @pytest.mark.usefixtures("starts_are_cheap")
 def test_a_sample_of_a_linear_function(folder, capsys):
     """v = a + 2 b of normals: mean 1 + 4, deviation sqrt(0.1^2 + 4 0.05^2), P(v > 5) = 1/2."""

@@ -27,6 +27,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.errors import Mark, ScriptError
 from karamelo_py.script.expressions import POINT_SEEDS
+from karamelo_py.script.terms import evaluated
 
 PEEK = 100  # steps; a shorter run is only an inspection of a scene
 ENDLESS = 1e8
@@ -274,6 +275,31 @@ def warn_about_factor(hub: Hub) -> None:
             hint="set_dt(...) instead",
             code="dt-factor-ignored",
         )
+
+
+def warn_about_steps_of_1(hub: Hub, time: float, steps: float) -> None:
+    """Warn once of static steps without set_dt in which heat or water flows, or a load is full."""
+    update = hub.update
+    if update.fixed_dt is not None or update.scheme.traits.inertia:
+        return
+    wet = any(solid.material.fluid for solid in hub.solids.values())
+    if (wet or update.thermal) and update.first_time("load steps of 1"):
+        what = "water" if wet else "heat"
+        text = f"load steps of 1, as the script has no set_dt: {what} flows for that time in each"
+        hub.warn(text, mark=update.scheme_mark, hint="set_dt(...), the time of a step")
+    for fix in hub.fixes.values() if 2 <= steps < inf else ():
+        for formula in fix.all_formulas:
+            if formula.names != {"time"}:
+                continue
+            now, first, last = (evaluated(formula, lambda _, t=t: time + t) for t in (0, 1, steps))
+            if now != first == last and update.first_time("loads at once"):
+                hub.warn(
+                    f"load steps of 1, as the script has no set_dt: '{formula.text}' has its last "
+                    "value from the first step on",
+                    mark=fix.mark,
+                    hint=f"set_dt({1 / steps:.3g})",
+                    code="loads-at-once",
+                )
 
 
 def warn_about_loads(hub: Hub, steps: float) -> None:

@@ -46,6 +46,7 @@ class Narrator(Listener):
         duration = min(run.end_time - simulation.time, steps * simulation.dt)
         if simulation.implicit:
             known_failures.warn_about_factor(hub)
+            known_failures.warn_about_steps_of_1(hub, simulation.time, steps)
             known_failures.warn_about_loads(hub, steps)
             known_failures.warn_about_weightless_water(hub, simulation)
             known_failures.warn_about_laws(hub, simulation, duration)

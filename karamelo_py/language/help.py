@@ -29,7 +29,7 @@ def describe(target: Callable, name: str) -> Help:
     descriptions = {
         "ID": f"Name of the {noun}.",
         "arguments": "See the page of the style.",
-        "active": "``true`` or ``false`` (the default).",
+        "active": "Without this command, ``false``.",
     }
     # Derived styles inherit descriptions of parameters.
     for owner in reversed(target.__mro__) if inspect.isclass(target) else (target,):
