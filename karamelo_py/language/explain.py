@@ -143,6 +143,8 @@ def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | 
     ]  # fmt: skip
     surplus = re.search(r"(\w+) arguments? too many", error.message)
     exact = surplus is not None and len(adjacent) == int(surplus[1].replace("one", "1"))
+    if many := re.match(r"(\d) components, but", error.message):
+        exact = int(many[1]) - len(adjacent) in (2, 3)
     if not adjacent or not (exact or ", " in adjacent[0][0].mark.text):
         return None
     if not exact and any(

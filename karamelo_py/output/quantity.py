@@ -5,7 +5,7 @@ import re
 
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
-from karamelo_py.script.errors import ScriptError, meant, unknown
+from karamelo_py.script.errors import ScriptError, meant, one_of, unknown
 from karamelo_py.script.expressions import POINT_SEEDS, Expression, Value
 from karamelo_py.script.syntax import Raw, Source
 
@@ -51,7 +51,7 @@ class Quantity:
             if error.mark is None:
                 error.mark = argument.mark
             if error.code == "unknown-name" and error.name == text:
-                error.expected = "one of " + ", ".join(dict.fromkeys(cls.names(hub)))
+                error.expected = one_of(text, cls.names(hub))
                 if error.alike != "time":
                     names = KEYWORDS if error.alike is None else cls.names(hub)
                     error.hint = meant(text, names) or error.hint
