@@ -208,7 +208,8 @@ def check_part(hub: Scene, name: str, plugin: Any) -> None:
     if error:
         raise faults.fault(name, error, hub.mark)
     check_fields(hub, name, plugin, hub.mark)
-    if zero_moment.defined(kind) and Moment not in fields_of(plugin, "point_fields"):
+    stored = any(issubclass(field, Moment) for field in fields_of(plugin, "point_fields"))
+    if zero_moment.defined(kind) and not stored:
         raise faults.fault(name, "it defines zero_moment: add Moment to point_fields", hub.mark)
 
 
