@@ -147,7 +147,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid: 3 g L^2/(H c^2) or, by impact, sqrt(3) v/c."""
+        """Bending strain of the slenderest solid: 3 g L^2/(H c^2) or, at impact, sqrt(3) v/c."""
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
             for motion in self.motions:

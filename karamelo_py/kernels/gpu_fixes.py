@@ -217,7 +217,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks; `which` is a range, and whether before the end of a run."""
+    """Publish totals of hooks `which` = (begin, end, always), else only at the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):

@@ -1,4 +1,4 @@
-"""Rows of pore water, and how its quantities join passes of the soil."""
+"""Rows of the step for pore water, whose quantities join the soil's passes over the points."""
 
 from typing import NamedTuple
 

@@ -34,7 +34,7 @@ STATE = np.dtype([
     ("momentum", *_VECTOR),  # angular momentum
     ("q", np.float64, 4),  # rotation since the start (quaternion)
     ("angle", *_VECTOR),  # 2D: rotation about z, may exceed 2 pi; 3D: rotation vector
-    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in this step; torque about the centre
+    ("force", *_VECTOR), ("torque", *_VECTOR),  # of contact in the step, about the centre
     ("R", *_MATRIX),  # rotation matrix of q
     ("move", *_VECTOR),  # displacement of the centre in this step / dt
     ("spread", *_MATRIX),  # velocity gradient: (rotation in this step - 1) / dt

@@ -18,7 +18,7 @@ class Rubbing(NamedTuple):
 
 
 def rubbed(mu, load, hold, stop, at):
-    """Return the friction (d,) on a point; ``at`` is (grip, row), its memory, which is updated."""
+    """Return the friction (d,) on a point, and update its contact history ``at`` = (grip, row)."""
     (grip, i), d = at, len(hold)
     memory = FrictionMemory(hold, grip[i, d], grip[i, d + 1])
     force, (hold, mean, unused) = rub(mu, load, memory, stop)

@@ -65,7 +65,7 @@ class AtNodes(NamedTuple):
 
     stage: int
     target: int
-    at: Any = None  # function of the setup: one with other nodes
+    at: Any = None  # maps the setup to a setup with other nodes
 
 
 class Gather(NamedTuple):
@@ -90,9 +90,9 @@ class NodeTask(NamedTuple):
     """A task at every node in use."""
 
     task: Any  # a tag, or the class of tags that `make` returns
-    at: Any = None  # function of the setup: a setup with other nodes
-    length: Any = None  # function of the setup: a time interval instead of `kick`
-    make: Any = None  # function of the setup: the tag
+    at: Any = None  # maps the setup to a setup with other nodes
+    length: Any = None  # maps the setup to a time interval, used instead of `kick`
+    make: Any = None  # maps the setup to the tag
 
 
 class EachNode(NamedTuple):

@@ -113,7 +113,7 @@ def leave(memory, p, near):
 
 
 def push(terms, memory, p, near):
-    """Return the force (d,) on a touching point; update its `memory`.
+    """Return the force (d,) on a touching point; update its history `memory`.
 
     `terms`: friction coefficient, largest known depth, dt, contact dt and kick, and kick.
     """

@@ -228,7 +228,7 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add the path in cells of elastic energy since the last check.
+    """Add the path (in cells) that elastic energy has travelled since the last check.
 
     New energy has no path; vibrations renew the energy within a wave period.
     """
@@ -320,8 +320,8 @@ def judge(control):
             balance + energy.last_balance + energy.last_but_one
         ) / FEW
     if energy.looks >= 2 * FEW:
-        # The minimum, as single checks have errors in collisions; stored, as the last check alone
-        # should not decide.
+        # Use the minimum, since single checks have errors in collisions; store it, since the last
+        # check alone should not decide.
         least = min(balance, energy.last_balance, energy.last_but_one)
         energy.grown = max(energy.grown, growth(energy.first_few, least, unit))
     energy.sum_of_balance += balance

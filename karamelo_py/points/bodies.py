@@ -27,7 +27,7 @@ def face(kin, volume, x):
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:
-        return sqrt(volume * x[0])  # r times the side of the square volume / r
+        return sqrt(volume * x[0])  # r times the side of a square of area volume / r
     if kin.dimension == 2:
         return sqrt(volume)
     return power(volume, 2 / 3) if kin.dimension == 3 else 1
@@ -81,13 +81,13 @@ class FrictionMemory(NamedTuple):
 
 
 def rub(mu, load, memory, stop):
-    """Return the force of Coulomb friction with memory, and the memory after the step.
+    """Return the force of Coulomb friction with history, and the history after the step.
 
     The force `stop` = m v/dt would stop a free point, but loaded points would creep. Therefore slip
     also stretches a spring as stiff as the normal contact, whose force `hold` is returned to the
     friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). As points bounce on
     a stiff contact, a step may use friction that was `unused` before, up to mu times the `mean`
-    load. A point that always slides has mu times the load of each step.
+    load. On a point that always slides, friction is mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

@@ -15,7 +15,7 @@ class DriftLimits(NamedTuple):
 
     drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
     line: float  # 1D
-    averaged: tuple[float, float]  # as `drift`, with usavg
+    averaged: tuple[float, float]  # `drift` with usavg
     rim: tuple[float, float]  # rotating body, musl and usf
     rim_averaged: tuple[float, float]  # usavg
     fastest: float = inf  # drift / wave speed above which no noise is added

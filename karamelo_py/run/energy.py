@@ -139,7 +139,7 @@ class EnergyWatch:
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
     def grown_little(self) -> bool:
-        """Return whether energy and last step show no fault in the present state."""
+        """Return True if neither the energy nor the last step shows a fault in the state."""
         watch, heat = self.watch, self.heat
         swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
         if swings or self.has_grown():

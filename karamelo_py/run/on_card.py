@@ -110,7 +110,7 @@ class SimulationOnCard(Simulation):
 
     def in_tiles(self) -> bool:
         self.sort_if_due()
-        self._sent = False  # as work of forces is stored at points
+        self._sent = False  # since points store the work of forces
         return super().in_tiles()
 
     def refuse(self) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from karamelo_py.scene.region import Region
 
-HALVED = 5  # times, in each direction
-PLANE = 0.01  # tolerated distance of the surface from a plane, over box size
+HALVED = 5  # number of halvings of a box in each direction
+PLANE = 0.01  # tolerated distance of the surface from a plane / box size
 EDGE = 0.05  # the same for the smallest sub-boxes
 SHEET = 0.01  # the same for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour

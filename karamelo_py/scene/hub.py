@@ -196,7 +196,7 @@ class Hub:
         self.scouting = False  # end the rehearsal at the first run
         self.begun = 0  # runs begun, including those in the rehearsal
         self.answered = False  # the script has printed or written something
-        self.checking = False  # at the first run only report, for ``check``
+        self.checking = False  # for ``check``: the first run only reports
         self.pausing = False  # stop before runs, which a Python program controls
         self.open_ended = False  # a Python program may add commands after the script
         self.in_runs: list[Any] = []

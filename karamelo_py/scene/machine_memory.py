@@ -43,7 +43,7 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # about numbers not used here
+        with warnings.catch_warnings(action="ignore"):  # about numbers that are not used
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None

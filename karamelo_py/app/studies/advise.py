@@ -76,10 +76,10 @@ def forecast(
     """Predict error and cost at `x` from runs at `xs`, coarse ones first.
 
     None with fewer than two errors, or if the last error is larger than the one before. The error
-    follows the last order, its bounds the smallest and largest order, at least 33 % above and half
-    below it; an order that fell may fall as much again, one below 2 may reach 2. Errors small by
-    chance count as `credible`. The time is steps times (a + b points), fitted; others follow the
-    last two runs.
+    is extrapolated with the last order. Its bounds follow from the smallest and the largest order,
+    and are at least 33 % above and half below it; an order that fell may fall as much again, one
+    below 2 may reach 2. Errors small by chance count as `credible`. The time is steps times
+    (a + b points), fitted; other costs follow the last two runs.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -128,7 +128,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
-    warnings: tuple[str, ...] = ()  # of the finest run
+    warnings: tuple[str, ...] = ()  # warnings of the finest run
 
     @property
     def label(self) -> str:

@@ -102,10 +102,10 @@ class Stop(Exception):
 @dataclass
 class Launch:
     script: Path
-    threads: int = 1  # of each run
+    threads: int = 1  # threads of each run
     repeat: int = 1  # runs of each case; the time is their median
     limit: float | None = None  # seconds
-    texts: tuple[str, ...] = ()  # of the script and its includes
+    texts: tuple[str, ...] = ()  # contents of the script and its includes
     stop: threading.Event = field(default_factory=threading.Event)
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
 
@@ -235,7 +235,7 @@ def command_of(script: str | Path, case: Mapping[str, str]) -> str:
     return shlex.join(["karamelo-py", str(script), *options_of(case)])
 
 
-OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # of MPI pools
+OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # variables in MPI pools
 
 
 def environment() -> dict[str, str]:

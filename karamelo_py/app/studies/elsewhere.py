@@ -47,7 +47,7 @@ FRUGAL = {
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "5s",
 }
-CLASS = re.compile(r"(\w+)\.\w+")  # of a module next to the script
+CLASS = re.compile(r"(\w+)\.\w+")  # class of a module next to the script
 IMPORTED = re.compile(r"^\s*(?:from|import)\s+([\w, ]+)", re.MULTILINE)
 QUOTED = re.compile(r'"([^"\n]*)"')
 RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
@@ -73,7 +73,7 @@ class Returned(NamedTuple):
     files: dict[str, bytes]  # empty if the machine has put them into their folder
     kernels: dict[str, bytes]
     refused_by: str | None = None  # worker with other versions; "" without an address
-    asks: bool = False  # for the contents of files
+    asks: bool = False  # True if the site asks for contents of files
 
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:
@@ -200,7 +200,7 @@ class Site:
         return {}
 
 
-SITES: dict[str, Site] = {}  # of this process, by mark
+SITES: dict[str, Site] = {}  # sites of this process, by mark
 
 
 def _site(parcel: Parcel) -> Site:

@@ -34,10 +34,10 @@ differences are independent. There is no +- if the three searches disagree, nor 
 end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # fractions of each range
-# Waves and points that cross cells make curves rough: derivatives over 0.01 of a range end in a
-# local minimum.
+# Waves and cell crossing make curves rough: with differences of 0.01 of a range, searches end in
+# local minima.
 STEP = 0.04
-NEAR = 0.01  # of a range within which values count as equal
+NEAR = 0.01  # fraction of a range within which values count as equal
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search
 AGAIN = 3  # searches from better points near an end
 ALIKE = 0.99  # correlation of indistinguishable variables
@@ -266,7 +266,7 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 
 
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Half the 95 % ranges, and pairs of variables that cannot be distinguished.
+    """Half-widths of the 95 % intervals, and pairs of variables that cannot be distinguished.
 
     NaN without effect or enough measurements, inf if only a combination is determined. Covariance
     s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear Regression,

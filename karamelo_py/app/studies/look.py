@@ -28,8 +28,8 @@ PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
     "triangle-left", "triangle-right",
 )  # fmt: skip
-NEAR = 0.02  # of the axes within which line ends coincide
-PART = 0.105  # of a logarithmic axis that a number of six digits covers
+NEAR = 0.02  # fraction of the axes within which line ends coincide
+PART = 0.105  # fraction of a logarithmic axis that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
     ("FLIP", "APIC", "PIC", "MLS", "TPIC", "TFLIP", "AFLIP", "ASFLIP", "XPIC"),

@@ -31,8 +31,8 @@ CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
 
 class Random(NamedTuple):
     name: str
-    text: str  # as given
-    law: Any  # of scipy.stats
+    text: str  # of the distribution, as the user wrote it
+    law: Any  # distribution of scipy.stats
 
 
 def needs_scipy(word: str) -> None:

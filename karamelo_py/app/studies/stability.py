@@ -52,7 +52,7 @@ UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the energy is checked often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
-FIRST = 0.1  # of the log over which energies are averaged
+FIRST = 0.1  # fraction of the log over which energies are averaged
 FEW = 9  # largest number of values of a variable that all get a tick
 COLOURS = {
     "stable": "#d9ecf7", "damped": "#c3dfb5", "growing": "#f0a53c", "left": "#9b9b9b",

@@ -9,8 +9,8 @@ import numpy as np
 from karamelo_py.app.studies.uncertainty import Interval
 from karamelo_py.script.errors import ScriptError
 
-GROUPS = 10  # of runs, each omitted once for the intervals of indices
-SAMPLES, FEW = 16384, 1024  # of the fitted function for each index, and for its interval
+GROUPS = 10  # groups of runs, each omitted once for the intervals of indices
+SAMPLES, FEW = 16384, 1024  # evaluations of the fit for each index, and for its interval
 WIDE = 1.96  # standard deviations of an interval of 95 %
 
 Function = Callable[[np.ndarray], np.ndarray]  # (n, d) to (n,)

@@ -17,13 +17,13 @@ from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, plural
 
 QUANTILES = (0.05, 0.5, 0.95)
-SURE = 0.95  # of intervals
+SURE = 0.95  # probability of the intervals
 RESAMPLED = 2000
 
 
 class Interval(NamedTuple):
     value: float
-    low: float  # of 95 %
+    low: float  # lower end of the 95 % interval
     high: float
 
     def __str__(self) -> str:

@@ -73,7 +73,7 @@ def cases(
 ) -> list[dict[str, str]]:
     """Combine all values, the first variable changing slowest.
 
-    Variables `zipped` go in step; `where` are conditions.
+    Variables in a group of `zipped` change together; `where` are conditions.
     """
     axes: list[list[dict[str, str]]] = []
     for group in zipped:

@@ -1,7 +1,7 @@
 """Start runs as forks of warm processes, which have imported the program.
 
-A run leaves a copy of itself, with its kernels, for later runs of its kind. On Linux the study can
-adopt orphans; otherwise, or if anything fails, a run starts a new interpreter.
+A run leaves a fork of itself, with its kernels, for later runs of the same kind, if the study can
+adopt orphans (Linux). Otherwise, or if anything fails, a run starts a new interpreter.
 """
 
 import ctypes

@@ -160,7 +160,7 @@ def _mixed(sign: str, first_signed: bool) -> Callable:
 
 
 def _whole_division(remainder: bool) -> Callable:
-    """Return Python's floor division or remainder; of integers, 0 for a divisor of 0."""
+    """Return Python's floor division or remainder; 0 if an integer is divided by 0."""
 
     def write(builder: ir.IRBuilder, kind: types.Type, *values: ir.Value) -> ir.Value:
         of = _whole_parts if _is_whole(kind) else _real_parts

@@ -26,7 +26,7 @@ IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):
-    """End of a branch: its last block, its variables, items read from `HeldTuple`s in memory."""
+    """End of a branch: its last block, its variables, the items read from `HeldTuple`s."""
 
     block: Any
     names: dict[str, Any]

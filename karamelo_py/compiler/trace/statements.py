@@ -427,7 +427,7 @@ class AstCompiler:
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
     ) -> Callable:
-        """Mark a function with text and variables, which determine its code."""
+        """Note in a function its source and its variables, which determine the machine code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         variables = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
         defaults = [p.default for p in signature.parameters.values()]

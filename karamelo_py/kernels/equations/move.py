@@ -91,7 +91,7 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the location `new` with moved corners, by velocities of corners if these are known."""
+    """Return the location `new` with corners moved by their velocities, known or interpolated."""
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

@@ -97,9 +97,9 @@ def of_pressure(kin):
 class WaterSums(SummedField):
     """Nodal sums of water and pores.
 
-    Mass, momentum and force of the water, as in `Nodes.sums`, in which it leaves a column to the
-    drag; volume, volume of pores, volume times pressure, its unseen part; force of the pressure
-    (d,) and outward area (d,).
+    Mass, momentum and force of the water, as in `Nodes.sums`, where a column is free for the drag;
+    volume, volume of pores, volume times pressure, the unseen part of this product; force of the
+    pressure (d,) and outward area (d,).
     """
 
     shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension)
@@ -192,7 +192,7 @@ def water_v(pt):
 class WetPoint(NamedTuple):
     m: arrays.Number  # mass of the water
     v: tuple  # velocity of the water
-    drag: arrays.Number  # per relative velocity
+    drag: arrays.Number  # force per unit relative velocity
     volumes: tuple  # of point and pores; their products with the pressure and its unseen part
     p: arrays.Number
     area: tuple  # the volume as a stress

@@ -47,7 +47,7 @@ class ByEnergy(OfDeformation):
     start: ClassVar[int]  # index of the formula's first number
     energy: ClassVar[Code]
     first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
-    second: ClassVar[tuple[Code, ...]]  # by aa, ab, ac, bb, bc, cc
+    second: ClassVar[tuple[Code, ...]]  # derivatives with respect to aa, ab, ac, bb, bc, cc
 
 
 @warmed_elastic.on(ByEnergy)
@@ -207,7 +207,7 @@ def invariants_of(stretches: Sequence[float]) -> tuple[float, float, float]:
 
 
 def stiffness_of_path(law: NamedTuple, stretches: Callable, x: float) -> float:
-    """Return the curvature of the energy by ln x along a path (Drucker's stability)."""
+    """Return the second derivative of the energy in ln x along a path (Drucker's stability)."""
     ends = [tuple(map(float, stretches(x * exp(h)))) for h in (-NEAR, 0, NEAR)]
     if not isinstance(law, OfStretches):
         ends = [(*invariants_of(end), 1.0, 1.0) for end in ends]

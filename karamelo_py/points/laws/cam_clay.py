@@ -59,7 +59,7 @@ class CamClayConstants(NamedTuple):
 
     Undrained clay that starts at p0 = pc has p = p0 ((M^2 + eta^2)/M^2)^-(1 - kappa/lam) with eta =
     q/p. At the critical state: p0 2^-(1 - kappa/lam). Dump columns: equivalent plastic strain ep,
-    and pc. There is no tension. A stress of fix initial_stress outside the surface raises pc.
+    and pc. Tension is not sustained. A stress of fix initial_stress outside the surface raises pc.
 
     At a free surface, a load must balance p0, which otherwise is released in the first step:
     ``fix(cover, edge_traction, all, b, yhi, 0, -100e3)`` at the top of the solid's region b with

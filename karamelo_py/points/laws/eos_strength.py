@@ -284,7 +284,7 @@ known_failure(
 
 
 class Memory(NamedTuple):
-    energy: Any  # memory of the equation of state
+    energy: Any  # history variables of the equation of state
     viscous: Any
     damage: Any
     heat: Any

@@ -1,7 +1,7 @@
 """Further parts of a composed law, whose kinds plug-ins may define.
 
-A part is a NamedTuple of parameters, with an optional memory and an added pressure. The plastic
-strain rate is such a part, which is added if an output requests it.
+A part is a NamedTuple of parameters, with optional history variables and an added pressure. The
+plastic strain rate is such a part, which is added if an output requests it.
 """
 
 from functools import reduce
@@ -33,7 +33,7 @@ def initial_part(component, template):
 
 @point_function(otherwise=True)
 def part_after(component, memory, law, step, memories):
-    """Return the memory after a `StrainStep` with new s; `memories` belong to other parts."""
+    """Return the history variables after a `StrainStep`; `memories` are those of other parts."""
     return memory
 
 

@@ -392,7 +392,7 @@ def _advance_hill(law, kin, state, dl, dt):
 class Residual(NamedTuple):
     excess: Any  # q_trial - Y q_trial/q(x/Y)
     slope: Any  # derivative by x
-    by_limit: Any  # derivative by Y
+    by_limit: Any  # derivative with respect to Y
     by_squares: tuple  # derivatives by rate z^2, where q = Y
 
 

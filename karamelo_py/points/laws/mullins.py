@@ -105,7 +105,7 @@ def distortional_energy(law, kin, state):
 
 @point_function()
 def softened(law, W, peak):
-    """Return eta, its slope by W, and the energy phi of Ogden and Roxburgh."""
+    """Return eta, its derivative with respect to W, and phi of Ogden and Roxburgh."""
 
 
 @softened.on(Mullins)

@@ -138,7 +138,7 @@ def with_pore_pressure(law, kin, state, p):
 
 @point_function()
 def drag_at(permeability, law, n):
-    """Return n^2 rho g / k, the drag per volume and relative velocity at porosity n."""
+    """Return n^2 rho g / k, the drag per unit volume and unit relative velocity at porosity n."""
 
 
 @drag_at.on(ConstantPermeability)

@@ -1,6 +1,6 @@
 """Temperature of a point as changed by its law, a part of `eos_strength`.
 
-A temperature is a NamedTuple of parameters. Its memory is `Warm`, which other parts get as `heat`;
+A temperature is a NamedTuple of parameters. Its history is `Warm`, which other parts get as `heat`;
 without a temperature they get ().
 """
 

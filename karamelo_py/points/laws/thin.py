@@ -34,7 +34,7 @@ class ThinInLargeIncrements(Thin):
 
 
 class State(NamedTuple):
-    whole: Any  # memory of the inner law
+    whole: Any  # history variables of the inner law
     across: Any  # thickness / initial thickness
     left: Any  # largest stress across that the trials of a step have left
     largest: Any  # largest component of stress so far

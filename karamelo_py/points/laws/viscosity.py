@@ -1,6 +1,6 @@
 """Artificial viscosity, which spreads shocks over a few cells.
 
-It is a part of `eos_strength` that an equation of state adds, with the memory (q,), a pressure.
+It is a part of `eos_strength` that an equation of state adds; its history variable q is a pressure.
 """
 
 from math import sqrt

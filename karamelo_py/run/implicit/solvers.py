@@ -130,7 +130,7 @@ def from_one_seed() -> Iterator[None]:
     np.random.seed(0)
     try:
         yield
-    except ValueError:  # a level has infinite numbers
+    except ValueError:  # a coarse matrix has infinite numbers
         raise Unconverged from None
     finally:
         np.random.set_state(state)

@@ -21,7 +21,7 @@ from karamelo_py.run.tiles import WholeDomain
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.script.formula import GLOBAL, UNIFORM
 
-LEARN_EVERY = 100  # steps between checks of the balance
+LEARN_EVERY = 100  # steps between checks of the load balance
 
 
 class Load:

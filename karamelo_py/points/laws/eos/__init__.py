@@ -23,7 +23,7 @@ class VolumeStep(NamedTuple):
 
 @point_function(otherwise=True)
 def compressed(eos, memory, step, heating):
-    """Return the memory after a `VolumeStep`; `heating` is plastic and viscous work per volume."""
+    """Return the history after a `VolumeStep`; `heating`: plastic and viscous work per volume."""
     return memory
 
 
@@ -35,13 +35,13 @@ def initial_loss(eos, template):
 
 @point_function(otherwise=True)
 def crush_work(eos, before, after, step):
-    """Return the work of crushing pores between two memories."""
+    """Return the work of crushing pores between two states of the history variables."""
     return 0
 
 
 @point_function(otherwise=True)
 def crushed_strain(eos, before, after):
-    """Return the volume strain of pores crushed between two memories."""
+    """Return the volume strain of pores crushed between two states of the history variables."""
     return 0
 
 
@@ -53,7 +53,7 @@ def ignited(eos, memory, since):
 
 @point_function(otherwise=True)
 def taken_heat(eos, memory, heat):
-    """Return (heat,), the part of `heat` that becomes internal energy of the memory, or ()."""
+    """Return (heat,), the part of `heat` that becomes internal energy, or ()."""
     return ()
 
 
@@ -85,7 +85,7 @@ def ratio_at_pressure(eos, p, heat):
 
 @point_function(otherwise=True)
 def at_pressure(eos, j, memory, p, heat):
-    """Return volume ratio and memory at the pressure p (fix initial_stress)."""
+    """Return volume ratio and history variables at the pressure p (fix initial_stress)."""
     return ratio_at_pressure(eos, p, heat), memory
 
 

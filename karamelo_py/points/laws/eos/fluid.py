@@ -385,7 +385,7 @@ def burnt(eos, memory):
 
 
 def cold(eos, j):
-    """Return the products' pressure without energy, and its slope by J."""
+    """Return the products' pressure at E = 0, and its derivative with respect to J."""
     p = slope = 0
     for C, R in ((eos.A, eos.R1), (eos.B, eos.R2)):
         term, ratio = C * exponential(-R * j), eos.omega / (R * j)

@@ -3,7 +3,7 @@
 A strength is a NamedTuple of parameters, a part of `eos_strength`. `heat` is the temperature
 (`Warm`) or (). Strengths that depend on pressure and change the volume define `pressure_response`
 instead of `shear_response`. The default functions are for an elastic strength, with a shear modulus
-``G`` and no memory.
+``G`` and no history variables.
 """
 
 import sys
@@ -34,7 +34,7 @@ class Remembered(NamedTuple):
 
 
 def remembers(strength: type, **numbers: float | str) -> None:
-    """Declare a strength's memory: names (also of dump columns) and initial values.
+    """Declare a strength's history variables: names (also of dump columns) and initial values.
 
     A value is a number or the name of a parameter; ``ep``, the equivalent plastic strain, comes
     first.
@@ -64,9 +64,9 @@ def initial_memory(strength, template):
 
 @point_function(otherwise=True)
 def respond(strength, law, kin, step, memories):
-    """Return deviatoric stress, memory and dissipated work per volume after a `StrainStep`.
+    """Return deviatoric stress, history and dissipated work per volume after a `StrainStep`.
 
-    `memories` holds the memories of all parts of the `law`.
+    `memories` holds the history variables of all parts of the `law`.
     """
     return shear_response(strength, kin, step, memories.strength, memories.heat)
 

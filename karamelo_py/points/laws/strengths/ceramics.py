@@ -132,7 +132,7 @@ class Concrete(NamedTuple):
     T
         Largest tension, as a pressure.
     smax
-        Upper bound of the strength, over fc.
+        Upper bound of the strength / fc.
     D1, D2
         Strain to failure: D1 (P* + T*)^D2.
     efmin

@@ -148,7 +148,7 @@ class ByFlow:
     __slots__ = ()
     start: ClassVar[int]
     flow: ClassVar[Code]
-    slopes: ClassVar[tuple[Code, ...]]  # by ep and epdot
+    slopes: ClassVar[tuple[Code, ...]]  # derivatives with respect to ep and epdot
 
 
 FlowFields = namedtuple("FlowFields", ("G", "initial_temperature"))

@@ -1,11 +1,11 @@
 """Base of pressure-dependent strengths: cohesion and friction with optional softening.
 
-The memory is the equivalent plastic strain ep, the plastic volume ratio Jp and the separation
-volume ratio Js. Beyond the largest tension points separate; the volume of gaps must close before
-points sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and simulation of
-granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon et al. 2017,
-"Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4), section
-4.3.4). The volume gained by plastic shear (dilatancy) remains.
+The history variables are the equivalent plastic strain ep, the plastic volume ratio Jp and the
+separation volume ratio Js. Beyond the largest tension points separate; the volume of gaps must
+close before points sustain pressure again (Dunatunga & Kamrin 2015, "Continuum modelling and
+simulation of granular flows through their many phases", J. Fluid Mech. 779, section 3.3; Tampubolon
+et al. 2017, "Multi-species simulation of porous sand and water mixtures", ACM Trans. Graph. 36(4),
+section 4.3.4). The volume gained by plastic shear (dilatancy) remains.
 """
 
 from collections.abc import Callable
@@ -124,7 +124,7 @@ def respond_by_friction(strength, law, kin, step, memories):
 
 
 def frictional(strength: type) -> None:
-    """Give `strength` (with ``G`` and the fields of `surface`) its memory and response."""
+    """Give `strength` (with ``G`` and fields of `surface`) its history variables and response."""
     remembers(strength, ep=0.0, Jp=1.0, Js=1.0)
     inelastic_ratio.on(strength)(plastic_and_gaps)
     respond.on(strength)(respond_by_friction)

@@ -119,7 +119,7 @@ def first_guess(strength, before, q, slope):
 
 @point_function(otherwise=True)
 def updated_memory(strength, memory, increment, dt):
-    """Return the memory after a step, whose plastic strain increment may be 0."""
+    """Return the history variables after a step, whose plastic strain increment may be 0."""
     return memory._replace(ep=memory.ep + increment)
 
 

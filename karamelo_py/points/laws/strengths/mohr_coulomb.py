@@ -101,7 +101,7 @@ def returned_to_plane(s, yield_surface, G, K):
     f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k
     volume = 2 * lam * sin_psi  # lam tr(m)
     rise = 2 * G * (1 + sin_psi) + volume  # C m of the largest
-    fall = volume - 2 * G * (1 - sin_psi)  # of the smallest; `volume` of the other
+    fall = volume - 2 * G * (1 - sin_psi)  # fall of the smallest; `volume` of the other
     x = f / (up + down + mean)
     s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
     if s1 >= s2 and s2 >= s3:

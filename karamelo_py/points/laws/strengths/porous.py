@@ -175,7 +175,7 @@ def returned(strength, memory, trial):
 
 @point_function()
 def grown(strength, memory, flow):
-    """Return the memory after a `PlasticStep`, except the plastic volume ratio."""
+    """Return the history variables after a `PlasticStep`, except the plastic volume ratio."""
 
 
 @point_function(otherwise=True)
