@@ -25,7 +25,7 @@ SPREAD, SPREAD_OF_OTHERS = 3 / 16, 1 / 4
 
 class Noise(NamedTuple):
     share: float  # noise / tolerable amount
-    speed: float  # speed of the body or its rim, over the wave speed
+    speed: float  # speed of the body or its rim / wave speed
     cells: float  # path of the body or its rim, in cells
     angle: float = 0.0
     noisy: bool = True

@@ -21,7 +21,7 @@ from karamelo_py.scene.solid import named, solid_with
 DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings about units
 ABSURD = 10.0  # path in one step, in cells, above which a smaller step would not help
 LOOSE = 1.5  # largest point spacing of an unstrained solid, in cells
-LEFT = 0.02  # tolerated stress across a thin body, over the largest stress
+LEFT = 0.02  # tolerated stress across a thin body / largest stress
 APART = "no other point of it within a cell"
 
 

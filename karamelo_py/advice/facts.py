@@ -20,7 +20,7 @@ from karamelo_py.points.laws import law_parts
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.plugins import attributed, foreign_parts
 
-PIC = 0.21  # numerical viscosity of PIC, over (1 - alpha) h^2/dt
+PIC = 0.21  # numerical viscosity of PIC / ((1 - alpha) h^2/dt)
 TURN = 0.3  # radians beyond which a scene counts as rotating
 SEQ = methodcaller("particle", "seq")
 
@@ -167,7 +167,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Relative displacement of points, over twice the longest side."""
+        """Relative displacement of points / twice the longest side."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

@@ -23,7 +23,7 @@ CELLS = 0.25  # displacement in cells below which few points cross a cell face
 class Settling(NamedTuple):
     name: str = ""
     strain: float = 0.0  # mean strain at rest
-    cells: float = 0.0  # displacement of the free end at rest, over the cell size
+    cells: float = 0.0  # displacement of the free end at rest / cell size
 
 
 def expected(facts: BasicFacts) -> Settling:

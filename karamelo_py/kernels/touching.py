@@ -30,7 +30,7 @@ from karamelo_py.points.kinematics import dot, zero_vector
 STIFF = 0.5  # stiffness / (m / dt^2)
 DAMPED = 0.02  # damping / (m / dt)
 STIFFENING = 0.02  # growth of the stiffness of a deep contact per step
-ASIDE = 0.05  # step of the differences of depth, over reach
+ASIDE = 0.05  # step of the differences of depth / reach
 LEVEL = 1e-3  # relative change of depth below which there is no direction
 CALL = types.int64(types.int64)
 

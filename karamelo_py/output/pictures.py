@@ -45,7 +45,7 @@ MOST_CELLS = 1 << 23
 HIDDEN = (0.0, 0.0, 0.0, 0.25)
 # Diameter of the circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
-STEPS = (1, 2, 2.5, 5, 10)  # intervals of ticks, over a power of ten
+STEPS = (1, 2, 2.5, 5, 10)  # intervals of ticks / a power of ten
 # Direction to the light: right, up, towards the viewer.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5

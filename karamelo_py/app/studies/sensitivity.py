@@ -38,7 +38,7 @@ change (mu*), and standard deviation of the changes (sigma), which shows curvatu
 (Morris 1991; Campolongo et al. 2007); n (d + 1) runs.
 fit: for expensive runs: sobol indices of a surrogate fitted to n runs, a polynomial or a Gaussian
 process, whichever has the smaller leave-one-out error (printed). Existing runs are reused."""
-DOUBTED = 0.2  # leave-one-out error of a fit, over the standard deviation of the runs
+DOUBTED = 0.2  # leave-one-out error of a fit / standard deviation of the runs
 LEVELS = 4  # values of each variable in the method morris
 ENDS = 0.01, 0.99  # quantiles
 

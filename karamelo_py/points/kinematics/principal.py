@@ -21,7 +21,7 @@ def principal(s):
 def from_principal(s, values, directions, slopes=None):
     """Build a tensor of the class of `s` from principal values and directions.
 
-    `slopes` (3,), for equal values, are derivatives by another tensor's principal values.
+    `slopes` (3,), for equal values: derivatives with respect to another tensor's principal values.
     """
     if s.kin.dimension == 1:
         return s._make(values)

@@ -43,10 +43,10 @@ class ByEnergy(OfDeformation):
     __slots__ = ()
     traits = LawTraits(rebounds=True)
     in_lanes = True
-    along: ClassVar[tuple[Code, ...]] = ()  # derivatives by I4, I6
+    along: ClassVar[tuple[Code, ...]] = ()  # derivatives with respect to I4, I6
     start: ClassVar[int]  # index of the formula's first number
     energy: ClassVar[Code]
-    first: ClassVar[tuple[Code, ...]]  # derivatives by the three variables a, b, c
+    first: ClassVar[tuple[Code, ...]]  # derivatives with respect to a, b, c
     second: ClassVar[tuple[Code, ...]]  # derivatives with respect to aa, ab, ac, bb, bc, cc
 
 
@@ -247,7 +247,7 @@ def stiffness_along_fibre(
     """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
 
     `cosine2` replaces the squared cosine between the families. At constant volume it is the
-    curvature by ln l. NaN where the energy has no value.
+    curvature in ln l. NaN where the energy has no value.
     """
     along = aligned(law) if cosine2 is None else cosine2
     W = []

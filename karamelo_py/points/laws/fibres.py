@@ -38,8 +38,8 @@ class OfFibres(OfInvariants):
     """A law that also depends on I4 = a0.C a0 and I6 = b0.C b0; has a field `directions`."""
 
     __slots__ = ()
-    twice_along: ClassVar[tuple[Code, ...]]  # derivatives by I4 I4, I6 I6, I4 I6
-    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` by I1, I2, J
+    twice_along: ClassVar[tuple[Code, ...]]  # derivatives with respect to I4 I4, I6 I6, I4 I6
+    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` with respect to I1, I2, J
 
 
 def _leans(directions: Any, d: int) -> bool:

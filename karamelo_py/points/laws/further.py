@@ -33,7 +33,7 @@ def initial_part(component, template):
 
 @point_function(otherwise=True)
 def part_after(component, memory, law, step, memories):
-    """Return the history variables after a `StrainStep`; `memories` are those of other parts."""
+    """Return the history variables after a `StrainStep`; `memories` belong to other parts."""
     return memory
 
 

@@ -391,9 +391,9 @@ def _advance_hill(law, kin, state, dl, dt):
 
 class Residual(NamedTuple):
     excess: Any  # q_trial - Y q_trial/q(x/Y)
-    slope: Any  # derivative by x
+    slope: Any  # derivative with respect to x
     by_limit: Any  # derivative with respect to Y
-    by_squares: tuple  # derivatives by rate z^2, where q = Y
+    by_squares: tuple  # derivatives with respect to rate z^2, where q = Y
 
 
 def residual(law, squares, before, x, dt):

@@ -72,7 +72,7 @@ laws.wraps(
 
 @laws.energy_density.on(Saturated)
 def _energy_density_saturated(law, kin, state):
-    """Return the energy of skeleton and water; derivative by pore volume: -p."""
+    """Return the energy of skeleton and water; -p is its derivative in the pore volume."""
     x = _filled(law, state) - 1
     series = x * x * (0.5 - x * (1 / 3 - x * (0.25 - 0.2 * x)))
     compressed = where(abs(x) < 0.01, series, x - logarithm_near_one(1 + x))

@@ -16,7 +16,7 @@ WHOLE = Axisymmetric()
 ENOUGH = 10  # number of trials for increments of any size
 UNROLLED = 9  # number of trials up to which there is no loop
 FURTHEST = 0.3  # largest change of the stretch across, in a trial
-FLATTEST, STEEPEST = 1e-6, 4.0  # accepted slopes of the stress across, over rho c^2
+FLATTEST, STEEPEST = 1e-6, 4.0  # accepted slopes of the stress across / (rho c^2)
 
 
 class Thin(NamedTuple):
@@ -152,7 +152,7 @@ def thickness(law, kin, state):
 
 @laws.number
 def stress_left(law, kin, state):
-    """Return the largest stress across that a step has left, over the largest stress so far."""
+    """Return the largest stress across that a step has left / largest stress so far."""
     return state.left / where(state.largest > 0, state.largest, 1)
 
 

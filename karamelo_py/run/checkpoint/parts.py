@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve
-        self.halvings = self.returns = 0  # of the run; returns to this state
+        self.halvings = self.returns = 0  # halvings in the run; returns to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}

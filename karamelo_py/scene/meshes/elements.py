@@ -74,7 +74,7 @@ class MeshElements(NamedTuple):
     corners: np.ndarray
     nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
-    bulge: float = 0.0  # distance of `nodes` from the straight element, over its size
+    bulge: float = 0.0  # distance of `nodes` from the straight element / its size
 
     def mirrored(self, which: np.ndarray) -> "MeshElements":
         """Reverse the elements `which` (n,); corners only."""

@@ -56,7 +56,7 @@ class JohnsonHolmquist2(NamedTuple):
     beta
         Fraction of the lost shear energy that becomes pressure (bulking), 0 to 1.
     sfmax
-        Upper bound of the strength of broken material, over the strength at the elastic limit.
+        Upper bound of the strength of broken material / strength at the elastic limit.
 
     Example
     -------
@@ -148,8 +148,8 @@ class Concrete(NamedTuple):
     Notes
     -----
     The von Mises stress is at most fc (A (1 - D) + B P*^N) (1 + C ln(rate/epsdot0)), and at most
-    smax fc; in tension it decreases to 0 at a pressure of -T (1 - D). D is the sum of plastic
-    strain and, with eos p-alpha, of the volume strain of crushed pores, over the strain to failure
+    smax fc; in tension it decreases to 0 at a pressure of -T (1 - D). D sums plastic strain and,
+    with eos p-alpha, the volume strain of crushed pores, both divided by the strain to failure
     (Holmquist, Johnson & Cook 1993, 14th Int. Symp. Ballistics, 591-600). Their three-part pressure
     curve is not built in: use eos p-alpha, which has the same parts, or eos formula. Dump columns:
     ep, damage, opened (the volume ratio of gaps).
