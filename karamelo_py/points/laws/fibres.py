@@ -39,7 +39,7 @@ class OfFibres(OfInvariants):
 
     __slots__ = ()
     twice_along: ClassVar[tuple[Code, ...]]  # derivatives with respect to I4 I4, I6 I6, I4 I6
-    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # `along` differentiated with respect to I1, I2, J
+    mixed: ClassVar[tuple[tuple[Code, ...], ...]]  # derivatives of `along` in I1, I2, J
 
 
 def _leans(directions: Any, d: int) -> bool:
