@@ -65,9 +65,9 @@ def pore_water(
     -----
     Points contain soil and pore water; nodes have separate velocities of soil and water (Jassim,
     Stolle & Vermeer 2013; Bandara & Soga 2015). Columns: ``pore_pressure``, ``saturation``,
-    ``porosity``, ``water_content`` (mass of the water per volume before deformation), and ``wx``,
-    ``wy``, ``wz``, the Darcy velocity (porosity times the velocity of the water relative to the
-    soil). ``s11`` ... is the effective stress, ``t11`` ... the total stress.
+    ``porosity``, ``water_content`` (mass of the water per unit volume before deformation), and
+    ``wx``, ``wy``, ``wz``, the Darcy velocity (porosity times the velocity of the water relative to
+    the soil). ``s11`` ... is the effective stress, ``t11`` ... the total stress.
 
     Surfaces are impermeable, except at nodes of a fix pore_pressure. Loads on a surface act on the
     soil; a fix that holds nodes holds the soil, and its reaction includes the water. Fix body_force

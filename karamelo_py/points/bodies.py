@@ -23,7 +23,7 @@ class MinimizePenetration(NamedTuple):
 
 
 def face(kin, volume, x):
-    """Return the face area of a cubic point, per thickness in 2D, per angle in axisymmetry."""
+    """Return the face area of a cubic point, per unit thickness in 2D, per angle in axisymmetry."""
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:

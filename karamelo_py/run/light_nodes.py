@@ -1,8 +1,8 @@
 """The stable step of bodies in the total frame, as limited by nodes with little mass.
 
-Edge nodes may have more stiffness per mass than inner ones. FLIP damps their motion by averaging;
-transfers with moments or velocity gradients do not. The step is stable below 2 / w, where w^2 is
-the largest eigenvalue of M^-1 K with lumped masses.
+Edge nodes may have more stiffness per unit mass than inner ones. FLIP damps their motion by
+averaging; transfers with moments or velocity gradients do not. The step is stable below 2 / w,
+where w^2 is the largest eigenvalue of M^-1 K with lumped masses.
 """
 
 from collections.abc import Callable

@@ -129,7 +129,7 @@ class Fix(Publisher):
     follows_points = False  # the force depends on positions of points (tools)
     depth_of: Any = None  # function: depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # function: present faces (m, d, d) of a tool or a body
-    accelerates = False  # formulas are forces per mass
+    accelerates = False  # formulas are forces per unit mass
     exerts = False  # publishes a force as ID_x, ID_y, ID_z, and on request its torque
     pressure: Any = None  # formula of the pressure, if it is a pressure on whole surfaces
     presses = False  # is the force of a surface on points

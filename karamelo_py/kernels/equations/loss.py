@@ -34,7 +34,7 @@ ALONE = 0.6
 
 
 class EnergyLoss(SummedField):
-    """Kinetic energy mapped to a node (fused: for the next step), loss per mass, and mass."""
+    """Kinetic energy mapped to a node (fused: for the next step), loss per unit mass, and mass."""
 
     shape = triple
 
@@ -43,7 +43,7 @@ BROUGHT = whole(EnergyLoss, scalar)
 
 
 class FrictionalHeat(StepField):
-    """Frictional heat per mass at a node, from contact and walls."""
+    """Frictional heat per unit mass at a node, from contact and walls."""
 
 
 @node_task
@@ -169,7 +169,7 @@ def _before(node, template):
 
 
 def _gone(pt, v, moment):
-    """Return the kinetic energy per mass that a point lost to the nodes and back."""
+    """Return the kinetic energy per unit mass that a point lost to the nodes and back."""
     gone, lost = v[0] - v[0], field(pt.w.nodes.fields, EnergyLoss)
     outward, back = transfers.lost_fractions(pt.w.transfer, gone)
     unit = OnePoint(real(1, gone), v - v, moment)

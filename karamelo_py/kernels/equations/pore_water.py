@@ -138,8 +138,8 @@ class GivenPressure(StepField):
 class GivenFlux(StepField):
     """Rates of water supply to a node, by `WAYS`.
 
-    Values are per area of faces with an outward normal along each direction (lo, hi), per area of
-    any face, and per volume; after the step, the mass flow rate that each supplied.
+    Values are per unit area of faces with an outward normal along each direction (lo, hi), per unit
+    area of any face, and per unit volume; after the step, the mass flow rate that each supplied.
     """
 
     shape = numbers(2, 2)

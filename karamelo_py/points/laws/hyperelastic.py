@@ -64,8 +64,8 @@ class HyperelasticFormula(OfInvariants, Fields):
     fibre, fibre2
         Directions of the fibres at rest, for I4 and I6: numbers, or formulas of x0, y0, z0.
     cp, kappa, alpha
-        Heat capacity per mass, conductivity and coefficient of linear expansion of a material with
-        a temperature, as for neo-hookean.
+        Heat capacity per unit mass, conductivity and coefficient of linear expansion of a material
+        with a temperature, as for neo-hookean.
     T
         Temperature at which the formula is checked; initial one unless the solid sets it.
 

@@ -36,8 +36,8 @@ class LinearConstants(NamedTuple):
     nu
         Poisson's ratio, above -1 and below 0.5.
     cp, kappa
-        Heat capacity per mass, and conductivity; both or neither. They add a temperature, initially
-        the solid's.
+        Heat capacity per unit mass, and conductivity; both or neither. They add a temperature,
+        initially the solid's.
     alpha
         Coefficient of linear expansion.
     rate
@@ -113,7 +113,7 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho with constant moduli; the volume per mass is multiplied by det F.
+    # (lam + 2 G) / rho with constant moduli; the volume per unit mass is multiplied by det F.
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 

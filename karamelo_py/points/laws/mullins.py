@@ -39,7 +39,7 @@ class Mullins(NamedTuple):
     r
         Limit of the softening: at least 1 - 1/r of the stress in first loading remains.
     m
-        Energy per volume that scales the softening.
+        Energy per unit volume that scales the softening.
     beta
         Growth of that scale with the largest energy so far.
 

@@ -31,7 +31,7 @@ class TulerButcher(NamedTuple):
     sigma0
         Principal tension below which there is no failure.
     exponent
-        Exponent of the tension beyond sigma0. With 1, K is an impulse per area; with 0, a duration.
+        Exponent of the tension beyond sigma0. With 1, K is stress times time; with 0, a duration.
     K
         Value of the integral (see notes) at which a point fails.
 

@@ -53,7 +53,7 @@ class PlasticWork(NamedTuple):
     chi
         Fraction of plastic work converted to heat (Taylor & Quinney 1934), often 0.9.
     cp
-        Heat capacity per mass.
+        Heat capacity per unit mass.
     kappa
         Conductivity, used with ``method(..., thermo-mechanical)`` only.
     alpha

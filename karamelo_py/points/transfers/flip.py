@@ -147,7 +147,7 @@ def warn_of_lost_angular_momentum(transfer: type) -> None:
 
     Points move with the grid velocity u but store v, so each step changes the angular momentum by
     the sum of m u x v dt. Limits are from 2D disks with 4 and 8 cells in the radius and a Young's
-    modulus of 100 times the rotational energy per volume (R4, splines, linear basis).
+    modulus of 100 times the rotational energy per unit volume (R4, splines, linear basis).
     """
     known_failure(
         transfer,

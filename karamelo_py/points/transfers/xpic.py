@@ -14,7 +14,7 @@ class TermOfSeries(StepField):
 
 
 class Reflected(StepField):
-    """Energy per mass that XPIC has removed, and velocity that is not yet in the series."""
+    """Energy per unit mass that XPIC has removed, and velocity that is not yet in the series."""
 
     shape = numbers(1, 1)
 

@@ -5,9 +5,9 @@ water content w, volume V and Darcy's flux q = -k (grad p - rho g). The pressure
 sum V p grad N_i. Time integration is backward Euler.
 
 Without drainage, pressures oscillate if displacement and pressure have the same basis. Therefore
-deviations of pressure increments from cell means have a compliance per volume, max(0, 3 / M - 12 k
-dt / h^2) (Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements for
-coupled solid-deformation/fluid-diffusion"; Zhao & Choo 2020), which conserves water.
+deviations of pressure increments from cell means have a compliance per unit volume, max(0, 3 / M -
+12 k dt / h^2) (Bochev & Dohrmann 2006; White & Borja 2008, "Stabilized low-order finite elements
+for coupled solid-deformation/fluid-diffusion"; Zhao & Choo 2020), which conserves water.
 """
 
 from collections.abc import Iterable

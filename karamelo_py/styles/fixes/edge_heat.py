@@ -52,8 +52,8 @@ class EdgeHeatFlux(EdgeHeat):
     Parameters
     ----------
     q
-        Heat per area and time, negative if it leaves the body, a function of x, y, z (initial
-        position of the edge), time and published values.
+        Heat per unit area and unit time, negative if it leaves the body, a function of x, y, z
+        (initial position of the edge), time and published values.
 
     Example
     -------
@@ -87,8 +87,8 @@ class EdgeConvection(EdgeHeat):
     Parameters
     ----------
     h
-        Heat transfer coefficient, heat per area, time and kelvin, a function of x, y, z (initial
-        position of the edge), time and published values.
+        Heat transfer coefficient, heat per unit area, time and kelvin, a function of x, y, z
+        (initial position of the edge), time and published values.
     T_inf
         Temperature of the surrounding fluid, likewise.
 

@@ -290,7 +290,7 @@ def _of(solid: Solid, ids: np.ndarray) -> np.ndarray:
 
 
 class EdgeTraction(EdgeFix):
-    """Apply a traction (force per area) to one side of a region.
+    """Apply a traction (force per unit area) to one side of a region.
 
     Parameters
     ----------

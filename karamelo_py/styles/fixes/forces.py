@@ -63,9 +63,9 @@ class BodyForce(Fix):
     Parameters
     ----------
     acceleration
-        bx, by, bz, one per dimension: force per mass, functions of x0, y0, z0, time and published
-        values. NULL leaves a component unchanged. With axisymmetric(true, twist=true), bz acts
-        around the axis.
+        bx, by, bz, one per dimension: force per unit mass, functions of x0, y0, z0, time and
+        published values. NULL leaves a component unchanged. With axisymmetric(true, twist=true), bz
+        acts around the axis.
 
     Example
     -------

@@ -33,7 +33,7 @@ class GeostaticStress(Fix):
 
     Notes
     -----
-    The vertical stress at a point is the weight per area of the points of the group above it,
+    The vertical stress at a point is the weight per unit area of the points of the group above it,
     summed in columns as wide as the largest point. Layers may differ in material and in points per
     cell. A material with pore_water is saturated up to its highest point in the column, with
     hydrostatic pressure, and the stress is the effective stress. Under fix body_force, ground with
@@ -104,7 +104,7 @@ def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return the weight per area (n, k) above the centres of points, taken as boxes.
+    """Return the weight per unit area (n, k) above the centres of points, taken as boxes.
 
     `x`, `size` (n, d): centres and sizes; the last direction is up. `weights` (n, k) are per
     volume. Columns are at least as wide as the widest box. The weight of a box is added to all

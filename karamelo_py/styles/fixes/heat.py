@@ -166,8 +166,8 @@ class HeatFluxParticles(FacesOfPoints):
     group
         A single layer of points along the surface.
     q
-        Heat per area and time, negative if it leaves the body, a function of x, y, z, x0, y0, z0,
-        time and published values.
+        Heat per unit area and unit time, negative if it leaves the body, a function of x, y, z, x0,
+        y0, z0, time and published values.
 
     Example
     -------
@@ -213,8 +213,8 @@ class ConvectionParticles(FacesOfPoints):
     group
         A single layer of points along the surface.
     h
-        Heat transfer coefficient, heat per area, time and kelvin, a function of x, y, z, x0, y0,
-        z0, time and published values.
+        Heat transfer coefficient, heat per unit area, time and kelvin, a function of x, y, z, x0,
+        y0, z0, time and published values.
     T_inf
         Temperature of the surrounding fluid, likewise.
 

@@ -444,7 +444,7 @@ class ContactRigidBody(Fix):
     Notes
     -----
     Publishes the force on the points as ID_x, ID_y, ID_z, and the area of contact, the faces of
-    the points that are pressed, as ID_area (in 2D per thickness, in axisymmetry per radian).
+    the points that are pressed, as ID_area (in 2D per unit thickness, in axisymmetry per radian).
 
     A point is a ball (in 2D a disk) with a radius of half the side of a cube of its volume. The
     contact impulse acts on the nodes around the point, and on the body at the point. It is that a

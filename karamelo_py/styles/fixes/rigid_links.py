@@ -175,8 +175,8 @@ class Joint(Fix):
     of the bodies, so masses may have any ratio. In a rotation, a joint opens by an error of second
     order in the step, which the next step removes.
 
-    A spring is explicit and dissipates nothing up to a stiffness per mass of 1/dt^2; a stiffer one
-    is implicit, with numerical damping. Damping is implicit.
+    A spring is explicit and dissipates nothing up to a stiffness per unit mass of 1/dt^2; a stiffer
+    one is implicit, with numerical damping. Damping is implicit.
 
     See Also
     --------

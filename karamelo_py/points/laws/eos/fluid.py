@@ -151,7 +151,7 @@ class IdealGas(NamedTuple):
     p
         Initial pressure.
     e
-        Initial internal energy per mass, instead of p.
+        Initial internal energy per unit mass, instead of p.
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear, as in eos shock.
 
@@ -161,7 +161,7 @@ class IdealGas(NamedTuple):
 
     Notes
     -----
-    p = (gamma - 1) rho e, and de = -p dv with the volume v per mass. In adiabatic steps e is
+    p = (gamma - 1) rho e, and de = -p dv with the volume v per unit mass. In adiabatic steps e is
     proportional to rho^(gamma - 1), exactly. Viscous work heats the gas, as does kinetic energy
     dissipated by PIC, FLIP, APIC, MLS and TPIC. For shocks, Q1 = 2 and Q2 = 0.2 are usual.
 
@@ -287,7 +287,7 @@ class JwlConstants(NamedTuple):
     A, B, R1, R2, omega
         Constants of the products.
     E0
-        Chemical energy per volume.
+        Chemical energy per unit volume.
     D
         Detonation speed.
     Q1, Q2

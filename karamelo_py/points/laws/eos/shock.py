@@ -37,7 +37,7 @@ class ShockConstants(NamedTuple):
     Gamma
         Grueneisen parameter, at the density before deformation.
     cv
-        Heat capacity per mass.
+        Heat capacity per unit mass.
     Tr
         Temperature above which heat adds to the pressure.
     Q1, Q2

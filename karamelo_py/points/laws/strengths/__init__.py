@@ -64,7 +64,7 @@ def initial_memory(strength, template):
 
 @point_function(otherwise=True)
 def respond(strength, law, kin, step, memories):
-    """Return deviatoric stress, history and dissipated work per volume after a `StrainStep`.
+    """Return deviatoric stress, history and dissipated work per unit volume after a `StrainStep`.
 
     `memories` holds the history variables of all parts of the `law`.
     """

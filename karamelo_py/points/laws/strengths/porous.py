@@ -163,7 +163,7 @@ class Trial(NamedTuple):
 
 class PlasticStep(NamedTuple):
     x: float  # equivalent strain of a foam
-    work: float  # plastic, per volume
+    work: float  # plastic, per unit volume
     opening: float  # plastic volume strain
     tension: bool
 

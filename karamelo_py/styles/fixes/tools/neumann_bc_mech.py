@@ -1,4 +1,4 @@
-"""A force per area on the outer points."""
+"""A force per unit area on the outer points."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from karamelo_py.styles.fixes.tools.base import ToolFix
 
 
 class NeumannBcMech(ToolFix):
-    """Apply a traction (force per area) to the surface of a body.
+    """Apply a traction (force per unit area) to the surface of a body.
 
     Parameters
     ----------
