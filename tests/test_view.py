@@ -228,7 +228,7 @@ def test_plot_draws_columns_of_a_log(tmp_path, monkeypatch, capsys, name):
     assert "<!-- step (s) -->" in (tmp_path / "p.svg").read_text()
     for arguments, remedy in [
         ([name, "Stepp"], "did you mean 'Step'?"),
-        (["gone.mpm", "Step"], "No such file"),
+        (["gone.mpm", "Step"], "there is no log gone.mpm"),
         ([name, "Step", "-o", "p.txt"], ".pdf"),
     ]:
         status, _, err = call(capsys, "plot", *arguments)
