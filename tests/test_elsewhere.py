@@ -342,6 +342,8 @@ def test_leaving_does_not_wait_for_a_case(folder):
         place.close()
         assert not outcome.done()
         free.set()
+        ended = outcome.result(10)
+    assert ended.status == "killed", ended
 
 
 @pytest.mark.usefixtures("starts_are_cheap")

@@ -355,3 +355,11 @@ def test_a_free_body_slides_beyond_the_limit_of_friction(run_script):
     assert "limit load: no equilibrium beyond" in result.out + result.err
     loose = run_script(text.replace("1, 1.5)", "1.5, 2)"), status=1, folder="loose").err
     assert "solid 'box' is not held along" in loose and "fixed=(" in loose
+
+
+def test_free_bodies_that_touch_are_refused_in_load_steps(run_script):
+    top = "region(top, block, 0.5, 1.5, 1.5, 2)\nsolid(top, region, top, 2, steel, 0.25, 0)"
+    text = FREE.format(ends="0, 2", loads="gravity=(0, -1)", dt=0.5)
+    text = text.replace("0, 2, 0.25)", "0, 3, 0.25)")
+    text = text.replace("fix(b", f"{top}\nfix(t, rigid_body, top, gravity=(0, -1))\nfix(b")
+    assert "rigid solids touch (top, box)" in run_script(text, status=1).err

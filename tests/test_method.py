@@ -201,6 +201,9 @@ def test_auto_by_the_scene(run_interpreted, material, more, lines):
         d=2, domain="0, 2, 0, 1", box="0.2, 0.6, 0.2, 0.6", material=material, more=more
     )
     said = run_interpreted(text, command="check").out
+    if "Bernstein" in lines:
+        one = run_interpreted(text.replace("box, 2, m", "box, 1, m"), command="check").out
+        assert "which writes" in one and "Bernstein" not in one
     assert lines in re.search("which writes +(.*)", said)[1]
     if "usavg" in lines:
         assert re.search("^method .* usavg$", said, re.M)

@@ -100,7 +100,8 @@ class Scouted(SceneFacts):
     def limit_load(self) -> bool:
         """True in load steps of soil that dilates, or that end at its limit load."""
         slow = self.implicit and not self.scheme.traits.inertia
-        return slow and self.soil and (self.dilates or self.scheme.limit == "stop")
+        one = any(solid.ppc == 1 for solid in self.soft)
+        return slow and self.soil and not one and (self.dilates or self.scheme.limit == "stop")
 
     @property
     def pressed(self) -> bool:

@@ -40,8 +40,9 @@ def unknown_statement(script: Any, name: str) -> ScriptError:
 def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptError:
     commands = registry.names("command")
     kind = "command" if statement else "function"
-    other = in_own_words(script, name) or instead("command", name) or as_style(script, name)
-    other = other if statement else table()["functions"].get(name)
+    other = table()["functions"].get(name)
+    if statement:
+        other = in_own_words(script, name) or instead("command", name) or as_style(script, name)
     if script.knows(name) and not other:
         message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"

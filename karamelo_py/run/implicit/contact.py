@@ -64,7 +64,7 @@ class Contact:
 
     def meet(self, nodes: np.ndarray) -> None:
         """Suppose that the nearest pairs of a body, with `nodes` (m,), are closed if none is."""
-        own = nodes[self.first] | nodes[self.second]
+        own = (nodes[self.first] | nodes[self.second]) & (self.stiffness > 0)
         if np.any(own) and not np.any(self.close[own]):
             near = CLOSE * float(np.min(self.s.grids.spacing))
             self.close |= own & (self.gap <= self.gap[own].min() + near)

@@ -424,6 +424,11 @@ class LoadSteps:
             how = f"is not held along {loose[0]}" if loose else "can rotate"
             how = how if len(rows) else "is held by nothing"
             raise self._loose(self._solid_at(equations, nodes), how)
+        if moving and contact and (solids := moving.without_stiffness(contact)):
+            raise self._error(
+                f"rigid solids touch ({', '.join(solids)}), and have no stiffness between them",
+                "an elastic material for one of them, or scheme(musl)",
+            )
         if moving and contact and (unheld := moving.loose(contact)):
             how = f"is not held along {unheld[1]}" if len(unheld[1]) == 1 else "can rotate"
             raise self._error(

@@ -125,6 +125,12 @@ class MovingBodies:
             one.finish(q, forces, blocks, control)
             first = end
 
+    def without_stiffness(self, contact: Contact) -> list[str]:
+        """Return the solids that touch another rigid solid."""
+        chosen = contact.close & (contact.stiffness == 0)
+        nodes = np.concatenate([contact.first[chosen], contact.second[chosen]])
+        return [one.fix.body.id for one in self.bodies if np.any(np.isin(one.nodes, nodes))]
+
     def loose(self, contact: Contact) -> tuple[str, str] | None:
         """Let bodies meet what is near; return a solid and a direction not held.
 
@@ -138,7 +144,8 @@ class MovingBodies:
             contact.meet(nodes)
             motions = np.zeros((*self.velocities.shape, count))
             motions[one.nodes] = one.motions[:, :, one.ways] / lever
-            _, sizes, ways = np.linalg.svd(contact.constraints(motions, nodes))
+            rows = np.linalg.qr(contact.constraints(motions, nodes), "r")
+            _, sizes, ways = np.linalg.svd(rows)
             loose = ways[np.sum(sizes > WEAK * sizes.max(initial=0.0)) :]
             rest = loose.T @ (loose @ (load / lever))
             if np.abs(rest).max(initial=0.0) > UNSUPPORTED * np.abs(load / lever).max(initial=0.0):
