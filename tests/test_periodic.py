@@ -1,5 +1,6 @@
 """Periodic directions: waves, drift, flow down a plane, and what has none."""
 
+import re
 from math import pi
 
 import numpy as np
@@ -245,6 +246,8 @@ SLIDING = """
     p = 1000*5*(1 - y0)
     fix(rest, initial_stress, all, -3/7*p, -p, -3/7*p, 0, 0, 0)
     compute(v, average_velocity, all)
+    fix(u, displacement, all)
+    dump(d, all, particle, 100000, d.*.txt, ux)
     log_modify(custom, time, v_x, v_y)
     set_output(time(0.1))
     run_time(0.5)
@@ -256,7 +259,12 @@ PLANE_OF = "contact/minimize_penetration/plane, layer, 0, 0, 0, 0, 1, 0"
 @pytest.mark.parametrize("ground", [SURFACE, PLANE_OF])
 def test_a_layer_slides_on_ground_without_ends(run_script, ground):
     """Coulomb: acceleration g_x - mu g_y, through the seam. Ground that ends is refused."""
-    log = run_script(SLIDING.format(ends="-INF, INF", ground=ground)).log
+    result = run_script(SLIDING.format(ends="-INF, INF", ground=ground))
+    log, ux = result.log, columns(final(result))["ux"]
+    assert np.abs(ux / 0.5 - 1).max() < 0.02  # each point moved by one period
+    if ground == SURFACE:
+        lost = float(re.search(r"lost by contact +([\d.]+) %", result.out)[1])
+        assert abs(lost / 25 - 1) < 0.1  # 0.2 g s divided by v^2/2, and bounces
     acceleration = np.diff(log["v_x"][[1, -1]]) / np.diff(log["Time"][[1, -1]])
     assert abs(acceleration / 4 - 1) < 0.005
     if ground == SURFACE:

@@ -66,6 +66,17 @@ def test_a_cloud_of_points_is_interpolated(tmp_path, name):
     assert (raster.corner <= (10, 20)).all() and (ends >= (14, 23)).all()
 
 
+def test_a_cloud_need_not_fill_its_corners(run_interpreted, tmp_path):
+    """Scattered points around the domain; the hull of random points has no corners."""
+    (tmp_path / "run").mkdir()
+    x, y = np.random.default_rng(2).random((2, 60)) * [[3.5], [3]] - 1
+    np.savetxt(tmp_path / "run" / "dem.xyz", np.column_stack([x, y, 0.3 + 0.2 * x]))
+    script = GROUND.format(more="", last="run(0)").replace("dem.asc", "dem.xyz")
+    assert "points" in run_interpreted(script).out
+    sparse = script.replace("dimension(3, 0, 1.5", "dimension(3, -0.99, 1.5")
+    assert "without a height in the domain" in run_interpreted(sparse, status=1).err
+
+
 @pytest.mark.parametrize(
     ("rows", "says"), [("1 2\n3 4\n", "has 2 columns"), ("1 2 3\n2 3 4\n3 4 5\n", "on a line")]
 )

@@ -93,6 +93,11 @@ class Field(NamedTuple):
         return values
 
     @staticmethod
+    def position(kin: Any) -> int | None:
+        """Return the first component of a stored position, which returns to a periodic cell."""
+        return None
+
+    @staticmethod
     def needed(tag: Any) -> bool:
         """Return whether points of a law, or nodes of a basis, have this field."""
         return True
@@ -125,6 +130,10 @@ def is_kept(kind: type) -> bool:
 
 def columns_of(kind: type) -> tuple[str, ...]:
     return _trait(kind, "columns")
+
+
+def position_in(kind: type, kin: Any) -> int | None:
+    return _trait(kind, "position")(kin)
 
 
 def shown_by(kind: type, values: np.ndarray, table: Any) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.fields import field, position_in
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, Setup
 from karamelo_py.kernels.equations.periodic import EVERY, GHOSTS, Axis, InUse, Seam, position_on
 from karamelo_py.kernels.equations.sheared import Shear
@@ -31,14 +31,21 @@ def return_points(s: Setup, domain: Domain) -> None:
         return
     for block in s.blocks:
         places = block.points.x[s.control.motion[0].now]
+        stored = [
+            one.array[first:]
+            for one in block.points.fields
+            if (first := position_in(type(one), s.kin)) is not None
+        ]
         for k in reversed(domain.periodic):
             lo, length = domain.lo[k], domain.hi[k] - domain.lo[k]
             periods = np.floor((places[k] - lo) / length)
             away = periods != 0
-            places[k, away] -= length * periods[away]
+            for positions in (places, *stored):
+                positions[k, away] -= length * periods[away]
             if k == 1 and domain.shear:
                 speed = domain.shear * length * periods[away]
-                places[0, away] -= speed * s.control.values[TIME]
+                for positions in (places, *stored):
+                    positions[0, away] -= speed * s.control.values[TIME]
                 block.points.v[0, away] -= speed
 
 

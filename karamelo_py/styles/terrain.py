@@ -91,7 +91,7 @@ class Heights(Enclosed):
         else:
             at[0], z = _cut(at[0], z, lo[0] - far, hi[0] + far)
             at[1], turned = _cut(at[1], z.T, lo[1] - far, hi[1] + far)
-            z = turned.T
+            z = _filled(turned.T, [_next_to(at[k], lo[k], hi[k]) for k in (1, 0)])
             self._refuse_holes(file.name, at, z)
             faces = faces_of(at[0], at[1], z, min(bottom, z.min() - far))
         super().__init__(
@@ -126,6 +126,17 @@ class Heights(Enclosed):
                 argument="file",
                 expected="a raster without holes (gdal_fillnodata), or a smaller domain",
             )
+
+
+def _next_to(at: np.ndarray, lo: float, hi: float) -> np.ndarray:
+    """Return for each centre the number of the nearest one in the domain or next to it."""
+    first, last = np.searchsorted(at, lo, "right") - 1, np.searchsorted(at, hi)
+    return np.clip(np.arange(len(at)), max(first, 0), min(last, len(at) - 1))
+
+
+def _filled(z: np.ndarray, nearest: list[np.ndarray]) -> np.ndarray:
+    """Continue the ground level where heights outside the domain are unknown."""
+    return np.where(np.isnan(z), z[np.ix_(*nearest)], z)
 
 
 def _cut(at: np.ndarray, z: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,7 @@
 """Fix displacement: displacements since a construction stage."""
 
+from typing import Any
+
 import numpy as np
 
 from karamelo_py.compiler.fields import Field, vector
@@ -14,6 +16,10 @@ class EarlierDisplacement(Field):
 
     shape = vector
     columns = ("ux", "uy", "uz")
+
+    @staticmethod
+    def position(kin: Any) -> int | None:
+        return 0
 
     @staticmethod
     def shown(values: np.ndarray, table: PointTable) -> np.ndarray:

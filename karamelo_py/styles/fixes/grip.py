@@ -1,5 +1,7 @@
 """State of friction at points, see `points.bodies.rub`."""
 
+from typing import Any
+
 from karamelo_py.compiler import importable
 from karamelo_py.compiler.fields import Field, field
 from karamelo_py.scene.hub import Hub
@@ -17,6 +19,10 @@ class GripOfTool(Grip):
     """`Grip`, and the last position (d) at the tool."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
+
+    @staticmethod
+    def position(kin: Any) -> int | None:
+        return kin.dimension + 2
 
 
 def memory_for(hub: Hub, kind: type) -> type:
