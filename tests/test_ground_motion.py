@@ -98,3 +98,29 @@ def test_what_is_refused(run_interpreted, tmp_path, changes, says):
     (tmp_path / "run" / "flat.csv").write_text("0, 1\n0, 2\n", encoding="utf-8")
     err = run_interpreted(column(**changes), status=1).err
     assert says in err and err.count("error:") == 1, err
+
+
+THROUGH = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(3, 0, 1, 0, 1, 0, 1, 0.5)
+    region(b, block, 0, 1, 0, 1, 0, 1)
+    material(m, linear, 1000, 1e6, 0.3)
+    solid(s, region, b, 1, m, 0.5, 0)
+    region(lo, block, INF, INF, INF, INF, -INF, 0)
+    group(low, nodes, region, lo, all)
+    fix(edge, absorbing, low, m, zlo)
+    fix(q, ground_motion, low, 30, 20, 10, through=edge)
+    compute(p, linear_momentum, all)
+    log_modify(custom, time, p_x, p_y, p_z)
+    set_output(1)
+    run(2)
+"""
+
+
+def test_a_compliant_base_moves_in_three_directions(run_interpreted):
+    """Tractions rho c v (Joyner & Chen 1975) of S, S and P waves push the ground."""
+    log = run_interpreted(THROUGH).log
+    p = [log[f"p_{axis}"][-1] for axis in "xyz"]
+    fast = np.sqrt(2 * (1 - 0.3) / (1 - 2 * 0.3))  # P over S waves
+    assert p[1] / p[0] == pytest.approx(2 / 3, rel=1e-6)
+    assert 0.6 < p[2] / p[0] * 3 / fast < 1  # the dashpots of P waves brake more

@@ -413,3 +413,33 @@ def test_a_drained_column_runs_out_as_dry_sand_does(run_script):
         run_time(0.6)
     """
     assert abs(last(run_script(script))["runout"] / 1.2 - 1) < 0.1
+
+
+STEP = """
+    method(tlmpm, FLIP, linear, 1)
+    dimension(1, 0, {l}, {l}/16)
+    region(layer, block, 0, {l})
+    material(clay, linear, 0.6*2650*{rho}, 1e7*{p}, 0)
+    pore_water(clay, n=0.4, permeability=0.01*{l}, K=2.2e9*{p}, rho=1000*{rho}, gravity=9.81*{l})
+    solid(clay, region, layer, 2, clay, {l}/16, 0)
+    fix(v, initial_velocity_particles, all, 0.01*x)
+    log_modify(custom, dt)
+    set_output(1)
+    run(2)
+"""
+
+
+def test_the_step_follows_both_waves_in_any_units(run_interpreted):
+    """The larger root of the two-phase problem without drag, in m and kg and in mm and t."""
+    dt = [
+        run_interpreted(STEP.format(**units), folder=folder).log["dt"][-1]
+        for folder, units in (
+            ("si", {"l": 1, "rho": 1, "p": 1}),
+            ("mm", {"l": 1000, "rho": 1e-12, "p": 1e-6}),
+        )
+    ]
+    assert dt[1] == pytest.approx(dt[0], rel=1e-3)
+    n, K, rho, E, dry = 0.4, 2.2e9, 1000, 1e7, 0.6 * 2650
+    forces = np.array([[E + K * (1 - n) ** 2 / n, K * (1 - n)], [K * (1 - n), K * n]])
+    roots = np.linalg.eigvals(forces / [[dry], [n * rho]])
+    assert 0.98 < dt[0] * np.sqrt(roots.real.max()) * 16 / 0.9 < 1.02

@@ -84,7 +84,7 @@ def _trace(law, kin, state, slow):
     """Return the trace of the two-phase wave problem, given the skeleton's c^2."""
     # K / n ((1 - n)^2 / dry + n / rho), with one division
     dry = laws.specific_volume(law) * laws.jacobian(law, kin, state)
-    grains, pores = 1 - law.n, law.rho * state.pores * (state.pores + (1 - law.n))
+    grains, pores = 1 - law.n, state.pores * (state.pores + (1 - law.n))
     return slow + law.K * ((grains * grains * law.rho * dry + pores) / (pores * law.rho))
 
 

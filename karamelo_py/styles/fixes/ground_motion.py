@@ -13,7 +13,7 @@ from karamelo_py.scene.modify import Fix, per_direction, vector_hook
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression, applied
-from karamelo_py.styles.fixes.absorbing import Absorbing, along_axis, speeds
+from karamelo_py.styles.fixes.absorbing import Absorbing, speeds
 from karamelo_py.styles.fixes.edges import SIDES
 from karamelo_py.styles.fixes.formulas import AXES
 from karamelo_py.styles.fixes.velocity_nodes import Velocity, VelocityNodes
@@ -21,15 +21,28 @@ from karamelo_py.styles.fixes.velocity_nodes import Velocity, VelocityNodes
 ENDINGS = (".csv", ".txt", ".dat", ".tsv")
 
 
-def push(normal, force, values, dt):
-    """Add the forces (rho A) c v on an edge; `values` are its axis and c v."""
-    axis, *tractions = values
-    weight = along_axis(normal, axis)
-    added = type(force)(*[weight * traction for traction in tractions])
+def push_x(normal, force, values, dt):
+    return pushed(0, normal, force, values)
+
+
+def push_y(normal, force, values, dt):
+    return pushed(1, normal, force, values)
+
+
+def push_z(normal, force, values, dt):
+    return pushed(2, normal, force, values)
+
+
+def pushed(axis, normal, force, values):
+    """Add the forces (rho A) c v on an edge normal to `axis`; `values` are c v."""
+    added = type(force)(*[abs(normal[axis]) * values[k] for k in range(len(force))])
     return force + added, added
 
 
-PUSH = vector_hook(push, reads=(Normal, "force"), writes=("force",), publishes=True, nodes=True)
+PUSHES = [
+    vector_hook(f, reads=(Normal, "force"), writes=("force",), publishes=True, nodes=True)
+    for f in (push_x, push_y, push_z)
+]
 
 
 class BaseAcceleration:
@@ -174,9 +187,8 @@ class GroundMotion(VelocityNodes):
         self.edge, self.node_fields = edge, (Normal,)
         self.prescribes_velocity, self.bound = False, "through"
         fast, slow = speeds(edge.material)
-        self.axis = axis
         self.factors = [fast if k == axis else slow for k in range(hub.domain.dimension)]
-        self.post_particles_to_grid = PUSH
+        self.post_particles_to_grid = PUSHES[axis]
 
     def defined(self) -> None:
         self.formulas = tuple(
@@ -186,11 +198,10 @@ class GroundMotion(VelocityNodes):
         if self.prescribes_velocity:
             super().defined()
         else:
-            tractions = (
+            self.formulas = tuple(
                 Expression(0.0) if v is None else applied("*", Expression(c), v)
                 for c, v in zip(self.factors, self.formulas, strict=True)
             )
-            self.formulas = (Expression(float(self.axis)), *tractions)
         self.between_steps()
 
     def _velocity(self, axis: str) -> Expression:
