@@ -9,6 +9,7 @@ import pytest
 from karamelo_py.scene.meshes.inside import Skin
 from karamelo_py.scene.terrain import faces_of, read_raster
 from karamelo_py.script.errors import ScriptError
+from karamelo_py.styles.terrain import _filled, _next_to
 
 HEAD = "ncols 3\nnrows 2\nxllcorner {x}\nyllcorner 0\ncellsize 0.5\nNODATA_value -9999\n"
 TILTED = HEAD.format(x=0) + "0.5 0.6 0.7\n0.3 0.4 0.5\n"
@@ -66,15 +67,14 @@ def test_a_cloud_of_points_is_interpolated(tmp_path, name):
     assert (raster.corner <= (10, 20)).all() and (ends >= (14, 23)).all()
 
 
-def test_a_cloud_need_not_fill_its_corners(run_interpreted, tmp_path):
-    """Scattered points around the domain; the hull of random points has no corners."""
-    (tmp_path / "run").mkdir()
-    x, y = np.random.default_rng(2).random((2, 60)) * [[3.5], [3]] - 1
-    np.savetxt(tmp_path / "run" / "dem.xyz", np.column_stack([x, y, 0.3 + 0.2 * x]))
-    script = GROUND.format(more="", last="run(0)").replace("dem.asc", "dem.xyz")
-    assert "points" in run_interpreted(script).out
-    sparse = script.replace("dimension(3, 0, 1.5", "dimension(3, -0.99, 1.5")
-    assert "without a height in the domain" in run_interpreted(sparse, status=1).err
+def test_heights_may_be_unknown_outside_the_domain():
+    """The ground continues level from the centres next to the domain, here from 0.5 to 2.5."""
+    at, z = np.arange(5.0), np.arange(25.0).reshape(5, 5)
+    corners = np.ix_([0, -1], [0, -1])
+    z[corners] = np.nan
+    filled = _filled(z, [_next_to(at, 0.5, 2.5)] * 2)
+    assert np.isnan(filled[0, 0])  # next to the domain
+    assert filled[corners].ravel()[1:].tolist() == [3, 15, 18]
 
 
 @pytest.mark.parametrize(

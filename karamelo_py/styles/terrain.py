@@ -130,7 +130,7 @@ class Heights(Enclosed):
 
 def _next_to(at: np.ndarray, lo: float, hi: float) -> np.ndarray:
     """Return for each centre the number of the nearest one in the domain or next to it."""
-    first, last = np.searchsorted(at, lo, "right") - 1, np.searchsorted(at, hi)
+    first, last = int(np.searchsorted(at, lo, "right")) - 1, int(np.searchsorted(at, hi))
     return np.clip(np.arange(len(at)), max(first, 0), min(last, len(at) - 1))
 
 
