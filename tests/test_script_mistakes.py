@@ -168,6 +168,7 @@ def test_a_mistake_in_an_included_script_says_who_includes_it(run_interpreted, t
         ("region(b, sphere, 0,5, 0,6, 0,2)", "with a decimal point: 0.5, 0.6, 0.2"),
         ("fix(v, body_force, all, 0,5, -2,5)", "with a decimal point: 0.5, -2.5"),
         ("run_time(0,1)", "with a decimal point: 0.1"),
+        ("fix(v, velocity_node, n, 1,0)", "did you mean 'velocity_nodes'?"),
         ("contact/surface(all, walls)", "fix(ID, contact/surface, group, region"),
         ("neo-hookean(rubber, 1, 1e5, 0.4)", "material(ID, neo-hookean, rho, E, nu"),
         ("modify(rubber, E=2e5)", "the kind comes first: modify(material, ID, name=value)"),

@@ -148,7 +148,8 @@ def call(
             raise ScriptError(message, hint="use larger cells or fewer points") from error
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
-            wrong.hint = explain.comma_in_number(arguments, wrong) or wrong.hint
+            if not wrong.code.startswith("unknown-"):
+                wrong.hint = explain.comma_in_number(arguments, wrong) or wrong.hint
             if "too many" in wrong.message:
                 wrong.hint = explain.in_parentheses(arguments) or wrong.hint
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
