@@ -376,9 +376,9 @@ def test_views_refuse_what_does_not_fit():
     assert (view._v == [[3, 3], [2, 2], [2, 2]]).all()
     with pytest.raises(ValueError, match="read-only"):
         view.mass[:] = 0
-    with pytest.raises(AttributeError, match="did you mean velocity"):
+    with pytest.raises(AttributeError, match="did you mean 'velocity'"):
         view.velocty = 1.0
-    with pytest.raises(AttributeError, match="did you mean velocity"):
+    with pytest.raises(AttributeError, match="did you mean 'velocity'"):
         view.velocty  # noqa: B018
     with pytest.raises(ValueError, match=r"velocity has the shape \(3, 2\), not \(2,\)"):
         view.velocity = np.ones(2)

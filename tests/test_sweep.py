@@ -336,7 +336,7 @@ def test_a_terminal_shows_what_runs(folder):
     import pty
 
     read, write = pty.openpty()
-    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 60"), "utf-8")
+    (folder / "in.flight").write_text(SCRIPT.replace("steps = 4", "steps = 600"), "utf-8")
     words = ["sweep", "in.flight", "-var", "speed=1e-5,2e-5", "-jobs", "1"]
     command = [sys.executable, "-m", "karamelo_py.app.cli", *words]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "120"}

@@ -74,7 +74,10 @@ class Forms:
         mark = gap.mark if gap else None if missing else arguments[len(names)].mark
         hint = f"is a comma missing in '{gap.text}'?" if gap else hint
         line = self.line(dimension)
-        raise ScriptError(message, mark=mark, expected=line, hint=hint, code="arguments")
+        more = max(got - len(names), 0)
+        raise ScriptError(
+            message, mark=mark, expected=line, hint=hint, code="arguments", surplus=more
+        )
 
     def _own_line(self, hub: Scene, arguments: Sequence[Any], dimension: int) -> str:
         names = self.names[dimension]

@@ -41,7 +41,8 @@ def wrong_count(
     message = f"{'one argument' if len(surplus) == 1 else f'{len(surplus)} arguments'} too many"
     if missing:
         message = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
-    return ScriptError(message, mark=mark, expected=form, hint=hint, code="arguments")
+    more = 0 if missing else len(surplus)
+    return ScriptError(message, mark=mark, expected=form, hint=hint, code="arguments", surplus=more)
 
 
 def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | None:
@@ -141,10 +142,7 @@ def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | 
         if one.mark.column + one.mark.length + 1 == two.mark.column
         and one.text.lstrip("+-").isdigit() and two.text.isdigit()
     ]  # fmt: skip
-    surplus = re.search(r"(\w+) arguments? too many", error.message)
-    exact = surplus is not None and len(adjacent) == int(surplus[1].replace("one", "1"))
-    if many := re.match(r"(\d) components, but", error.message):
-        exact = int(many[1]) - len(adjacent) in (2, 3)
+    exact = len(adjacent) == error.surplus
     if not adjacent or not (exact or ", " in adjacent[0][0].mark.text):
         return None
     if not exact and any(

@@ -150,7 +150,7 @@ def call(
         for wrong in () if error.complete else (error, *error.others):
             if not wrong.code.startswith("unknown-"):
                 wrong.hint = explain.comma_in_number(arguments, wrong) or wrong.hint
-            if "too many" in wrong.message:
+            if wrong.surplus:
                 wrong.hint = explain.in_parentheses(arguments) or wrong.hint
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):
                 wrong.mark, wrong.hint = gap.mark, f"is a comma missing in '{gap.text}'?"

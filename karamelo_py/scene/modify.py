@@ -257,7 +257,8 @@ def per_direction(
         )
     if len(formulas) > 3:
         message = f"{len(formulas)} components, but there are at most 3 directions"
-        raise ScriptError(message, argument=3 - len(formulas), expected=wanted)
+        surplus = len(formulas) - d
+        raise ScriptError(message, argument=3 - len(formulas), expected=wanted, surplus=surplus)
     for k, extra in enumerate(formulas[d:], d - len(formulas)):
         if not _is_nothing(extra):
             last = ": gravity is a component of it" * (name == "b")

@@ -77,6 +77,7 @@ class ScriptError(Exception):
     name: str | None = None
     kind: str = ""
     alike: str | None = None
+    surplus: int = 0  # number of arguments too many
     # Likely cause and the command that resumes, for failed runs.
     cause: str = ""
     resume: str = ""
