@@ -3,7 +3,6 @@
 import numpy as np
 
 from karamelo_py.advice import energy
-from karamelo_py.advice.known_failures import FASTER
 from karamelo_py.advice.step_size import own_step_instead, step_by_script
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
@@ -48,10 +47,12 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
             result = result._replace(message=result.message + seen, fix=fix, cause=cause)
         else:
             result = result._replace(message=f"{result.message} ({when(simulation, 1)})")
-    early = [name for name in hub.update.warned_of if name.startswith(FASTER)]
-    if early and not result.cause and result.code in ("inside-out", "step-collapsed"):
+    above = hub.update.above_waves
+    if above and not result.cause and result.code in ("inside-out", "step-collapsed"):
+        cause = "at the start, points move {:.3g} times as fast as the waves of their material"
         units = "check the units of modulus, density and velocity"
-        return result._replace(cause=early[0].removeprefix(FASTER), fix=f"{units}; {result.fix}")
+        cause = (cause + " (c = {:.3g})").format(*above)
+        return result._replace(cause=cause, fix=f"{units}; {result.fix}")
     if result.mark is None and not result.cause and (too_large or simulation.steps.above_limit()):
         return result._replace(cause=_above_limit_as_cause(hub, simulation))
     return result

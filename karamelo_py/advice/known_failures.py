@@ -37,7 +37,6 @@ IMPOSSIBLE = 30.0  # speed / wave speed (mm/s instead of m/s is a factor of 1000
 SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # density; moduli, in m, kg, s and mm, t, s
 SPEEDS = 1.0, 5e4  # wave speeds in m/s, from jelly to above diamond
 REST = "a scene at rest"
-FASTER = "faster than its waves: "  # name of what is remembered for a run that fails
 UNITS = (
     "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
 )
@@ -193,11 +192,8 @@ def warn_about_steps(
 def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
     laws = [solid.material.law for solid in s.hub.solids.values()]
     solid = any(not any(law_traits(k).any_speed for k in law_kind(law)) for law in laws)
-    if solid and s.speed > 1:
-        s.hub.update.first_time(
-            f"{FASTER}at the start, points move {s.speed:.3g} times as fast as the waves of their "
-            f"material (c = {s.waves:.3g})"
-        )
+    if solid and s.speed > 1 and not s.hub.update.above_waves:
+        s.hub.update.above_waves = [float(s.speed), float(s.waves)]
     if solid and s.speed > IMPOSSIBLE:
         yield Advice(
             "units of velocities",

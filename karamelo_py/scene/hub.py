@@ -117,7 +117,7 @@ class Settings:
 
 
 class Update:
-    remembers = ("warned_of_bounces", "warned_of")
+    remembers = ("warned_of_bounces", "warned_of", "above_waves")
 
     def __init__(self, values: Values):
         self.values = values
@@ -137,6 +137,8 @@ class Update:
         self.boundary_mark: Mark | None = None
         self.warned_of_bounces = False
         self.warned_of: list[str] = []
+        # Largest speed / wave speed and wave speed, if a run began faster than its waves.
+        self.above_waves: list[float] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run; its start
 
     def first_time(self, name: str) -> bool:

@@ -69,15 +69,17 @@ def _wrong(path: Path, what: str) -> ScriptError:
     return ScriptError(f"{path} is not an ESRI ASCII grid: {what}", argument="file", expected=FORM)
 
 
+def _needs(path: Path, form: str, package: str, tool: str) -> ScriptError:
+    hint = f"pip install {package}, or {tool} -of AAIGrid, which writes an ESRI grid"
+    message = f"{path}: {form} needs the package {package}"
+    return ScriptError(message, argument="file", hint=hint)
+
+
 def _of_geotiff(path: Path) -> Raster:
     try:
         import rasterio
     except ImportError:
-        raise ScriptError(
-            f"{path}: GeoTIFF needs the package rasterio",
-            argument="file",
-            hint="pip install rasterio, or gdal_translate -of AAIGrid, which writes an ESRI grid",
-        ) from None
+        raise _needs(path, "GeoTIFF", "rasterio", "gdal_translate") from None
     try:
         with rasterio.open(path) as file:
             heights, transform = (
@@ -99,11 +101,7 @@ def _of_cloud(path: Path) -> Raster:
         from scipy.interpolate import LinearNDInterpolator
         from scipy.spatial import QhullError
     except ImportError:
-        raise ScriptError(
-            f"{path}: a cloud of points needs SciPy",
-            argument="file",
-            hint="pip install scipy, or gdal_grid -of AAIGrid, which writes an ESRI grid",
-        ) from None
+        raise _needs(path, "a cloud of points", "scipy", "gdal_grid") from None
     if path.suffix.lower() in TABLES:
         points = np.column_stack([*read_table(path).values()])
     else:
