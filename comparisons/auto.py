@@ -10,10 +10,10 @@ import io
 import json
 import os
 import re
+import resource
 import shutil
 import signal
 import sys
-import time
 import traceback
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -45,7 +45,7 @@ SETUPS = {
 }
 VISITS = {"usl": 2, "musl": 4, "usf": 4, "usavg": 6}
 EXACT = 1e-3  # errors below count as this
-LONGEST = 40.0  # seconds for a run
+LONGEST = 40  # seconds of processor time for a run
 
 
 class Scene(NamedTuple):
@@ -164,10 +164,10 @@ def front(result: Result) -> float:
     return abs(result.log.front_x[-1] / (2 * sqrt(9.81) * result.log.Time[-1]) - 1)
 
 
-def force_of_hertz(result: Result) -> float:
+def force_of_hertz(result: Result, way: float = 0.02) -> float:
     """Deviation of the mean of the last tenth, or of the last load step."""
     force = result.log.force
-    wanted = exact.hertz_load(0.02, 1.0, 1e6 / (1 - 0.3**2))
+    wanted = exact.hertz_load(way, 1.0, 1e6 / (1 - 0.3**2))
     return abs(force[-max(1, len(force) // 10) :].mean() / wanted - 1)
 
 
@@ -225,7 +225,61 @@ UNSEEN = {
     "static_column": Scene(f"{IN}.static_column", last("share"), ("8", "16"), "N"),
     "slow_bar": Scene(f"{IN}.slow_bar", last("v_x", "exact"), ("500", "1000"), "N"),
 }  # fmt: skip
-SCENES = {**SEEN, **UNSEEN}
+
+MONATOMIC = 5 / 3
+# Not looked at before the present rules were final.
+HELD_OUT = {
+    "slope_12": slope(12, 0.1),
+    "slope_24": slope(24, 0.3),
+    "roll_30": Scene(f"{IN}.incline", last("v_x", "exact"), HALF, more=("angle", 30, "mu", 0.6)),
+    "slide_25": Scene(f"{IN}.incline", last("v_x", "exact"), HALF, more=("angle", 25, "mu", 0.1)),
+    "hertz_light": Scene(
+        f"{IN}.hertz", partial(force_of_hertz, way=0.01), ("0.25", "0.5"), more=("d", 0.01)),
+    "static_hertz_light": Scene(
+        f"{IN}.static_hertz", partial(force_of_hertz, way=0.01), HALF, more=("d", 0.01)),
+    "thin_ring": Scene(f"{M}.lame", last("err"), HALF, more=("model", "cylindrical", "b", 1.5)),
+    "thick_shell": Scene(f"{M}.shell", last("err"), HALF, more=("b", 4)),
+    "static_column_soft": Scene(
+        f"{IN}.static_column", last("share"), ("8", "16"), "N",
+        more=("H", 10, "E", 1e4, "g", 9.81)),
+    "pressed": model("pressed", last("err"), ("8", "16"), c="1.4"),
+    "cylinder_3": Scene(
+        f"{IN}.thick_cylinder", partial(extreme, "pressure", 2 / sqrt(3) * log(3)), HALF,
+        more=("b", 3, "U", 0.015)),
+    "beam_long": model("beam", last("err"), ("8", "16"), L="8"),
+    "slow_bar_5": Scene(
+        f"{IN}.slow_bar", last("v_x", "exact"), ("500", "1000"), "N",
+        more=("periods", 5, "courant", 50)),
+    "slosh_shallow": Scene(f"{D}.slosh", partial(of_defaults, "slosh"), ONE, more=("H", 0.25)),
+    "still_deep": Scene(f"{OWN}.still_water", last("err"), HALF, more=("H", 1)),
+    "poiseuille_thin": Scene(f"{OWN}.poiseuille", last("err"), ONE, more=("mu", 0.5)),
+    "couette_late": Scene(f"{V}.couette", last("err"), ("0.5", "1"), more=("T", 0.3)),
+    "nine_vortices": Scene(f"{D}.taylor_green", last("off"), ONE, more=("k", 3 * pi)),
+    "sod_late": Scene(f"{IN}.sod", last("err"), HALF, more=("T", 0.2)),
+    "blast_early": model(
+        "blast", lambda r: abs(lesser.radius_of_shock(r) / 0.35**0.4 - 1), ("20", "40"),
+        end="0.35"),
+    "tnt_thin": Scene(f"{IN}.tnt_slab", detonation, HALF, more=("L", 0.05)),
+    "organ_argon": Scene(f"{V}.organ", last("err_history"), more=("g", MONATOMIC)),
+    "piston_fast": Scene(f"{V}.piston", last("p", "exact"), more=("T", 20)),
+    "expansion_argon": Scene(f"{V}.expansion", last("err"), more=("g", MONATOMIC)),
+    "plates_900": Scene(f"{D}.plates", partial(of_defaults, "plates"), HALF, more=("v", 900)),
+    "flyer_slow": Scene(f"{IN}.flyer", partial(extreme, "u_x", 0.3), HALF, more=("v", 0.3)),
+    "impact_hard": model("impact", last("err"), ("4", "8"), H="20e9"),
+    "torsion_soft": model("torsion", last("err"), ("4", "8"), k="0.05"),
+    "bar_across": model("bar", last("err"), ("8", "16"), law="across"),
+    "oblique_20": Scene(f"{V}.oblique", last("err_history"), HALF, more=("angle", radians(20))),
+    "square_20": Scene(f"{IN}.axis_aligned", last("error_z"), HALF, more=("G", "0.02")),
+    "square_1d_50": Scene(f"{IN}.axis_aligned_1d", last("error_z"), more=("G", "0.05")),
+    "rebound_long": Scene(f"{V}.rebound", last("back", exact=1.0), ("2", "4"), more=("L", 2)),
+    "disk_2": Scene(
+        f"{IN}.energy_disk", lambda r: abs(r.log.E[-60:].mean() / r.log.E[:60].mean() - 1),
+        ("5", "8"), "n", more=("periods", 15, "strain", 0.02)),
+    "plane_flow_27": Scene(
+        f"{D}.plane_flow", partial(plane_flow.scatter, degrees=27), more=("angle", radians(27))),
+    "cooling_steel": Scene(f"{V}.cooling", last("mean", "exact"), more=("kappa", 50)),
+}  # fmt: skip
+SCENES = {**SEEN, **UNSEEN, **HELD_OUT}
 
 
 def script_of(scene: Scene, lines: str, total: bool) -> str:
@@ -258,6 +312,7 @@ def forked(words: Sequence[str], place: Path) -> int | None:
     pid = os.fork()
     if not pid:
         status = 1
+        resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
         try:
             os.chdir(place)
             for name, at in (("out", 1), ("err", 2)):
@@ -269,15 +324,8 @@ def forked(words: Sequence[str], place: Path) -> int | None:
             traceback.print_exc()
         sys.stdout.flush()
         os._exit(status or 0)
-    end = time.monotonic() + LONGEST
-    while time.monotonic() < end:
-        done, status = os.waitpid(pid, os.WNOHANG)
-        if done:
-            return os.waitstatus_to_exitcode(status)
-        time.sleep(0.01)
-    os.kill(pid, signal.SIGKILL)
-    os.waitpid(pid, 0)
-    return None
+    status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    return None if status in (-signal.SIGKILL, -signal.SIGXCPU) else status
 
 
 def run(scene: Scene, name: str, setup: str, size: str, folder: Path, total: bool = True) -> dict:
@@ -380,7 +428,7 @@ def warm(folder: Path) -> None:
 def main() -> None:
     folder, *names = sys.argv[1:]
     warm(Path(folder))
-    for group in (UNSEEN, SEEN):
+    for group in (HELD_OUT, UNSEEN, SEEN):
         ratios = []
         for name in group:
             if not names or name in names:

@@ -11,6 +11,7 @@ from karamelo_py.app.cli import main
 from karamelo_py.app.studies import records
 from karamelo_py.app.studies.advise import Adviser, ChoiceRuns, carry_out, forecast, sureness
 from karamelo_py.app.studies.curves import CHANCES, by_chance, credible, reached
+from karamelo_py.output.files import read_json
 
 ROOT = Path(__file__).parent.parent
 INPUTS = ROOT / "inputs"
@@ -67,6 +68,43 @@ def test_what_has_been_run_is_sure(folder, capsys):
     out = capsys.readouterr().out
     assert "  N = 20\n" in out and "sure: it was run (err 0.25, steps 2)" in out
     assert "-var N 20" in out
+
+
+def auto(folder, accuracy=", accuracy=0.3"):
+    line = 'method(ulmpm, FLIP, "cubic-spline", 1)'
+    text = SCRIPT.replace(line, f"method(auto{accuracy})")
+    (folder / "in.law").write_text(text, encoding="utf-8")
+    return ["advise", "in.law", "-var", "N=20", "-accuracy", "err", "-cost", "steps"]
+
+
+def test_a_script_states_the_target_and_set_ups_are_compared(folder, capsys):
+    """All have the same errors and steps here, so the program's choice is the cheapest."""
+    words = auto(folder)
+    assert main([*words, "-run"]) == 0
+    out = capsys.readouterr().out
+    assert "for err <= 0.3" in out and "  method(tlmpm, PolyPIC, linear)\n  scheme(usl)\n" in out
+    assert "-var auto rules -var N 20" in out and "the target is met: auto = rules, N = 20" in out
+    known = ("rules", "linear", "quadratic", "APIC-quadratic", "APIC-cubic", "corrected")
+    rows = records.read(folder / "advise.csv")
+    assert {row["auto"] for row in rows} == {*known, "total-quadratic"}
+    record = read_json(folder / "advise" / "N=20,auto=corrected" / "run.json")
+    assert record["runs"][0]["method"] == "ulmpm APIC cubic-spline musl mass=corrected"
+    # The option precedes the script, and the user's names precede the list.
+    assert main([*words, "-target", "0.2", "-var", "auto=linear,APIC-cubic"]) == 1
+    assert "no variant is expected to reach err <= 0.2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "said"),
+    [
+        ("", "there is no largest error"),
+        (", accuracy=2", "between 0 and 1, both excluded or NULL, not 2"),
+    ],
+)
+def test_no_target_and_a_wrong_one(folder, capsys, accuracy, said):
+    assert main(auto(folder, accuracy)) == 1
+    err = capsys.readouterr().err
+    assert said in err and err.count("error: ") == 1
 
 
 def test_a_misspelt_word_ends_the_study(folder, capsys):

@@ -7,7 +7,7 @@ import pytest
 from conftest import ROOT
 from plugged import install, offer
 
-from karamelo_py.advice.choices import CHOICES
+from karamelo_py.advice.choices import ALTERNATIVES, CHOICES
 from karamelo_py.app.cli import main
 from karamelo_py.language import registry
 from karamelo_py.language.interpreter import Interpreter
@@ -215,6 +215,9 @@ def test_auto_leaves_what_the_script_names(run_interpreted):
     result = run_interpreted(text, command="check")
     assert re.search("^method +tlmpm PolyPIC linear musl$", result.out, re.M)
     assert "warning" not in result.out + result.err
+    for target in ("0", "-1", "1", "2", "small", '"0.1"'):
+        with pytest.raises(ScriptError, match=r"accuracy|small"):
+            Interpreter(Hub()).run_text(text.replace("auto", f"auto, accuracy={target}", 1), "in")
     for wrong, line, words in (
         (text.replace("rubber", "m").replace("0.3)", "0.7)"), 5, "Poisson's ratio 0.7"),
         (text.replace("auto", "auto, FLIP"), 2, "one argument too many"),
@@ -227,8 +230,27 @@ def test_auto_leaves_what_the_script_names(run_interpreted):
         assert words in raised.value.render() and raised.value.mark.line == line
 
 
+def test_a_target_is_stated_and_not_checked(run_interpreted):
+    """`check` names the set-ups that ``advise`` compares, which the scene supports."""
+    text = AUTO.format(d=2, domain="0, 1, 0, 1", box="0, 0.5, 0, 0.5", material=RUBBER, more="")
+    text = text.replace("auto", "auto, accuracy=0.01")
+    checked = run_interpreted(text, command="check").out
+    assert re.search("^accuracy +0.01 is the target; not checked", checked, re.M)
+    named = re.search("^advise tries +(.*)$", checked, re.M)[1].split(", ")
+    assert named[0] == "rules" and {*named[1:]} == {*ALTERNATIVES} - {"total"}
+    slow = text.replace("run(10)", "scheme(newmark)\nset_dt(1)\nrun(1)")
+    named = re.search("^advise tries +(.*)$", run_interpreted(slow, command="check").out, re.M)[1]
+    assert "total-quadratic" in named and "corrected" not in named
+    with pytest.raises(ScriptError, match="unknown set-up 'cubic'"):
+        Interpreter(Hub(), {"auto": "cubic"}).run_text(text, "in.script")
+
+
 def test_auto_is_the_table_of_the_page():
     """docs/choose.md lists the rows in order, with lines, reason and scenes of evidence."""
+    page = (ROOT / "docs" / "studies" / "advise.md").read_text("utf-8")
+    for name, lines in ALTERNATIVES.items():
+        words = ", ".join(f"`{line.replace('{grid}', 'ulmpm')}`" for line in lines)
+        assert f"| `{name}` | {words} |\n" in page
     page = (ROOT / "docs" / "choose.md").read_text("utf-8").partition("## Chosen by the program")[2]
     rows = [line.split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
     for choice, row in zip(CHOICES, rows, strict=False):

@@ -1,7 +1,8 @@
 """Rules of ``method(auto)``: the first row whose `when` is true is chosen.
 
 `when` gets the facts of the scene (:class:`karamelo_py.advice.choosing.Scouted`), whose attributes
-fill braces in `lines`. `evidence` names the scenes on which the row is based.
+fill braces in `lines`. `evidence` names the scenes on which the row is based. Studies compare the
+chosen row with `ALTERNATIVES`.
 """
 
 from collections.abc import Callable
@@ -188,3 +189,13 @@ PLAIN = Choice(
     (),
 )
 RESUMED = PLAIN._replace(scene="the run that wrote the restart file")
+BY_RULES = "rules"  # name of the row that the rules choose
+ALTERNATIVES = {
+    "linear": ("method({grid}, FLIP, linear, 0.99)",),
+    "quadratic": ("method({grid}, FLIP, quadratic-spline, 0.99)",),
+    "APIC-quadratic": ("method({grid}, APIC, quadratic-spline)",),
+    "APIC-cubic": ("method({grid}, APIC, cubic-spline)",),
+    "corrected": ("method({grid}, APIC, cubic-spline, mass=corrected)",),
+    "total": ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
+    "total-quadratic": ("method(tlmpm, FLIP, Bernstein-quadratic, 1)",),
+}

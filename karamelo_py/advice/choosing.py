@@ -9,13 +9,20 @@ from contextlib import suppress
 from functools import cached_property
 from itertools import chain
 from math import inf, pi
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from karamelo_py.advice.basics import is_zero
 from karamelo_py.advice.bodies import fixes_at, yields
-from karamelo_py.advice.choices import CHOICES, PLAIN, RESUMED, Choice
+from karamelo_py.advice.choices import (
+    ALTERNATIVES,
+    BY_RULES,
+    CHOICES,
+    PLAIN,
+    RESUMED,
+    Choice,
+)
 from karamelo_py.advice.crossing import boxes_of, meetings
 from karamelo_py.advice.facts import SceneFacts
 from karamelo_py.points.laws import LawTraits, can, conductivity, law_kind, law_traits, parameter
@@ -49,11 +56,23 @@ class AtFirstRun(Exception):
 class Chosen(NamedTuple):
     choice: Choice
     lines: Sequence[str]
+    accuracy: float | None = None
+    alternatives: tuple[str, ...] = ()  # names of set-ups that the scene supports
 
     @property
     def words(self) -> dict[str, str]:
         reason = ": ".join(filter(None, (self.choice.scene, self.choice.why)))
-        return {"chosen for": reason, "which writes": "; ".join(self.lines)}
+        words = {"chosen for": reason, "which writes": "; ".join(self.lines)}
+        if self.accuracy is not None:
+            words["accuracy"] = f"{self.accuracy:g} is the target; not checked (karamelo-py advise)"
+        if self.alternatives:
+            words["advise tries"] = ", ".join(self.alternatives)
+        return words
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        of = {"lines": list(self.lines), "accuracy": self.accuracy}
+        return of | ({"alternatives": list(self.alternatives)} if self.alternatives else {})
 
 
 class Scouted(SceneFacts):
@@ -191,24 +210,42 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
     return None
 
 
-def choose(hub: Hub) -> Chosen:
-    """Choose a row for this scene; mistakes further on in the script raise ScriptError."""
+def choose(hub: Hub, name: str, accuracy: float | None) -> Chosen:
+    """Choose a row for this scene; mistakes further on in the script raise ScriptError.
+
+    `name` is `BY_RULES` or one of `ALTERNATIVES`. With a target `accuracy`, ``check`` also finds
+    the alternatives that the scene supports.
+    """
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
-        return Chosen(RESUMED, lines)  # a longer run may have another row
+        return Chosen(RESUMED, lines, accuracy)  # a longer run may have another row
     if hub.rehearsing:
         return Chosen(PLAIN, PLAIN.lines)
     facts = _facts(hub)
-    for choice in CHOICES:
-        if facts is not None and choice.when(facts):
-            lines = _written(choice, facts)
-            with suppress(ScriptError):
-                scouted(hub, lines)
-                return Chosen(choice, lines)
-    return Chosen(PLAIN, PLAIN.lines)
+    if facts is None:
+        return Chosen(PLAIN, PLAIN.lines, accuracy)
+    if name != BY_RULES:
+        lines = _written(ALTERNATIVES[name], facts)
+        named = PLAIN._replace(scene=f"-var auto {name}")
+        return Chosen(named, lines, accuracy)
+    rows = ((choice, _written(choice.lines, facts)) for choice in CHOICES if choice.when(facts))
+    fit = (Chosen(choice, lines, accuracy) for choice, lines in rows if _runs(hub, lines))
+    chosen = next(fit, Chosen(PLAIN, PLAIN.lines, accuracy))
+    if accuracy is None or not hub.checking:
+        return chosen
+    others = {name: _written(lines, facts) for name, lines in ALTERNATIVES.items()}
+    fit = (n for n, lines in others.items() if lines != tuple(chosen.lines) and _runs(hub, lines))
+    return chosen._replace(alternatives=(BY_RULES, *fit))
 
 
-def _written(choice: Choice, facts: Scouted) -> tuple[str, ...]:
-    first, *others = (line.format(grid=facts.grid) for line in choice.lines)
+def _runs(hub: Hub, lines: Sequence[str]) -> bool:
+    with suppress(ScriptError):
+        scouted(hub, lines)
+        return True
+    return False
+
+
+def _written(lines: Sequence[str], facts: Scouted) -> tuple[str, ...]:
+    first, *others = (line.format(grid=facts.grid) for line in lines)
     heat = ", thermo-mechanical" * facts.hot
     if facts.hub.update.scheme_mark is not None:  # the script chooses a scheme
         others = [line for line in others if not line.startswith("scheme(")]

@@ -83,9 +83,12 @@ class Narrator(Listener):
             "threads": simulation.threads,
             "precision": hub.settings.precision,
         }
+        chosen = hub.update.chosen
+        if chosen:
+            facts["chosen"] = chosen.facts
         shown = {
             "method": facts["method"],
-            **(hub.update.chosen.words if hub.update.chosen else {}),
+            **(chosen.words if chosen else {}),
             "points": facts["points"],
             "volumes": words_of_volumes(hub),
             "nodes": facts["nodes"],

@@ -47,13 +47,16 @@ def report(hub: Hub, end_time: float = inf) -> None:
     word = thin[s.kin.dimension] if hub.domain.thin else s.kin.word
     say(f"dimension      {s.kin.dimension} ({word})")
     say(f"method         {hub.update.words}")
-    for name, words in (hub.update.chosen.words if hub.update.chosen else {}).items():
-        say(f"{name:<15}{words}")
+    facts = {"points": simulation.count, "dt": simulation.dt}
+    if chosen := hub.update.chosen:
+        facts["chosen"] = chosen.facts
+        for name, words in chosen.words.items():
+            say(f"{name:<15}{words}")
     say(f"precision      {hub.settings.precision}")
     say(f"points         {simulation.count} in {len(hub.solids)} solid(s)")
     if volumes := words_of_volumes(hub):
         say(f"volumes        {volumes}")
-    hub.record.begin({"points": simulation.count, "dt": simulation.dt})
+    hub.record.begin(facts)
     lattices = hub.lattices
     shapes = ", ".join(" x ".join(map(str, lattice.shape)) for lattice in lattices[:8])
     more = ", ..." if len(lattices) > 8 else ""

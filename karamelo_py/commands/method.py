@@ -6,14 +6,15 @@ from itertools import groupby
 from typing import Annotated, Any, Literal
 
 from karamelo_py.advice import choosing
+from karamelo_py.advice.choices import ALTERNATIVES, BY_RULES
 from karamelo_py.language import registry, signature
 from karamelo_py.language.kinds import StyleOf
 from karamelo_py.language.rules import Feature, compare
-from karamelo_py.language.signature import Argument, Parameter, variants_of
+from karamelo_py.language.signature import Argument, In, Parameter, variants_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
 from karamelo_py.schemes.quasi_static import PUBLISHED
-from karamelo_py.script.errors import ScriptError, meant
+from karamelo_py.script.errors import ScriptError, meant, unknown
 from karamelo_py.styles.methods.base import CORRECTED
 
 
@@ -58,8 +59,9 @@ def method(
     -----
     This command must precede the first solid.
 
-    ``method(auto)``, without further arguments, reads the script up to its first run and chooses
-    method, transfer, basis, scheme, mass and F-bar for the scene (docs/choose.md).
+    ``method(auto)`` reads the script up to its first run and chooses method, transfer, basis,
+    scheme, mass and F-bar for the scene (docs/choose.md). ``method(auto, accuracy=0.01)`` also
+    states the largest error for ``karamelo-py advise``, which compares this choice with others.
 
     ``thermo-mechanical``: before each momentum update, heat is conducted between points of
     materials with a temperature (``linear``, ``neo-hookean`` and ``hencky`` with cp and kappa,
@@ -106,13 +108,24 @@ def _refuse_after_solids(hub: Hub) -> None:
         raise ScriptError(message, expected=expected, hint=hint, code="too-late")
 
 
-def auto(hub: Hub, kind: Literal["auto"]) -> None:
+def auto(
+    hub: Hub,
+    kind: Literal["auto"],
+    *,
+    accuracy: Annotated[float, In(0, 1, open=True)] | None = None,
+) -> None:
     """Choose the method for the scene that the rest of the script describes.
 
     The script is read up to its first run; materials, bodies, speeds, contact and duration select a
     row of the table in docs/choose.md. The banner and ``check`` show the chosen lines, such as
     ``method(...)``. Commands ``scheme``, ``anti_volumetric_locking`` and ``dt_factor`` in the
     script take precedence.
+
+    Parameters
+    ----------
+    accuracy
+        The largest error, a fraction, for ``karamelo-py advise``, which compares this choice with
+        other set-ups (docs/studies/advise.md). A single run does not check it.
     """
     _refuse_after_solids(hub)
     interpreter = hub.interpreter
@@ -120,7 +133,10 @@ def auto(hub: Hub, kind: Literal["auto"]) -> None:
         message = "method(auto) reads the script ahead, but no lines follow"
         hint = "in Python: Simulation.script(...) with the whole scene, or a method by name"
         raise ScriptError(message, expected="the whole scene and a run after it", hint=hint)
-    chosen = choosing.choose(hub)
+    name = interpreter.presets.get("auto", BY_RULES)
+    if name not in (names := (BY_RULES, *ALTERNATIVES)):
+        raise unknown(f"-var auto: unknown set-up '{name}'", name, names)
+    chosen = choosing.choose(hub, name, accuracy)
     update, own_scheme = hub.update, hub.update.scheme_mark
     interpreter.perform(chosen.lines)
     update.chosen, update.scheme_mark = chosen, own_scheme

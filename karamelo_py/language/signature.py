@@ -107,7 +107,9 @@ def call(
     `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a mark.
     """
     if arguments and target in FORMS:
-        target = FORMS[target].get(arguments[0].word(), target)
+        # The word of a form takes precedence over a variable.
+        words = arguments[0].text, arguments[0].word()
+        target = next((FORMS[target][word] for word in words if word in FORMS[target]), target)
     try:
         expected = parameters(target)
     except TypeError as error:

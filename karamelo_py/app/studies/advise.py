@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import inf, prod
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +15,13 @@ from karamelo_py.app.options import above_zero, positive
 from karamelo_py.app.studies import look, records, variables
 from karamelo_py.app.studies.case import (
     PROGRAM,
+    CaseOutcome,
+    Record,
+    Refused,
     Row,
     command_of,
     environment,
+    error_of,
     options_of,
     record_of,
     worded,
@@ -35,7 +40,7 @@ from karamelo_py.app.studies.curves import (
 )
 from karamelo_py.app.studies.study import Study, open_study, plain_table, shown, terminal
 from karamelo_py.kernels.clock import STILL
-from karamelo_py.output.files import read_json
+from karamelo_py.output.record import NAME
 from karamelo_py.script.errors import ScriptError, plural
 from karamelo_py.script.terms import number_of
 
@@ -51,7 +56,8 @@ all numbers have one value, words are compared at that size. Cases run one at a 
 their times, unless another cost is named. Runs of an earlier call are used. A run that meets the
 target by chance is not advised: if the sign of its error changes, its order exceeds the order of
 the basis, or a finer run is worse; finer runs are made to check. With -run the variant is run and
-checked against the target."""
+checked against the target. With method(auto, accuracy=0.01) the script states the target, and the
+choice of the program is compared with other set-ups (-var auto=rules,linear: only with linear)."""
 
 
 # Bases whose gradients jump between cells, and methods whose points cross them.
@@ -128,6 +134,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
+    lines: tuple[str, ...] = ()  # of the script, by method(auto)
     warnings: tuple[str, ...] = ()  # warnings of the finest run
 
     @property
@@ -145,7 +152,9 @@ class ChoiceRuns:
     def look(self, folder: Path) -> None:
         source = folder / self.rows[-1]["folder"]
         record = record_of(source)
-        self.words = frozenset(record["runs"][0]["method"].split() if record.get("runs") else ())
+        first = next(iter(record.get("runs", ())), {})
+        self.words = frozenset(first.get("method", "").split())
+        self.lines = tuple(first.get("chosen", {}).get("lines", ()))
         notes = record.get("messages", [])
         self.warnings = tuple(note["text"] for note in notes if note["kind"] == "warning")
 
@@ -322,7 +331,10 @@ def add_options(parser: ArgumentParser) -> None:
         "-accuracy", required=True, metavar="COLUMN",
         help="log column: err, max:err, or a formula: off=abs(max:u/3.28 - 1)",
     )  # fmt: skip
-    parser.add_argument("-target", required=True, type=above_zero, help="largest error allowed")
+    parser.add_argument(
+        "-target", type=above_zero,
+        help="largest error allowed (default: accuracy in method(auto, accuracy=0.01))",
+    )  # fmt: skip
     parser.add_argument("-cost", default="seconds", help="column of the cost (seconds)")
     parser.add_argument("-along", metavar="NAME", help="variable that refines the scene")
     parser.add_argument("-pilot", type=positive, default=3, help="first runs of each choice (3)")
@@ -340,6 +352,15 @@ def run(options: Namespace) -> int:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
         raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
+    target, chosen = options.target, {}
+    if ["auto"] in (words[:1] for words in plan.script.words("method")):
+        chosen = chosen_in(options.script, {name: texts[0] for name, texts in values.items()})
+        target = target or chosen.get("accuracy")
+        if "alternatives" in chosen:
+            values.setdefault("auto", chosen["alternatives"])
+    if target is None:
+        expected = "-target 1e-2, or method(auto, accuracy=0.01) in the script"
+        raise ScriptError("there is no largest error", expected=expected)
     numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
     name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
     compared = name in numeric and len(values[name]) == 1 < prod(map(len, values.values()))
@@ -362,7 +383,7 @@ def run(options: Namespace) -> int:
     ordered = values[name]
     if len(ordered) > 1:
         ordered = coarse_first(options.script, name, ordered, choices[0].values)
-    goal = {"accuracy": items[0].word, "cost": options.cost, "target": options.target}
+    goal = {"accuracy": items[0].word, "cost": options.cost, "target": target}
     adviser = Adviser(study, (name, ordered), choices, width=study.place.size, **goal)
     adviser.pilot(options.pilot)
     best = adviser.best()
@@ -374,6 +395,22 @@ def run(options: Namespace) -> int:
     return carry_out(adviser, best, options.script) if options.run else 0
 
 
+def check(script: Path, case: Mapping[str, str], folder: str) -> Record:
+    command = [*PROGRAM, "check", str(script), "--threads", "1"]
+    command += ["-record", str(Path(folder) / NAME), *options_of(case)]
+    subprocess.run(command, capture_output=True, env=environment())
+    return record_of(Path(folder))
+
+
+def chosen_in(script: Path, case: Mapping[str, str]) -> dict[str, Any]:
+    """Return what ``method(auto)`` chooses in a case, and what else it supports."""
+    with TemporaryDirectory() as folder:
+        record = check(script, case, folder)
+        if error := error_of(record):
+            raise Refused(case, CaseOutcome("refused", error["text"], folder=Path(folder)))
+    return next((one["chosen"] for one in record.get("runs", ()) if "chosen" in one), {})
+
+
 def coarse_first(
     script: Path, name: str, values: list[str], others: Mapping[str, str]
 ) -> list[str]:
@@ -381,13 +418,7 @@ def coarse_first(
     work = []
     for value in (ordered[0], ordered[-1]):
         with TemporaryDirectory() as folder:
-            file = Path(folder) / "check.json"
-            command = [*PROGRAM, "check", str(script), "--threads", "1", "-record", str(file)]
-            subprocess.run(
-                [*command, *options_of({name: value, **others})],
-                capture_output=True, env=environment(),
-            )  # fmt: skip
-            runs = read_json(file).get("runs")
+            runs = check(script, {name: value, **others}, folder).get("runs")
         work.append(runs[0]["points"] / runs[0]["dt"] if runs else None)
     if None not in work and work[0] > work[1]:
         ordered.reverse()
@@ -417,7 +448,11 @@ def advise(adviser: Adviser, best: Candidate, script: Path) -> None:
     values = {**best.choice.values, adviser.name: adviser.values[best.step]}
     print(f"\nfor {adviser.accuracy} <= {adviser.target:g} at the least {adviser.cost}:")
     for name, value in values.items():
-        print(f"  {name} = {value}" if number_of(value) is not None else f'  {name} = "{value}"')
+        if name != "auto":
+            text = value if number_of(value) is not None else f'"{value}"'
+            print(f"  {name} = {text}")
+    for line in best.choice.lines:
+        print(f"  {line}")
     print(f"or: {command_of(script, values)}")
     print(sureness(adviser, best))
     lucky = adviser.lucky()
