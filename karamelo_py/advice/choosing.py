@@ -225,16 +225,16 @@ def choose(hub: Hub, name: str, accuracy: float | None) -> Chosen:
         return Chosen(PLAIN, PLAIN.lines, accuracy)
     if name != BY_RULES:
         lines = _written(ALTERNATIVES[name], facts)
-        named = PLAIN._replace(scene=f"-var auto {name}")
-        return Chosen(named, lines, accuracy)
+        return Chosen(PLAIN._replace(scene=f"-var auto {name}"), lines, accuracy)
     rows = ((choice, _written(choice.lines, facts)) for choice in CHOICES if choice.when(facts))
     fit = (Chosen(choice, lines, accuracy) for choice, lines in rows if _runs(hub, lines))
     chosen = next(fit, Chosen(PLAIN, PLAIN.lines, accuracy))
     if accuracy is None or not hub.checking:
         return chosen
-    others = {name: _written(lines, facts) for name, lines in ALTERNATIVES.items()}
-    fit = (n for n, lines in others.items() if lines != tuple(chosen.lines) and _runs(hub, lines))
-    return chosen._replace(alternatives=(BY_RULES, *fit))
+    named = {other: _written(lines, facts) for other, lines in ALTERNATIVES.items()}
+    others = {other: lines for other, lines in named.items() if lines != tuple(chosen.lines)}
+    supported = (other for other, lines in others.items() if _runs(hub, lines))
+    return chosen._replace(alternatives=(BY_RULES, *supported))
 
 
 def _runs(hub: Hub, lines: Sequence[str]) -> bool:

@@ -152,7 +152,7 @@ class ChoiceRuns:
     def look(self, folder: Path) -> None:
         source = folder / self.rows[-1]["folder"]
         record = record_of(source)
-        first = next(iter(record.get("runs", ())), {})
+        first: dict[str, Any] = next(iter(record.get("runs", ())), {})
         self.words = frozenset(first.get("method", "").split())
         self.lines = tuple(first.get("chosen", {}).get("lines", ()))
         notes = record.get("messages", [])
