@@ -243,7 +243,7 @@ def test_check_says_whether_water_flows_in_time(run_interpreted, Tv, word):
     script = INPUTS / "in.terzaghi"
     out = run_interpreted(script, "-var", "Tv", Tv, "-var", "N", "4", command="check").out
     assert f"Tv = {float(Tv):.2g} across the shortest side of 'clay', {word}:" in out
-    assert "flux of the water; water that comes and goes" in out
+    assert "flux of the water; inflow and outflow of water" in out
 
 
 def test_a_modified_skeleton_keeps_its_water(run_interpreted):

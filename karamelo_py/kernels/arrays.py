@@ -23,7 +23,7 @@ from karamelo_py.points.kinematics import vector
 
 # A NamedTuple, often empty, whose class selects implementations.
 Tag: TypeAlias = Any
-# Double or single precision, lanes of these, or a number with derivatives.
+# A number in double or single precision, lanes of such numbers, or a number with derivatives.
 Number: TypeAlias = Any
 # An index, or several indices in lanes.
 Index: TypeAlias = Any
@@ -36,7 +36,8 @@ class Nodes(NamedTuple):
     fields: tuple  # (N, components) each
 
 
-# First components of node records. A 3D vector has four numbers, which fill a register.
+# Column of the first component in node records. A 3D vector is padded to four numbers, which fill a
+# register.
 MASS = 0
 
 
@@ -77,7 +78,7 @@ class Points(NamedTuple):
 
 
 def known_to_laws(points):
-    """Omit optional fields, so that kernels of laws are the same for all methods."""
+    """Return points without optional fields, so that all methods use the same kernels of laws."""
     return Points(
         points.x, None, points.v, points.mass, points.state, points.material, points.grid,
         points.id, (),
@@ -108,8 +109,8 @@ class Tiling(NamedTuple):
     grid: np.ndarray  # (T + 1,) int64: grid of the k-th occupied tile
     number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile
     box: np.ndarray  # (T + 1, 2 d) int64: first and last nodes in reach of its points
-    # (T + 1, r, 2) int16: first and last node of each row of the box (3D: row i ny + j), from the
-    # row's first; last < first if empty; r = 0 if boxes are not refined
+    # (T + 1, r, 2) int16: first and last node in each row of the box (in 3D, row i ny + j), counted
+    # from the start of the row; last < first if the row is empty; r = 0 if boxes are not refined
     rows: np.ndarray
     # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x and step_y of its
     # nodes there
@@ -130,7 +131,7 @@ class Buffers(NamedTuple):
     parts of a tile are ranges of nodes that overlap a box; an additional first part clears nodes
     outside the first box. Columns of a part: first node in the grid and in the box; lengths;
     strides in the grid and in the box along the first two directions; the action. With few points,
-    the nodes are the only buffer.
+    the node arrays themselves are the only buffer.
     """
 
     nodes: Nodes
@@ -179,7 +180,7 @@ def some_of(block: Block, rows: np.ndarray) -> Block:
 
 
 def joined_points(points: Points, parts: Sequence[Sequence[np.ndarray]]) -> Points:
-    """Return points like `points`, from `parts` with all their arrays, one after another."""
+    """Return `points` with all arrays replaced by the concatenated arrays of `parts`."""
     count = sum(arrays[0].shape[-1] for arrays in parts)
     made = [rows_of_points((*a.shape[:-1], count), a.dtype.type) for _, a in arrays_of(points)]
     for array, same in zip(made, zip(*parts, strict=True), strict=True):
@@ -194,7 +195,7 @@ class NoHooks(NamedTuple):
 HOOK = np.dtype([
     ("address", np.int64),
     ("stage", np.int64),
-    ("begin", np.int64),  # range of members; a begin of -1: all
+    ("begin", np.int64),  # range of members; begin is -1 for all
     ("end", np.int64),
     ("slot", np.int64),  # slot of the published total; -1: none
     ("uses_before", np.int64),  # also needs values of the formulas one step earlier
@@ -204,7 +205,7 @@ HOOK = np.dtype([
     ("totals", np.int64),  # numbers published by a hook on whole points
 ])  # fmt: skip
 PROGRAM = np.dtype([
-    ("begin", np.int64),  # range of code; a begin of -1: NULL
+    ("begin", np.int64),  # range of code; begin is -1 for NULL
     ("end", np.int64),
     ("first", np.int64),  # range of constants
     ("last", np.int64),
@@ -214,7 +215,7 @@ HELD = np.dtype([("slot", np.int64), ("force", np.float64)])  # slot: 1 + slot o
 
 
 class Apart(NamedTuple):
-    """Private arrays of A threads for hooks."""
+    """Private arrays for the hooks of A threads."""
 
     chosen: np.ndarray  # (A, BLOCK)
     scratch: np.ndarray  # (A, 9 + depth, BLOCK)
@@ -277,7 +278,7 @@ STEP = np.dtype([
     ("last_dt", np.float64),  # 0 at the start and after load steps
     ("kick", np.float64),  # time for which forces act, from mid-step to mid-step
     ("first_kick", np.float64),  # kick of the first step, in steps
-    ("contact_dt", np.float64),  # sets the contact stiffness
+    ("contact_dt", np.float64),  # dt that sets the contact stiffness
     ("contact_kick", np.float64),  # kick for steps of this length
     ("last_contact_dt", np.float64),
     ("spacing", np.float64),  # smallest cell size
@@ -350,7 +351,7 @@ HEAT = np.dtype([
     ("heat_limit", np.float64),  # stable step, or infinite
     ("heat_reference", np.float64),  # stable step in undeformed bodies
     ("watch_heat", np.int64),  # 1: all heat sources are known
-    ("coldest", np.float64),  # bounds of temperatures by initial state, fixes and sources
+    ("coldest", np.float64),  # bounds on temperatures from the initial state, fixes and sources
     ("hottest", np.float64),
     ("T_low", np.float64),  # extremes at the last check
     ("T_high", np.float64),
@@ -407,13 +408,13 @@ class Setup(NamedTuple):
     nodes: Nodes
     buffers: Buffers
     blocks: tuple[Block, ...]  # one per law
-    spans: np.ndarray  # (1 + rows, 2) int64: their number, then ranges of nodes in use
+    spans: np.ndarray  # (1 + rows, 2) int64: number of ranges, then ranges of nodes in use
     ranges: np.ndarray  # (S + rows, 2) int64: range of each part's rows, then ranges of nodes
     control: Control
 
 
 def with_items(of, /, **items):
-    """Return a NamedTuple, or a `hold` tuple, with `items` replaced."""
+    """Return a copy of a NamedTuple or `hold` tuple, with `items` replaced."""
     pairs = zip(of._fields, of, strict=True)
     return type(of)(*[items.get(name, item) for name, item in pairs])
 

@@ -18,7 +18,7 @@ _call = caller_of(CALL)
 
 class CalledHooks(NamedTuple):
     compiled: NamedTuple
-    address: int  # address of ``(stage) -> 1``, which returns 0 on failure
+    address: int  # address of a function ``(stage)`` that returns 1, or 0 on failure
 
 
 @kernel

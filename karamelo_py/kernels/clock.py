@@ -14,12 +14,12 @@ from karamelo_py.points.kinematics import vector
 
 
 def step_size(s: Setup) -> Number:
-    """Return dt, the time that points move, in the precision of the run."""
+    """Return dt, the time for which points move, in the precision of the run."""
     return real(s.control.values[DT], s.nodes.sums[0, MASS])
 
 
 def last_step_size(s: Setup) -> Number:
-    """Return dt of the previous step; before the first step tiny, not 0, as laws divide by it."""
+    """Return the previous dt. Before the first step it is tiny, but not 0, as laws divide by it."""
     last = s.control.step[0].last_dt
     least = NEXT_TO_NOTHING * s.control.values[DT]
     return real(last if last > 0 else least, s.nodes.sums[0, MASS])
@@ -52,7 +52,7 @@ STRIDE = 0.65
 
 @kernel
 def choose_dt(control: Control) -> None:
-    """Choose the next dt, by the fastest point or fixed, and shorter at the end of a run.
+    """Choose the next dt: from the fastest point, or fixed; shorter at the end of a run.
 
     The last two steps are equal. A very short last step would have huge forces, since impulses of
     prescribed or mapped velocities do not vanish with dt. Contact with a stiffness of m/dt^2 uses

@@ -60,9 +60,9 @@ class SeparateFields(NamedTuple):
     """Contact at nodes where several of F fields have mass; S solids."""
 
     node_fields = (Normal, Centre)
-    looks_beyond = 1  # cells beyond the nodes of points in which sums are used
+    looks_beyond = 1  # cells beyond the points' nodes where sums are used
 
-    stride: int  # difference in number of nodes at the same position in consecutive fields
+    stride: int  # difference of node numbers between consecutive fields, at one position
     beside: np.ndarray  # (d, 2) stride, and number of nodes, along each axis
     per_mass: np.ndarray  # (F,) specific volume / h^(d - 1)
     friction: np.ndarray  # (F, F) coefficient; infinite: no slip
@@ -78,9 +78,9 @@ class SeparateFields(NamedTuple):
     free: np.ndarray  # (F,) bool: rigid and moved by fix rigid_body
     torque: np.ndarray  # (F,) slot of the torque
     torques: np.ndarray  # (values,) slot of the torque of the force in each slot, or 0
-    memory: np.ndarray  # (F,) steps that a contact is remembered
+    memory: np.ndarray  # (F,) steps for which a contact is remembered
     fluid: np.ndarray  # (F,) bool
-    surface: np.ndarray  # (F, k) distance to the surface against mean position, in cells
+    surface: np.ndarray  # (F, k) distance to the surface by mean position, in cells
     meeting: np.ndarray  # (F,) int64 scratch: fields that meet
     partners: np.ndarray  # (F,) int64 scratch: contacts of each field
     change: np.ndarray  # (F, k) scratch: velocity changes
@@ -111,7 +111,7 @@ def take_around(kin, bodies, control, sides, impulse):
 
 @point_function(otherwise=True)
 def stay_around(kin, bodies, pair, sides, share):
-    """Make a pair stick in the angular velocities that strain points."""
+    """Make a sticking pair's angular velocities, as used to strain points, equal."""
 
 
 @point_function(otherwise=True)
@@ -154,7 +154,7 @@ class NodePair(NamedTuple):
     yielding: tuple  # (d,) change of relative velocity per impulse
     relative: tuple  # velocity of the first relative to the second
     wall: bool  # exactly one body has a prescribed velocity
-    hollow: bool  # a wall, of which the other body fills a corner
+    hollow: bool  # a wall with a corner that the other body fills
 
 
 @noinline
@@ -277,8 +277,8 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The remainder is along a face or an edge, or 0. Both are perpendicular, so one impulse is
-    enough.
+    The remainder is along a face or an edge, or 0. The two parts are perpendicular, so one impulse
+    is enough.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -416,7 +416,10 @@ def closing_part(contact, a, b):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return the approach velocity beyond what closes the gap in this step; 0 without contact."""
+    """Return by how much a pair approaches faster than it takes to close the gap in this step.
+
+    The result is 0 without contact.
+    """
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -456,7 +459,7 @@ def _friction_of(yielding, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """List fields at a position in `meeting`; return their number, 0 if `n` is not the first."""
+    """List the fields that meet at node `n`; return their number, 0 if `n` is not in the first."""
     if not nodes.sums[n, MASS] > 0:
         return 0
     a = n // contact.stride
@@ -527,7 +530,7 @@ def _before(kin, nodes, n, per_mass):
 
 @noinline
 def _work_on(bodies, n, k, impulse, per_mass):
-    """Return the work of a rigid body's impulse, with the mean velocity of the node in the step."""
+    """Return the work of a rigid body's impulse at the node's mean velocity in the step."""
     _, kin, nodes = bodies
     if _immovable(bodies.contact, n, k):
         return 0.0

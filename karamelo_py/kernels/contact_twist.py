@@ -1,6 +1,6 @@
 """Friction of contact around an axis.
 
-Friction of two nodes acts at their common radius of gyration, so that torques are opposite.
+Friction between two nodes acts at their common radius of gyration, so the torques are opposite.
 """
 
 from math import sqrt

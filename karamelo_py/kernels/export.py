@@ -71,7 +71,7 @@ impose_lighting = imposing(law_functions.lit)  # values: time since lighting
 
 @kernel
 def export_to_nodes(at, values, unit, out):
-    """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) have at most 2^36 units.
+    """Add sum N value of the points to ``out`` (nodes, 2); ``values`` (n,) are at most 2^36 units.
 
     The first column is a multiple of `unit`, the second the remainder as a multiple of a unit 2^36
     times smaller. Both sums are exact in any order for up to 2^17 points per node.

@@ -1,4 +1,4 @@
-"""Contact of freely moving rigid bodies, and their rows of a step."""
+"""Contact of freely moving rigid bodies, and the rows that they add to a step."""
 
 from typing import NamedTuple
 
@@ -37,7 +37,7 @@ class TouchingSurface(NamedTuple):
     slot: int  # slot of the force on points
     torque: int  # slot of the torque, or 0
     area: int  # slot of the area of contact
-    lost: int  # address of a function for points without a way out
+    lost: int  # address of the function for points without a way out
 
 
 # --- contact at points ------------------------------------------------------------------------
@@ -83,12 +83,12 @@ def _touched_faces(shape, kin, x, about):
     _, _, _, step, away = about
     if not 0.01 * step < away:
         return _touched(shape, kin, x, about)
-    sign = 1.0 if encloses(kin, shape, x) else -1.0  # differences would take six searches
+    sign = 1.0 if encloses(kin, shape, x) else -1.0  # finite differences would take six searches
     return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
 
 
 def _is_near(body, kin, x, p, square):
-    """Return whether point `p` is within a distance, given its square, of the centre."""
+    """Return True if point `p` is within a distance, given its square, of the body's centre."""
     away = 0.0
     for c in range(kin.dimension):
         away += (x[c, p] - body.state[0].x[c]) ** 2
@@ -97,13 +97,14 @@ def _is_near(body, kin, x, p, square):
 
 @noinline
 def _list_point(body, surface, s, block, p):
-    """Put a contact of point `p` with a surface into the next record; return whether it touches."""
+    """Record a contact of point `p` with a surface; return True if it touches."""
     kin, points, d = s.kin, block.points, s.kin.dimension
     state, constants = body.state[0], body.constants[0]
     times, dt = s.control.step[0], s.control.values[arrays.DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
     x = load_vector(kin, points.x[s.control.motion[0].now], p)
-    # Reject points that cannot reach the surface in this step; a search in a short reach is cheap.
+    # Reject points that cannot reach the surface in this step; a search within a short distance is
+    # cheap.
     speed = 0.0
     for c in range(d):
         speed += abs(points.v[c, p])
@@ -372,7 +373,7 @@ class NoBodies(NamedTuple):
 
 
 class FreeBodies(NamedTuple):
-    """Bodies, with rows before and after contact and the mapping of the velocity that strains."""
+    """Free rigid bodies, and the rows that they add to a step."""
 
     bodies: tuple[motion.FreeBody, ...]
     held: np.ndarray  # (N, d) 1 + slot of the reaction where v is prescribed, else 0

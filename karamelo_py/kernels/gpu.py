@@ -35,7 +35,7 @@ MOVED, RATE, WRONG, STATUS, DRIFT = range(5)  # in `fate`; STATUS: 0, or 1 + a s
 BEHIND = 2.0**53  # above all point ids
 CHUNK = 64  # items summed per thread
 WARP = 32  # threads that read memory together
-REGISTERS = {4: 200, 8: 130}  # words that a thread of a cell may sum, by size of a number
+REGISTERS = {4: 200, 8: 130}  # numbers that a cell's thread may sum, by bytes of a number
 OCCUPIED = 1 << 40  # added to `CellLists.sums` per occupied cell
 
 
@@ -326,9 +326,9 @@ def sum_counts(i, fate, cells):
 
 
 def sum_sums(i, fate, cells, level):
-    """Sum a chunk of sums of a level;
+    """Sum the `i`-th chunk of a level into the next level (prefix sums by chunks).
 
-    `level`: begin and count of the sums, begin of the next level.
+    `level`: index of its first sum, number of sums, index of the first sum of the next level.
     """
     begin, count, above = level
     total = 0
@@ -338,7 +338,7 @@ def sum_sums(i, fate, cells, level):
 
 
 def sum_before(i, fate, cells, begin, above):
-    """Sum the items before an item of a level; `above` is the begin of the next level, or -1."""
+    """Sum the items before item `i` of a level; `above` is the start of the next level, or -1."""
     chunk = i // CHUNK
     total = cells.before[above + chunk] if above >= 0 else 0
     for k in range(chunk * CHUNK, i):

@@ -94,7 +94,10 @@ def work_of_loads(i, fate, s, about, target):
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Return the function of a member of a hook on nodes, ACT or RUB, acting for `length`."""
+    """Return the thread function that applies a hook to one node.
+
+    `task` is ACT or RUB; `length` returns the time for which the hook acts.
+    """
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):
@@ -217,7 +220,7 @@ def collect_total(i, fate, copies, sums, first):
 
 
 def publish(i, fate, s, hooks, which):
-    """Publish totals of hooks `which` = (begin, end, always), else only at the end of a run."""
+    """Publish totals of hooks `which` = (first, end, always), or only at the end of a run."""
     begin, end, always = which
     if always or is_last(s):
         for h in range(begin, end):

@@ -1,7 +1,7 @@
 """Heat flow through the nodes, and the fixes that act on it.
 
 Capacity and temperature are treated like mass and velocity: nodes for heat are `Nodes` with one
-component and have the same loops (:mod:`karamelo_py.kernels.equations.heat`).
+component and use the same loops (:mod:`karamelo_py.kernels.equations.heat`).
 """
 
 from typing import NamedTuple

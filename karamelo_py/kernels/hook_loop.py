@@ -241,7 +241,7 @@ def _published(hooks, h):
 
 
 def _torque_of(hooks, slot):
-    """Return the first row of the torque of the force in rows from `slot` on, or 0."""
+    """Return the first row of the torque that belongs to the force in rows from `slot` on, or 0."""
     return hooks.torques[slot] if slot >= 0 else NONE
 
 
@@ -255,7 +255,7 @@ def _add_torque(call, q, c, slot, force):
 
 
 def _add_numbers(call, q, kin, numbers):
-    """Add what a function of the `q`-th whole member publishes, with the torque of a force."""
+    """Add the values that the `q`-th member's function publishes, and the torque of its force."""
     slot = call.hooks.table[call.h].slot
     if slot >= 0:
         for c in range(len(numbers)):
@@ -728,7 +728,7 @@ def _act_on_warmth(members, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time at present and at the end of the step, and contact times."""
+    """Return formulas of time now and at the end of the step; dt and kick of contacts; the kick."""
     values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):
@@ -797,7 +797,11 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 
 
 def point_hooks(stage, then, hooks, s, arguments_of):
-    """Call the point functions of `stage` in each block; `arguments_of` is (what_of, heat_of)."""
+    """Call the point functions of `stage` in each block.
+
+    `arguments_of` is a pair of functions: arguments of a block's point functions, and its heat
+    arrays.
+    """
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)
     of_points = [tag for tag in hooks.whole if not tag.of_nodes]

@@ -16,7 +16,7 @@ class OneByOne(NamedTuple):
 
 
 def lanes_with(parts: tuple, laws: NamedTuple, mass: np.ndarray) -> Tag:
-    """Choose lanes for a loop over points: none if it is interpreted, or a part supports none."""
+    """Choose lanes for a loop over points: none if interpreted, or if a part excludes them."""
     return OneByOne()
 
 
@@ -36,7 +36,7 @@ def points_from(lanes: Tag, q: int, end: int) -> Index:
 
 
 def one_loop_each(lanes: Tag, visit: Any) -> bool:
-    """Return True if three loops over a stretch (gather, update, scatter) replace one.
+    """Return True if gather, update and scatter get separate loops over a stretch of points.
 
     Separate loops are faster for passes in lanes that only strain, as a law may fill the
     instruction cache. If points move, the update is short, and computing stencils twice costs more.
@@ -46,7 +46,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Return twice the lanes, as operations of an update depend on each other."""
+    """Return twice as many lanes, as operations of an update wait for each other."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

@@ -48,7 +48,7 @@ class Push(NamedTuple):
     law: Tag  # `points.bodies`
     kin: Tag
     reach: float  # largest distance between touching points along an axis
-    step: float  # time since the last positions
+    step: float  # time since the previous positions
     dt: float  # sets the stiffness, with `kick`
     kick: float
 

@@ -111,7 +111,7 @@ def _record(builder: ir.IRBuilder, kind: Any, pointer: ir.Value, components: int
 
 
 def _chunks(count: int) -> list[tuple[int, int]]:
-    """Split components into (first, number), with a number of 4 (also for 3), 2 or 1."""
+    """Split components into (first, length), with lengths of 4 (also for the last 3), 2 or 1."""
     out, first = [], 0
     while first < count:
         left = count - first

@@ -44,7 +44,7 @@ SOFT = 1e-5
 GIVEN_BACK = 0.1  # fraction of a penetration that is removed per step
 SOLVED, GOOD_ENOUGH = 1e-18, 1e-14  # residual / momentum, both as sums of p^2 / m
 SEARCHES, NEAR_MINIMUM = 40, 0.1  # line search: evaluations, final slope / initial slope
-SLOW = 1e-9  # collisions slower than this fraction of the fastest one are ignored
+SLOW = 1e-9  # collisions slower than this fraction of the fastest are ignored
 COLLISIONS = 50  # largest number per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
@@ -71,7 +71,7 @@ JOINT = np.dtype([
 
 
 class LinkedPart(NamedTuple):
-    """A body, or a fixed region, in contact with others."""
+    """A body, or a fixed region, that can touch other bodies."""
 
     body: int  # index of the body; the last body is fixed
     shape: arrays.Tag
@@ -105,7 +105,7 @@ class Links(NamedTuple):
     free: np.ndarray  # (B + 1, 6) int64: index of the unknown, or -1
     u: np.ndarray  # (B + 1, 6) velocities
     old: np.ndarray  # velocities before the step
-    jump: np.ndarray  # velocity change by collisions
+    jump: np.ndarray  # velocity change due to collisions
     trial: np.ndarray
     rest: np.ndarray
     trial_rest: np.ndarray
@@ -227,7 +227,7 @@ def _set_weight(links, link):
 
 @noinline
 def _along(links, a, b):
-    """Return a . W b."""
+    """Return a . W b for vectors (3,)."""
     total = 0.0
     for k in range(3):
         for j in range(3):
@@ -544,7 +544,7 @@ def _try(links, bodies, fraction, bounded):
 
 @noinline
 def _fall(links, rest):
-    """Return the residual times the Newton step."""
+    """Return the residual times the Newton step, the slope along the step."""
     m, total = links.slope.shape[0], 0.0
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -555,7 +555,7 @@ def _fall(links, rest):
 
 @noinline
 def _descend(links, bodies):
-    """Go to the minimum along the Newton step; return the squared residual, 0 without descent.
+    """Minimise along the Newton step; return the squared residual, 0 if the step does not descend.
 
     With bounded friction the residual is the gradient of a convex function.
     """
@@ -578,7 +578,7 @@ def _descend(links, bodies):
 
 @noinline
 def _iterate(links, bodies, bounded):
-    """Take Newton steps, halved if needed; return whether they have converged."""
+    """Take Newton steps, halved if needed; return True if they have converged."""
     energy = 0.0
     size = _residual(links, bodies, links.u, links.rest, bounded)
     for body in bodies:
@@ -743,7 +743,7 @@ def _collide(links, bodies, dt):
 
 @noinline
 def find(links, bodies, control, kin):
-    """List the links of this step; return whether there are any."""
+    """List the links of this step; return True if there are any."""
     dt, values = control.values[arrays.DT], control.values
     links.count[0], links.dt[0] = 0, dt
     for i in range(links.published.shape[0]):

@@ -1,8 +1,8 @@
 """Motion of free rigid bodies, and the impulses of their contacts.
 
-A contact has a position x, the mass m and velocity v* of the other body, a normal n out of the
-rigid body, and a gap g. With the rigid body's velocity U = (V, w) at the end of the step, its
-velocity at x is A U = V + w x (x - X), and the impulse has a closed form::
+A contact has a position x, the mass m and velocity v* of the other body, a normal n that points out
+of the rigid body, and a gap g. With the rigid body's velocity U = (V, w) at the end of the step,
+its velocity at x is A U = V + w x (x - X), and the impulse has a closed form::
 
     p_n = s m max(n . (A U - v*) - g / dt, 0)
     p_t = m (A U - v*)_t, but at most mu p_n
@@ -190,7 +190,7 @@ def _set_spin(body):
 
 @noinline
 def _turn_by_spin(body, dt):
-    """Rotate by the spin in the step, if the rotation is partly prescribed."""
+    """Rotate by the spin in the step; used if the rotation is partly prescribed."""
     state = body.state[0]
     w = state.spin
     size = sqrt(w[0] ** 2 + w[1] ** 2 + w[2] ** 2)
@@ -353,7 +353,7 @@ def solve_system(J):
 
 @noinline
 def _iterate(body, dt, bounded):
-    """Take Newton steps, halved if needed; return whether they have converged."""
+    """Take Newton steps, halved if needed; return True if they have converged."""
     work = body.solution
     M, J, energy = work.mass, work.slope, 0.0
     size = residual(body, dt, work.u, work.residual, bounded)
@@ -392,7 +392,7 @@ def _iterate(body, dt, bounded):
 
 @noinline
 def bounds_are_settled(contacts, count):
-    """Bound friction by the last normal impulses; return whether the bounds remain the same."""
+    """Bound friction by the last normal impulses; return True if the bounds have not changed."""
     change = largest = 0.0
     for i in range(count):
         c = contacts[i]
@@ -494,7 +494,7 @@ def finish_step(body, control, dimension):
 
 @noinline
 def move(body, dt, dimension, by_spin):
-    """Move a body by its velocities; rotate by its constant spin or, if free, momentum."""
+    """Move a body by its velocity; rotate it by its spin or, if free, by its angular momentum."""
     state, old = body.state[0], body.solution.slope
     old[:3, :3] = state.R
     if by_spin:

@@ -84,7 +84,7 @@ def find_tiles(at, tiles, ends, tile, k):
 
 @noinline
 def _begin_tiles(sorting):
-    """Find where the points of each part begin in each tile; divide tiles by number of points."""
+    """Find where each part's points begin in each tile; divide tiles by number of points."""
     ends, share, points = sorting.ends, sorting.share, sorting.order.size
     parts = ends.shape[0]
     position = shares = 0
@@ -102,7 +102,10 @@ def _begin_tiles(sorting):
 
 @shared_out
 def _order_parts(sorting, k):
-    """Place the k-th part of the points (counting sort), which moves `ends` from begin to end."""
+    """Place the k-th part of the points (counting sort).
+
+    This advances `ends` from the begin to the end of each tile.
+    """
     ends, tile, order = sorting.ends, sorting.tile, sorting.order
     parts = ends.shape[0]
     for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):
@@ -113,7 +116,7 @@ def _order_parts(sorting, k):
 
 @shared_out
 def _order_in_all_tiles(at, by, sorting, k):
-    """Sort the points of a tile by first node, then id; cells that fill groups come first."""
+    """Sort the points of a tile by first node, then id; cells that fill whole groups come first."""
     (_, kin, grids, of, x), sorting = at_hand(at), at_hand(sorting)
     tiles, around, ids = at_hand(by)
     boxes, bins, cell, order = sorting.boxes, sorting.bins, sorting.room, sorting.order

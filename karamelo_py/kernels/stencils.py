@@ -20,7 +20,7 @@ from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
 from karamelo_py.points.kinematics import from_columns
 
 # --- affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point
-# instead of per node, which is half of the work of a scatter in 2D, and 67 % in 3D.
+# instead of per node, which halves the work of a scatter in 2D, and saves 33 % in 3D.
 
 
 def _beside(a, b):
@@ -29,7 +29,7 @@ def _beside(a, b):
 
 
 def joined(lanes, kin, parts):
-    """Join momentum and force if both have increments and a register holds both."""
+    """Join momentum and force in one part, if both have increments and fit into a register."""
     if isinstance(lanes, OneByOne) or len(parts) != 2 or of_force(kin) != 4:
         return parts
     array, first, weighted, a, to_a = parts[0]

@@ -24,11 +24,11 @@ from karamelo_py.points.laws import wave_speed_squared
 
 
 class Fused(NamedTuple):
-    """As few passes over the points as possible, without hooks on points between."""
+    """As few passes over the points as possible, without hooks on points between them."""
 
 
 class Staged(NamedTuple):
-    """One pass per stage, with hooks on points between."""
+    """One pass per stage, with hooks on points between passes."""
 
 
 def rows_of(scheme: Any, visits: Any) -> list[Any]:
@@ -128,7 +128,10 @@ def _take_all(rows, s, step):
 
 
 def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
-    """Make a function that carries out the rows of a scheme; it returns False if a point failed."""
+    """Make a function that carries out the rows of a scheme.
+
+    It returns False if a point failed.
+    """
     cached: Any = functools.cache(rows_of_kind)  # for interpreted runs
 
     def take_all(kind, s, hooks, more):
@@ -143,7 +146,8 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# A step (with `more`, a fused one leaves the next sums), and the rows before the first step.
+# A step, and the rows before the first step. With `more`, a fused step leaves sums for the next
+# one.
 step, begin = _taking(rows_of), _taking(first_rows)
 
 
@@ -160,11 +164,11 @@ SMALLEST = 1e-6  # fraction of the first stable step below which a run stops
 
 
 def run_steps(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
-    """Take up to `count` steps, at most to the end time; return the reason for the end.
+    """Take up to `count` steps, not beyond the end time; return why they ended.
 
-    DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK (stable dt near
-    0), GAINED (spurious energy), HEATED (unexplained temperatures), SORT (a point may soon leave
-    the nodes of its tile).
+    The result is DONE, STOPPED (a point failed), ABOVE_LIMIT (dt above the stable limit), SHRUNK
+    (stable dt near 0), GAINED (spurious energy), HEATED (unexplained temperatures), SORT (a point
+    may soon leave the nodes of its tile).
     """
     values = s.control.values
     stepping, motion = s.control.step[0], s.control.motion[0]

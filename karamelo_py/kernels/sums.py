@@ -24,7 +24,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
-    """List columns of quantities in arrays that are present, with added-to columns last."""
+    """List columns of quantities in arrays that are present; those added to present values last."""
     turns = sorted(quantities, key=adds)
     sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
     return [
@@ -36,7 +36,7 @@ def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[An
 
 
 def arrays_given(quantities: tuple, kin: Tag) -> int:
-    """Return the arrays of the quantities as bits: 1 for sums, 2 for velocities, 4 for fields."""
+    """Return the arrays that quantities add to, as bits: 1 sums, 2 velocities, 4 fields."""
     names = {name for name, _, _ in columns_of(quantities, kin)}
     fields = any(not isinstance(name, str) for name in names)
     return ("sums" in names) + 2 * ("velocity" in names) + 4 * fields

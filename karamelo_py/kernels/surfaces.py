@@ -243,7 +243,7 @@ def _crossed(a, b, point):
 
 @point_function()
 def _crossing(kin, surface, i, x):
-    """Return 1 or -1, by side, if a ray from `x` along the last axis crosses face `i`; else 0."""
+    """Return 1 or -1 (by side) if a ray from `x` along the last axis crosses face `i`, else 0."""
 
 
 @_crossing.on(KINEMATICS[1])
@@ -331,7 +331,7 @@ def is_endless(shape: NamedTuple, axis: int) -> bool:
 
 @point_function()
 def depth(shape, kin, x, reach):
-    """Return the depth of `x` in a shape, negative outside; it is exact below `reach`."""
+    """Return the depth of `x` in a shape, negative outside; it is exact if below `reach`."""
 
 
 @point_function(otherwise=True)
@@ -427,7 +427,8 @@ def _of_positions(measure: Callable) -> Callable[[Surface, np.ndarray, float], n
     return measure_all
 
 
-# Functions of positions (n, d) and a reach that return, for each, the depth (negative outside), the
-# distance to the nearest face, and the largest component of the vector to it, all at most `reach`.
+# Functions of positions (n, d) and a reach. They return, for each position, the depth (negative
+# outside), the distance to the nearest face, and the largest component of the vector to it; all are
+# at most `reach`.
 depths, distances = _of_positions(_depth_in_surface), _of_positions(distance)
 offsets = _of_positions(_offset)

@@ -58,7 +58,7 @@ class Extent(NamedTuple):
     dt: Number
     gathers: bool
     scatters: bool
-    moves: bool  # new locations are stored in the other array
+    moves: bool  # new locations go to the other of two arrays
 
 
 class Context(NamedTuple):
@@ -105,7 +105,7 @@ def recompute_stencil(weights: Tag, w: Work, stencil: tuple, p: Index) -> tuple:
 
 
 def stays_in_box(weights: Tag, room: Number, moved: Number) -> bool:
-    """Return True while points remain in the box of their tile; otherwise they must be sorted."""
+    """Return True while points remain in the box of their tile; once False, sort them."""
     return isinstance(weights, OldWeights) or all_lanes(moved <= room)
 
 
@@ -132,7 +132,7 @@ class TileVisit(NamedTuple):
     s: Context
     lanes: Tag
     w: Work  # nodes to gather from
-    out: Work  # nodes to scatter to
+    out: Work  # Visit the points of tile `t` of a block; if a point fails, nothing is scattered.
     begin: int
     end: int
 
@@ -168,7 +168,7 @@ def _without_gather(tile, p, moved):
 
 
 def is_good(stride, moved, rate):
-    """Return False if a point failed, also for NaN."""
+    """Return False if a point failed or a number is NaN."""
     return (moved <= stride) & (rate < 1e300)
 
 
@@ -200,7 +200,7 @@ def _visit_at_once(tile):
 
 
 def _visit_in_stretches(tile):
-    """Gather, update and scatter stretches of points, in a loop each (`one_loop_each`)."""
+    """Gather, update and scatter stretches of points in three separate loops (`one_loop_each`)."""
     visit, s, lanes, w, out, begin, end = tile
     dt, wide = s.dt, lanes_of_update(lanes, visit)
     template = empty_all(visit.tasks, w, zero_vector(s.kin, dt))
@@ -285,7 +285,7 @@ def sweep_nodes(mode: Tag, task: Tag, s: Setup, dt: Number) -> None:
 
 @point_function(otherwise=True)
 def sweep_blocks(ranks: Tag, s: Setup, mode: Tag, visit: Visit, context: Context) -> None:
-    """Sweep over all blocks, and begin to send to other processes."""
+    """Sweep over all blocks, and begin sending to other processes."""
     for block in s.blocks:
         sweep_points(mode, visit, context, block)
 

@@ -1,9 +1,10 @@
 """Rows of schemes, and the fused and staged steps made of them.
 
-A scheme lists its stages once, in ``rows``. From these rows are made: the staged step, in which
-fixes act on points between stages; the fused step with the fewest passes over the points, whose
-first scatter joins the last pass of the previous step; the text of `karamelo-py check`; and the
-memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
+A scheme lists its stages once, in ``rows``. Four things are derived from them: the staged step, in
+which fixes act on points between stages; the fused step with the fewest passes over the points,
+whose first scatter joins the last pass of the previous step; the text of `karamelo-py check`; and
+the memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact
+(`plain`).
 """
 
 from collections import namedtuple
@@ -54,7 +55,7 @@ def take(row: Any, backend: Any) -> Any:
 
 
 class AtPoints(NamedTuple):
-    """Fixes act on points; `then` is 1 after new positions are known, before that 0."""
+    """Fixes act on points; `then` is 1 after new positions are known, else 0."""
 
     stage: int
     then: int
@@ -77,7 +78,7 @@ class Gather(NamedTuple):
 
 
 class Scatter(namedtuple("Scatter", "quantities weights")):
-    """Quantities to the grid: a tuple of them, or a single one."""
+    """Scatters quantities to the grid: a tuple of them, or a single one."""
 
     __slots__ = ()
 
@@ -87,7 +88,7 @@ class Scatter(namedtuple("Scatter", "quantities weights")):
 
 
 class NodeTask(NamedTuple):
-    """A task at every node in use."""
+    """Carries out a task at every node in use."""
 
     task: Any  # a tag, or the class of tags that `make` returns
     at: Any = None  # maps the setup to a setup with other nodes
@@ -96,14 +97,14 @@ class NodeTask(NamedTuple):
 
 
 class EachNode(NamedTuple):
-    """``function(s, n)`` at every node in use, called by ``loop(s)``."""
+    """Calls ``function(s, n)`` at every node in use, by ``loop(s)``."""
 
     function: Any
     loop: Any
 
 
 class EachPoint(NamedTuple):
-    """``function(s, block, p)`` at every point of one kind of law, called by ``loop(s, block)``."""
+    """Calls ``function(s, block, p)`` at every point of one kind of law, by ``loop(s, block)``."""
 
     function: Any
     law: type
@@ -111,7 +112,7 @@ class EachPoint(NamedTuple):
 
 
 class Once(NamedTuple):
-    """``function(s)`` between two loops."""
+    """Calls ``function(s)`` between two loops."""
 
     function: Any
 
@@ -123,7 +124,7 @@ class WorkOfLoads(NamedTuple):
 
 
 class Repeated(NamedTuple):
-    """``rows(k)`` for k < ``count(s)``."""
+    """Repeats ``rows(k)`` for k < ``count(s)``."""
 
     count: Any
     rows: Any
@@ -170,7 +171,10 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of a pass; strain depends on a preceding move, and on the step of velocity."""
+    """List the tasks of a pass.
+
+    Strain depends on a preceding move, and on which step's velocity it uses.
+    """
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -228,12 +232,15 @@ _FUSED: dict[type, Any] = {
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step with the fewest passes; nodal sums exist at its start."""
+    """List the rows of a step with the fewest passes.
+
+    Nodal sums must exist at its start.
+    """
     return _FusedStep(rows).rows
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows one by one, as parts of passes of the fused step if possible."""
+    """List the rows one by one; each is a part of a pass of the fused step if possible."""
     rows = list(rows)
     return one_by_one(rows, _FusedStep(rows).visits)
 
@@ -281,7 +288,7 @@ def _described_scene(row, setup):
 
 
 def says(row: Any, setup: Any) -> str | None:
-    """Describe a row with the parts that join it in a scene; None for a row without effect."""
+    """Describe a row and the parts that join it in a scene; None for a row without effect."""
     return _described.find((type(row),))(row, setup)
 
 
@@ -324,7 +331,7 @@ def _joined(tags: tuple, s: Setup) -> tuple:
 
 @point_function(otherwise=True)
 def in_scene(row: Any, s: Setup) -> Iterable[Any]:
-    """Return the rows that a row becomes in a scene."""
+    """Return the rows that replace a row in a scene."""
     return (row,)
 
 
@@ -341,7 +348,7 @@ def _after_others(row, s):
 
 @in_scene.on(Sweep)
 def _in_company(row, s):
-    """Add tasks that join a pass and rows before it; F-bar adds a pass before strains."""
+    """Add the tasks that join a pass, and rows before it; F-bar adds a pass before strains."""
     averages = average_volumes(row, s) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)
@@ -453,7 +460,7 @@ def any_node(s):
 
 
 def light_node(s):
-    """Return the task with the mass below which USL limits gradients: d (c dt / h)^2 of a point.
+    """Return the task that limits gradients at nodes below a mass (USL): d (c dt / h)^2 of a point.
 
     This fraction is at most 1. At nodes of less mass, strain would change faster than stress can
     follow. There is no limit with moments in the total frame, which return the whole nodal velocity
@@ -554,7 +561,7 @@ MOMENTUM_AGAIN = (
 
 
 def shown_sums(rows: Iterable[Any]) -> tuple:
-    """List the quantities of `SUMS`, and others that a scheme scatters before the points move."""
+    """List the quantities of `SUMS`, and further ones that a scheme scatters before points move."""
     found = {type(one): one for one in SUMS.quantities}
     for row in rows:
         if isinstance(row, Gather) and isinstance(row.task, Move):

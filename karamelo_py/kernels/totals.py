@@ -1,8 +1,8 @@
 """Sums independent of the order of their terms: reactions, work, energies.
 
-A total is a superaccumulator: a fixed-point number over the range of doubles, in limbs of 32 bits
-with room for carries. Terms are added without rounding; a published total is correct within a unit
-in the last place (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
+A total is a superaccumulator: a fixed-point number that covers the range of doubles, in limbs of 32
+bits with room for carries. Terms are added without rounding; a published total is correct within a
+unit in the last place (Kulisch 1971; Neal 2015, "Fast exact summation using small and large
 superaccumulators").
 """
 
@@ -23,7 +23,7 @@ COARSE, FINE = 1e-200, 1e200  # range of the largest term that allows integer su
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign; ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of totals, in the slots of published values that are no sums (time, timestep, dt).
+# Rows of totals, in slots whose published values (time, timestep, dt) are not sums.
 KINETIC, STORED, WORK = 0, 1, 2
 
 
@@ -115,7 +115,7 @@ def hand_over(private, totals, row):
 
 @kernel
 def carry(total):
-    """Carry digits into [0, 2^32 - 1]; the last one is signed."""
+    """Carry between limbs, which are then in [0, 2^32 - 1]; the last one is signed."""
     for k in range(LOST - 1):
         carry = total[k] >> 32
         total[k] -= carry << 32
@@ -196,7 +196,7 @@ def agree_on_heat(ranks, control):
 
 @point_function(otherwise=True)
 def take_over(ranks, due):
-    """Wait for contributions of other processes' tiles to nodes in use here."""
+    """Wait for the contributions of other processes to nodes that this process uses."""
 
 
 def publish(control, slot, count):

@@ -30,7 +30,7 @@ from karamelo_py.points.kinematics import dot, zero_vector
 STIFF = 0.5  # stiffness / (m / dt^2)
 DAMPED = 0.02  # damping / (m / dt)
 STIFFENING = 0.02  # growth of the stiffness of a deep contact per step
-ASIDE = 0.05  # step of the differences of depth / reach
+ASIDE = 0.05  # finite-difference step of the depth / reach
 LEVEL = 1e-3  # relative change of depth below which there is no direction
 CALL = types.int64(types.int64)
 
@@ -63,7 +63,7 @@ def memory_of(tag, members):
 
 
 def ball_at_first(ball, within, closer):
-    """Return the radius of a point at first contact; `closer`: approach in the last step.
+    """Return the radius of a point at first contact; `closer` is its approach in the last step.
 
     Points that begin inside, as at stair-stepped faces, must not gain energy: the radius of their
     balls is the distance to the surface.
@@ -75,7 +75,7 @@ def ball_at_first(ball, within, closer):
 def spring_rate(before, now, within, reach):
     """Return stiffness / mass, constant from the first touch on to conserve energy.
 
-    A larger stiffness would add energy, and a much smaller one would let points through.
+    A larger stiffness would add energy; a much smaller one would let points pass through.
     """
     if before == 0:
         return now
@@ -83,7 +83,7 @@ def spring_rate(before, now, within, reach):
 
 
 class NearPoint(NamedTuple):
-    """A point near a shape (or n points, in rows): centre, depth, way out, first radius."""
+    """One or more points near a shape: centre, depth, way out, radius at first contact."""
 
     x: Any  # (d,) in the shape's frame
     within: Any
@@ -150,7 +150,7 @@ def push(terms, memory, p, near):
 
 @kernel
 def push_points(kin, terms, memory, near, force):
-    """Set the forces (n, d) on n points of a shape unknown to kernels."""
+    """Set the forces (n, d) on n points of a shape that kernels do not know."""
     d, none = kin.dimension, zero_vector(kin, 0.0)
     x, within, normal, whole, slip, mass = near
     for p in range(mass.size):
@@ -164,7 +164,7 @@ def push_points(kin, terms, memory, near, force):
 
 @noinline
 def force_of(tag, members, volume, one):
-    """Return the force (d,) of a shape on a point, `one`, a `~.hooks.Member`."""
+    """Return the force (d,) of a shape on a point; `one` is a `~.hooks.Member`."""
     kin, d, (p, _, _, values, dt) = members.kin, members.kin.dimension, one
     none = zero_vector(kin, 0.0)
     way = none._make(values[:d])
@@ -172,7 +172,7 @@ def force_of(tag, members, volume, one):
     whole, memory = radius(kin, float(volume), position), memory_of(tag, members)
     ball, aside = reach_of(memory[0], p, whole, d)
     x, mass = position - way, float(members.points.mass[p])
-    # Most points are far away, and a search in a short reach is cheap.
+    # Most points are far away, and a search within a short distance is cheap.
     within = depth(tag.shape, kin, x, 1.001 * max(ball + aside, whole))
     if within + ball + aside <= 0:
         return leave(memory, p, NearPoint(x, within, none, whole, none, mass))

@@ -1,4 +1,4 @@
-"""Rows of rotation around an axis; nodes have one component, as for heat."""
+"""Rows of a step for rotation around an axis; nodes have one component, as for heat."""
 
 from typing import Any, NamedTuple
 

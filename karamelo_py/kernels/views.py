@@ -63,13 +63,13 @@ class NodeView(namedtuple("NodeView", "w stencil k i N grad_N")):
 
     @property
     def arm(self):
-        """X_i - x."""
+        """The vector X_i - x."""
         w = self.w
         return reach(w.basis, w.kin, w.grid, self.stencil, self.k)
 
     @property
     def affine_N(self):
-        """N_i D^-1 (X_i - x)."""
+        """The vector N_i D^-1 (X_i - x)."""
         w = self.w
         return affine_weight(w.basis, w.kin, w.grid, self.stencil, self.k)
 

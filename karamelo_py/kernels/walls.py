@@ -1,7 +1,7 @@
 """Coulomb friction at walls, on nodes that a fix holds in the normal direction.
 
 The normal force is the reaction of the fix. The tangential force is at most mu times the normal
-force, and at most stops the motion. The wall does not move in tangential directions.
+force, and never more than stops the motion. The wall does not move in tangential directions.
 """
 
 from math import sqrt
@@ -65,7 +65,7 @@ def rub(members, call, q, mu):
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Stop a node that sticks in the velocity that strains, too; stress would do spurious work."""
+    """Stop a sticking node also in the velocity that strains; stress would do spurious work."""
     d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:

@@ -36,7 +36,7 @@ from karamelo_py.points.laws.across import Across
 from karamelo_py.points.laws.pore_water import Saturated, water_content
 
 LOOK = 10  # steps between checks
-FEW = 3  # number of first checks that are compared before a window is full
+FEW = 3  # number of first checks compared before the first window is full
 LOOKS = 10  # checks per window
 GROWTH = 0.01  # growth per window for a warning
 WITHIN = 0.1  # growth since the start for a warning
@@ -102,13 +102,13 @@ MORE = VelocityAround, RelativeVelocity, WorkOfForces
 
 
 def more_of(block):
-    """Return law and fields of points with energy or work beyond `energies_of`, or empty tuples."""
+    """Return law and fields of points with further kinds of energy or work, or empty tuples."""
     law = block.laws if isinstance(block.laws, (Across, Saturated)) else ()
     return law, tuple([one for one in block.points.fields if type(one) in MORE])
 
 
 def add_more(kin, points, more, sums, p):
-    """Add a point's energy of rotation and of water, and take its work of forces and across."""
+    """Add a point's energy of rotation and of water; take its work of forces, and of water."""
     laws, (around, relative, work) = more[0], [field(more[1], kind) for kind in MORE]
     if around is not None:
         v = float(around[0, p])
@@ -170,7 +170,7 @@ def take_energies(s):
 
 @kernel
 def _add_momenta(d, motion, tiling, control):
-    """Add mass and momentum of solids, elastic energy, and elastic energy times velocity."""
+    """Add mass and momentum of each solid, elastic energy, and elastic energy times velocity."""
     (ids, masses, v), firsts, sums = motion, control.firsts, control.answer
     last = control.values.size + (firsts.size - 1) * (1 + d)
     for t in range(tiling.count[0]):
@@ -246,7 +246,7 @@ def note_crossing(control, d):
     renewed = (
         min(max((energy.kinetic - energy.of_drift) / now, 0.0), 1.0) * lasting / energy.to_and_fro
     )
-    # Energy that a linear basis loses does not count as energy that has left.
+    # Energy lost by the linear basis does not count as energy that has left.
     stays = max(1 - 2 * PER_CELL * sqrt(moved) * cells, 0.0)
     stays = exp(-renewed) * min(stays, now / before if before > 0 else 0.0)
     for i in range(d):
@@ -274,13 +274,13 @@ def keeps(first, later, unit, within=WITHIN):
 
 
 def unit_of(energy):
-    """Return the largest energy, which contains only a limited part of drift."""
+    """Return the largest energy; drift counts only up to a limit."""
     return max(energy.largest_own, DRIFTING * energy.largest_energy, energy.energy_floor)
 
 
 @kernel
 def judge(control):
-    """Update the balance; return whether energy is within its bound."""
+    """Update the balance; return True if the energy is within its bound."""
     energy = control.energy[0]
     # Mean of the balances at mid-step (stored energy interpolated) and at the end (kinetic energy).
     # Both oscillate by (omega dt)^2/8 in opposite phase, their mean by (omega dt)^3/16.
@@ -362,7 +362,7 @@ def measure_heat(s):
 
 
 def look_at_heat(s):
-    """Return whether temperatures are within the bounds by fixes, sources and initial state."""
+    """Return True if temperatures are within the bounds from fixes, sources and initial state."""
     heat = s.control.heat[0]
     if heat.watch_heat == 0 or int(s.control.values[TIMESTEP]) % LOOK != 0:
         return True
@@ -375,7 +375,7 @@ def look_at_heat(s):
 
 
 def begin_to_look(s, mode, level, anew):
-    """Store energies if a check is due; `level` is the weight of the stored energy at the end."""
+    """Store energies if a check is due; `level` is the weight of the final stored energy."""
     energy = s.control.energy[0]
     energy.level = level
     if anew:
@@ -405,7 +405,7 @@ def look(s, mode):
 
 
 def look_at_end(s, mode):
-    """Check the energy after an implicit step, with velocities and stresses at the same time."""
+    """Check the energy after an implicit step, whose velocities and stresses have the same time."""
     if s.control.energy[0].watch_energy == 0:
         return True
     _sum_before(s, mode, int(s.control.values[TIMESTEP]))

@@ -1,4 +1,4 @@
-"""Nodes of a simulation by number: all at once, or a limited number at a time."""
+"""Nodes of a simulation, accessed by number: all at once, or a limited number at a time."""
 
 from __future__ import annotations
 

@@ -14,14 +14,17 @@ from karamelo_py.run.step_size import StepSize
 
 
 class Backend(SceneState, Protocol):
-    """A scene that takes steps: a run calls `begin` or `go_on`, then `compile`, then `advance`."""
+    """A scene that can take steps.
+
+    A run calls `begin` or `go_on`, then `compile`, then `advance`.
+    """
 
     steps: StepSize
     energy_watch: EnergyWatch
     rollback: RollbackPoint | None
     states_every: int
     repeats_steps: bool
-    remedy: str  # changes of the scene that may prevent a failed step
+    remedy: str  # changes of the scene that may prevent the failure of a step
 
     def begin(self, end_time: float) -> None: ...
     def go_on(self, end_time: float, halvings: int) -> None: ...

@@ -32,7 +32,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocity (3,), I^-1 L; 0 about an axis along which all points lie."""
+        """Angular velocity (3,), I^-1 L. It is 0 about an axis on which all points lie."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear
@@ -46,7 +46,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance from the rotation axis, of an ellipsoid in the bounding box."""
+        """Largest distance from the rotation axis of an ellipsoid that fills the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)
@@ -54,7 +54,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Largest principal rate of stretch, by a least-squares fit of the velocity gradient."""
+        """Largest principal rate of stretch, from a least-squares fit of the velocity gradient."""
         gradient = np.linalg.lstsq(self.spread, self.shear, rcond=None)[0]
         return float(np.abs(np.linalg.eigvalsh(gradient + gradient.T)).max()) / 2
 

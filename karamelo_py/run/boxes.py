@@ -23,7 +23,7 @@ class Boxes(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """Pairs of an overlapping box and tile of nodes."""
+    """Pairs of a box and a tile of nodes that overlap."""
 
     box: np.ndarray  # (k,)
     tile: np.ndarray  # (k,)
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for each item of k lists, the number of its list and its index in the list."""
+    """Return, for each item of k lists, the index of its list and its index in the list."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -105,7 +105,7 @@ def steps_of(shapes: np.ndarray) -> np.ndarray:
 
 
 def unique(numbers: np.ndarray) -> np.ndarray:
-    """Do as ``np.unique``, which takes 0.03 s to import numpy.ma."""
+    """Return sorted unique numbers; ``np.unique`` takes 0.03 s to import numpy.ma."""
     return np.unique(numbers, return_counts=True)[0]
 
 
@@ -134,7 +134,7 @@ def read_beside(nodes: Nodes) -> list[np.ndarray]:
 
 
 def beyond(contact: Tag) -> int:
-    """Return the number of further cells in which contact uses sums."""
+    """Return how many cells beyond the nodes in use contact reads."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 

@@ -10,7 +10,7 @@ from karamelo_py.script.expressions import Expression
 
 class RunCondition(NamedTuple):
     formula: Expression
-    until: bool  # True: the run ends when it holds; False: when it does not
+    until: bool  # True: the run ends when the condition holds; False: when it no longer holds
 
     def allows(self, hub: Hub) -> bool:
         values = hub.values

@@ -29,14 +29,14 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Strains and stresses at the end of a load path; other strains do not change."""
+    """Strains and stresses at the end of a load path; strains not named do not change."""
 
     increments: int
     duration: float
     strain: Mapping[str, float]  # strains by component
     stress: Mapping[str, float]
     shear: Sequence[str] = ()  # components with simple instead of pure shear
-    volumetric: float | None = None  # sum of normal strains, of which free ones get equal parts
+    volumetric: float | None = None  # sum of normal strains; unnamed ones are equal
     turn: float = 0.0  # angle of rotation about z
 
     catalogue = "load_paths"
@@ -80,8 +80,8 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
 DIVISIONS = 8  # halvings of an increment that does not converge
-TOLERANCE = 1e-10  # residual / stress, or / its change in elastic increments
-UNRESOLVED = 1e-13  # stress / modulus below which it is round-off
+TOLERANCE = 1e-10  # residual / stress, or / the stress change in elastic increments
+UNRESOLVED = 1e-13  # stress / modulus below which a stress is round-off
 
 
 class Unreachable(Exception):
@@ -93,7 +93,7 @@ class Loading(NamedTuple):
     turn: float
     shear: tuple[int, ...]
     prescribed: np.ndarray  # components with a prescribed stress
-    begin: np.ndarray  # their stress at the beginning
+    begin: np.ndarray  # the stress of these components at the beginning
     end: np.ndarray
 
 
@@ -136,14 +136,14 @@ class Point:
             end=np.array([path.stress[COMPONENTS[k]] for k in prescribed]),
         )
         begun = self.time
-        rate = np.zeros(len(prescribed))  # change of the unknown strains per path
+        rate = np.zeros(len(prescribed))  # change of the unknown strains along the path
         marks = np.arange(path.increments + 1) / path.increments
         for number, (a, b) in enumerate(pairwise(marks), 1):
             try:
                 rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
-            # Not summed over increments, so that tables have round numbers.
+            # Computed from the path, not summed over increments, so that tables have round numbers.
             self.time = begun + b * path.duration
             observe()
 
@@ -268,16 +268,16 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """Return dt grad v (3, 3) of a rotation about z which a law takes as rigid.
+        """Return dt grad v (3, 3) of a rotation about z that a law takes as rigid.
 
-        To first order it is skew. Its second-order part depends on the law, whose strain follows
-        from the symmetric part and whose volume from det F, or all from F.
+        To first order it is skew. The second-order part depends on the law: its strain follows from
+        the symmetric part and its volume from det F, or both follow from F.
         """
         if angle == 0:
             return np.zeros((3, 3))
         skew = np.zeros((3, 3))
         skew[1, 0], skew[0, 1] = angle, -angle
-        # The volume is constant in the first form if (1 + a) ((1 + a)^2 + angle^2) = 1.
+        # In the first case, volume is constant if (1 + a) ((1 + a)^2 + angle^2) = 1.
         roots = np.roots([1, 0, angle**2, -1])
         same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
         exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])

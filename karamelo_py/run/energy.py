@@ -33,8 +33,8 @@ GROWING = 2  # windows of growth before a warning
 def unknown_work(hub: Hub) -> str:
     """Return the source of work that is not tracked, or "".
 
-    Work of compiled hooks is summed. Python fixes declare by `Fix.conserves` that they do no work
-    that is not summed.
+    Work of compiled hooks is summed. A Python fix declares by `Fix.conserves` that it does no other
+    work.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -133,7 +133,7 @@ class EnergyWatch:
         return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
 
     def share_lost(self) -> float:
-        """Return the energy lost since the first step (gained: negative) / the largest energy."""
+        """Return (energy lost since the first step) / (largest energy); negative for a gain."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
@@ -146,7 +146,7 @@ class EnergyWatch:
             return False
         if not watch.watch_energy:
             return True
-        # With the last window, since noise that grows by 50 % in 100 steps is in the state already.
+        # Use the last window, too: noise that grows by 50 % in 100 steps is in the state already.
         before = watch.first_mean if watch.looks >= FEW else watch.first_balance
         return bool(keeps(before, watch.balance, unit_of(watch)))
 

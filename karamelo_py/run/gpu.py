@@ -45,7 +45,7 @@ def arrays_in(thing: Any) -> Iterator[np.ndarray]:
 
 
 def there(s: arrays.Setup) -> arrays.Setup:
-    """Return the setup without tiles and buffers, which a GPU does not use."""
+    """Return the setup without tiles and buffers, which GPUs do not use."""
     blocks = tuple(block._replace(tiling=()) for block in s.blocks)
     buffers, conduction = s.buffers._replace(nodes=s.nodes), s.heat
     if isinstance(conduction, heat.Conducting):
@@ -64,7 +64,7 @@ def as_rows(image: np.ndarray) -> np.ndarray:
 def _no_formula(*_): ...
 
 
-def _no_hook(m, v, star, force, *_):  # loops contain a call that is never made
+def _no_hook(m, v, star, force, *_):  # the loops contain a call of it that is never made
     return v, star, force, force
 
 
@@ -163,7 +163,7 @@ class StepsOnCard:
         if not row.gathers:
             for block, cells in pairs:
                 yield self.of_points(visit.load_point, block, cells)
-        # Points are sorted once if cells of reference positions are used.
+        # If cells belong to reference positions, points are sorted only once.
         if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
                 yield self.of_points(visit.count, block, cells)
@@ -180,7 +180,7 @@ class StepsOnCard:
                 yield self.launch(sum_up, self.nodes, s, cells, self.use)
 
     def _lists(self, block: Any, cells: gpu.CellLists) -> Iterator[KernelLaunch]:
-        """Sort the points of a block by cell (counting sort, with prefix sums by chunks)."""
+        """Sort the points of a block by cell: a counting sort, with prefix sums by chunks."""
         levels = self.levels
         begins = [0, *np.cumsum(levels).tolist()]
         yield self.launch(gpu.sum_counts, levels[0], cells)
@@ -291,7 +291,7 @@ class StepsOnCard:
         return (min(rows)[0], max(end for _, end in rows)) if rows else (0, 0)
 
     def _clear_again(self, stage: int, rows: list[int]) -> Iterator[KernelLaunch]:
-        """Clear totals of hooks whose stage is repeated in a step, so that the last one counts."""
+        """Clear totals of hooks whose stage is repeated in a step; only the last pass counts."""
         if stage in self._acted:
             for h in rows:
                 if self.table[h].slot >= 0:
@@ -323,7 +323,7 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish a hook's totals right after it, if formulas read hooks."""
+        """Publish a hook's totals right after it, if formulas read published values of hooks."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
@@ -353,7 +353,7 @@ class StepsOnCard:
         self.ordered = -np.inf
 
     def fetch(self) -> None:
-        """Copy the state back except nodes; clock and published values are up to date anyway."""
+        """Copy the state back, except nodes; clock and published values are always up to date."""
         here = arrays_in(self.s._replace(control=()))
         nodes = set(map(id, self._of_nodes()))
         self.images.fetch([array for array in here if id(array) not in nodes])
@@ -368,7 +368,7 @@ class StepsOnCard:
 
     @property
     def wrong(self) -> int:
-        """Return the lowest number of a point that has failed."""
+        """Return the lowest number of the points that have failed."""
         return int(gpu.BEHIND - self.fate[gpu.WRONG])
 
     def advance(self, count: int) -> int:
@@ -405,7 +405,7 @@ class StepsOnCard:
             self._do["order"]()
 
     def seconds_of_step(self) -> list[tuple[KernelLaunch, float]]:
-        """Return the median time of each launch in a step, from a few steps after the last one."""
+        """Return the median time of each launch in a step, measured in a few further steps."""
         for launch in self.begin:
             launch()
         times = [self.card.seconds_of(self.step) for _ in range(5)]

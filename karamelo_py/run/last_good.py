@@ -1,4 +1,4 @@
-"""End of a failed run: write its last good state, and the last rows of log and dumps."""
+"""End of a failed run: write its last good state, and the final rows of log and dumps."""
 
 import os
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
 LAST_GOOD = Path("last_good.*.h5")
-MOST_REPEATED = 100  # steps that are repeated for the last rows of log and dumps
+MOST_REPEATED = 100  # steps that may be repeated for the final rows of log and dumps
 
 
 CHANGES = {"left-domain": "boundary(delete)", "body-left": "another fix rigid_body of the same ID"}
 
 
 class OthersWait(Exception):
-    """This process cannot write a file, for which others still wait to send data."""
+    """This process cannot write a file, and other processes wait to send data for it."""
 
 
 class LastGood(NamedTuple):

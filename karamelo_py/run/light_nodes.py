@@ -28,7 +28,7 @@ from karamelo_py.scene.solid import Solid
 
 LIGHT_SHARE = 0.9  # fraction of an inner node's mass
 MOST_PAIRS = 100_000  # number of point-node pairs up to which all nodes are used
-LANCZOS_STEPS = 24  # give the highest frequency within 1 %
+LANCZOS_STEPS = 24  # enough for the highest frequency within 1 %
 
 
 class _Line(NamedTuple):
@@ -40,7 +40,7 @@ class _Line(NamedTuple):
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
     """Return the stable step / (h/c) for the nodes of all solids; inf if it is unknown.
 
-    It is rounded down to four digits, so that it does not depend on the order of sums.
+    The result is rounded down to four digits, so that it does not depend on the order of sums.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf

@@ -28,13 +28,16 @@ class Listener:
     """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step has been chosen, and nothing is compiled; `resumed`: from a file."""
+        """The first step has been chosen, and nothing is compiled yet.
+
+        `resumed`: the run continues from a restart file.
+        """
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
         """Compilation is done."""
 
     def stepped(self, simulation: Any) -> None:
-        """Some steps succeeded."""
+        """Some steps have succeeded."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
         """Explain `status` (DONE: an energy gain); return None if this listener cannot.

@@ -33,9 +33,9 @@ class Interrupted(Exception):
 
 @dataclass(eq=False)
 class RunLoop:
-    """Runs a scene for a number of steps, to a time, or by a condition.
+    """Runs a scene for a number of steps, to a time, or until or while a condition holds.
 
-    With `halve`, a failure returns to the last good state and halves the step.
+    With `halve`, the run returns to its last good state after a failure, and halves the step.
     """
 
     hub: Hub
@@ -51,7 +51,7 @@ class RunLoop:
     first_step: int = field(init=False)
     first_time: float = field(init=False)
     last_step: float = field(init=False)
-    ruined: bool = field(init=False)  # whether the step was too large before a restart file
+    ruined: bool = field(init=False)  # whether the step was too large in an earlier run
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)

@@ -13,7 +13,7 @@ from karamelo_py.script.expressions import POINT_SEEDS, Expression
 
 
 def _first_bad(simulation: SceneState) -> tuple | None:
-    """Return the first bad value of this process, or None.
+    """Return the first NaN or infinite value of this process, or None.
 
     The result is ((fix, formula, point or node), value, position).
     """

@@ -28,17 +28,17 @@ def alike(hooks: Tag, others: Tag) -> bool:
 class SimulationOnCard(Simulation):
     """A simulation whose steps run on a GPU; everything else runs on the CPU.
 
-    `setup` fetches the arrays after steps. Code on the CPU that changes arrays calls `changed` or
-    `sort`, so that they are sent again. Fetched points are in the order of the GPU, and tiles are
-    not up to date: code that uses tiles must sort the points first.
+    `setup` fetches the arrays after steps. Code on the CPU that changes arrays must call `changed`
+    or `sort`, so that they are sent to the GPU again. Fetched points are in the order of the GPU,
+    and tiles are not up to date: code that uses tiles must sort the points first.
     """
 
     states_every = 1000  # steps between stored states, which must be fetched
     notes_temperatures = False
     _steps: StepsOnCard | None = None
     _known: Sequence = ()  # key of the compiled steps
-    _ahead = False  # the arrays here are not up to date
-    _nodes_ahead = False  # the nodes here are not up to date
+    _ahead = False  # the arrays on the CPU are out of date
+    _nodes_ahead = False  # the nodes on the CPU are out of date
     _sent = False  # the arrays of the GPU are up to date
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
@@ -64,7 +64,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """Nodes after the last step; they are fetched only when used, as they may be many."""
+        """Nodes after the last step. There may be many, so they are fetched only when used."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False
@@ -110,7 +110,7 @@ class SimulationOnCard(Simulation):
 
     def in_tiles(self) -> bool:
         self.sort_if_due()
-        self._sent = False  # since points store the work of forces
+        self._sent = False  # points store the work of forces
         return super().in_tiles()
 
     def refuse(self) -> None:

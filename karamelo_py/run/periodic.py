@@ -26,7 +26,7 @@ def seam_of(s: Setup, domain: Domain) -> Seam:
 
 
 def return_points(s: Setup, domain: Domain) -> None:
-    """Move points outside the domain by whole periods, at steps independent of restarts."""
+    """Move points outside the domain by whole periods, at steps that do not depend on restarts."""
     if int(s.control.values[TIMESTEP]) % EVERY:
         return
     for block in s.blocks:

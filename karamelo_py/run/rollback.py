@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 HALVINGS = 5  # largest number of halvings in a run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
-RETURNS = 2  # returns to a state before an energy gain, as two halvings without effect are enough
+RETURNS = 2  # returns to a state before an energy gain; two halvings without effect are enough
 
 
 class Stopped(ScriptError):
@@ -24,7 +24,10 @@ class Stopped(ScriptError):
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Return the action after `status` or `grown` energy, and `returns` to the last good state."""
+    """Return what to do after `status` or a gain of energy (`grown`).
+
+    `returns` is the number of returns to the last good state.
+    """
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -36,13 +39,15 @@ class RollBack:
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or with the state of a file, which may be `ruined`.
+        """Begin with the present state, or with that of a file.
 
-        `looks`: a condition may read values of parts after any step.
+        `ruined`: the step was too large in the run that wrote the file.
+
+        `looks`: the condition of the run may read values of parts after any step.
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
-        # A return to an earlier state would not restore deleted points.
+        # Returning to an earlier state cannot restore points that a fix deletes.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step
@@ -50,9 +55,9 @@ class RollBack:
             self._keep()
 
     def before(self) -> None:
-        """Store the present state if it is due and good; otherwise note the states of parts."""
+        """Store the present state if it is due and good; otherwise note states of parts."""
         if self.point.step == self.begun_at and self.simulation.steps.too_large:
-            return  # only the initial state is good
+            return  # the first step was too large: later states are not good
         step = self.simulation.step
         # Results depend on these states after a return, so they must not depend on run time.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
@@ -122,7 +127,7 @@ class RollBack:
         present.give(self.hub)
 
     def _points_only_leave(self) -> bool:
-        """Return whether points leave without an energy gain, where smaller steps do not help."""
+        """Return True if points leave without an energy gain; smaller steps cannot help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
         if not (moves and len(simulation.leaving()) and watch.grown_little()):
@@ -133,11 +138,11 @@ class RollBack:
         self.point.again(simulation.advance, step)
         kept = watch.growth_since(before) <= WITHIN and not simulation.steps.above_limit()
         simulation.advance(1)  # repeat the failed step for output
-        present.give(self.hub)  # the files of outputs have not changed
+        present.give(self.hub)  # outputs have written nothing since
         return kept
 
     def _stop(self, status: int) -> NoReturn:
-        """Return to the last good state, write it, and raise the error for the user.
+        """Return to the last good state, write it to a file, and raise the error for the user.
 
         After an energy gain, this is the last state before the gain; log and dumps end at the last
         step that succeeded. If the step was too large from the start, it is the initial state.

@@ -82,7 +82,7 @@ class SceneArrays:
         self.count = sum(s.count for s in hub.solids.values())
         check_scene(hub)
         check_room(hub, copied=previous is None and bool(hub.in_run))
-        # Points are distributed by tiles in the first sort.
+        # The first sort distributes points by tiles.
         ends = (self.count * comm.rank // comm.size, self.count * (comm.rank + 1) // comm.size)
         try:
             state = previous.state() if previous else None
@@ -105,7 +105,7 @@ class SceneArrays:
         self.control = self.setup.control
         self.version = 0  # increases when fields change without a step
         self.rollback: RollbackPoint | None = None  # last good state of the last run
-        self.mapped = False  # whether nodes have the present state
+        self.mapped = False  # whether nodes show the present state
 
     def keep_present(self) -> None:
         blocks = (
@@ -167,7 +167,7 @@ class SceneArrays:
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
         velocities = (block.points.v for block in self.setup.blocks)
-        # Without a copy, as there may be millions of points.
+        # Avoids a copy, as there may be millions of points.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([largest], float))[0])
@@ -209,7 +209,7 @@ class SceneArrays:
                 force[:] = 0
 
     def sort(self) -> None:
-        """Sort points by tile, after points in tiles of other processes have been sent there."""
+        """Sort points by tile; points in tiles of other processes are sent there first."""
         self.setup = self.domain.migrate(self.setup)
         domain = self.hub.domain
         if domain.periodic:
@@ -232,7 +232,7 @@ class SceneArrays:
             self.sort()
 
     def show_on_nodes(self) -> None:
-        """Map the present state to the nodes, unless a step has done so."""
+        """Map the present state to the nodes, unless the last step has done so."""
         if self.mapped:
             return
         self.sort_if_due()
@@ -248,7 +248,7 @@ class SceneArrays:
         self.mapped = True
 
     def snapshot(self, before: dict[str, np.ndarray] | None = None) -> dict[str, np.ndarray]:
-        """Copy all arrays that a step changes, and the published values; see `copied`."""
+        """Copy the published values and all arrays that a step changes; see `copied`."""
         self.domain.share_kept()
         return checkpoint.copied(self, before or {})
 

@@ -35,7 +35,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.views import set_columns
 
-TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # sums over deleted points
+TAKEN_ALONG = ("mass", "kinetic", "stored", "dissipated")  # quantities summed over deleted points
 
 
 class Simulation(SceneArrays):
@@ -52,7 +52,7 @@ class Simulation(SceneArrays):
     failure = ""  # reason why a load step found no equilibrium
     notes_temperatures = True
     between: Callable[[str], bool] | None = None
-    _called: Tag = None  # Python hooks of the steps
+    _called: Tag = None  # Python hooks of the last steps
 
     def __init__(self, hub: Hub, previous: Simulation | None = None):
         super().__init__(hub, previous)
@@ -121,7 +121,7 @@ class Simulation(SceneArrays):
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)
-        # Balance and rate remain as in the last step, even if a run begins here.
+        # Balance and rate remain those of the last step, even if a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
@@ -129,10 +129,10 @@ class Simulation(SceneArrays):
     def insert(self, ids: np.ndarray, prepare: Callable[[Points], None] | None = None) -> float:
         """Add absent points (ascending ids) in their initial state; return their energy.
 
-        `prepare` may change velocities and positions of the points in a block. In the balance, this
-        energy is work of loads.
+        `prepare` may change velocities and positions of the points in a block. The energy balance
+        counts the returned energy as work of loads.
         """
-        if self.comm.leads:  # the next sort sends them to their processes
+        if self.comm.leads:  # the next sort sends the points to their processes
             blocks = []
             made = points_at_rest(self.hub, self.setup, ids)
             for block, points in zip(self.setup.blocks, made, strict=True):
@@ -158,14 +158,14 @@ class Simulation(SceneArrays):
 
     @property
     def scheme(self) -> Tag:
-        """The scheme of the steps; some schemes have another if fixes move deformable points."""
+        """The scheme of the steps, which may depend on whether fixes move deformable points."""
         scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
         led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
         leading = scheme.traits.leading
         return scheme if leading is None or next(led, None) is None else leading
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
-        """Take up to `count` steps, at most to the end time; return DONE or another status.
+        """Take up to `count` steps, not beyond the end time; return DONE or another status.
 
         Load steps call `between` with a progress message, and end if it returns True.
         """
@@ -222,7 +222,7 @@ class Simulation(SceneArrays):
         return self.fixes.first is not None
 
     def refuse(self) -> None:
-        """Raise ScriptError for unsupported scenes; the CPU supports all."""
+        """Raise ScriptError if the back end does not support the scene; the CPU supports all."""
 
     def compile(self) -> None:
         hooks = self._acting
@@ -237,7 +237,7 @@ class Simulation(SceneArrays):
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
-            # No hook precedes it in a step, so it may act before the first output.
+            # This stage comes first in a step, so the fix may act before the first output.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
         rigid = any(solid.rigid for solid in self.hub.solids.values())
@@ -257,6 +257,6 @@ class Simulation(SceneArrays):
         if fix.point_by_point:
             act(self.setup)
         else:
-            self.sort_if_due()  # tiles are used, too
+            self.sort_if_due()  # the fixes may use tiles
             self.domain.act(act, self.setup)
         self.changed()

@@ -30,14 +30,14 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
-BOX_WEIGHT = 6.0  # weight of the common velocity in steps with domains that are boxes
+BOX_WEIGHT = 6.0  # weight of the common velocity, for domains that are boxes
 SLOWED = 1.2  # viscous / elastic wave speed above which viscosity limits the step
-LONE = 0.9  # fraction of an isolated point's stable step, as expanded points are stiffer
+LONE = 0.9  # fraction of an isolated point's stable step; expanded points are stiffer
 # With mass=corrected in the total frame, blocks with one point per cell gain energy at 0.73 times
 # the stable step.
 CORRECTED_TOTAL = 0.7
-# Instead of LONE: in splashes of a dam break with two points per cell, energy grew at 0.43 h/c, but
-# not at 0.38 h/c.
+# Replaces LONE if mass=corrected. In splashes of a dam break with two points per cell, energy grew
+# at 0.43 h/c, but not at 0.38 h/c.
 CORRECTED_LONE = 0.55
 DAMPED = 0.5  # smallest default fraction with one point per cell, if the transfer damps
 
@@ -53,9 +53,9 @@ def sparse(hub: Hub) -> bool:
 def keeping_share(hub: Hub) -> float:
     """Return the largest fraction of the stable step at which a drifting body gains no energy.
 
-    With FLIP and similar transfers, jumps of gradients add energy to points that cross cells, about
-    in proportion to the third power of the step. With these fractions (docs/energy.md), the gain is
-    at most 10 % in 50 periods.
+    With FLIP and similar transfers, jumps of gradients add energy to points that cross cells; the
+    gain is about proportional to dt^3. With these fractions (docs/energy.md), the gain is at most
+    10 % in 50 periods.
     """
     update = hub.update
     alpha = flip_coefficient(update.transfer)
@@ -71,7 +71,10 @@ def keeping_share(hub: Hub) -> float:
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """Return whether points move through the grid with FLIP or alike, without moments and usl."""
+    """Return True for FLIP and similar transfers, without moments and not with usl.
+
+    Points then carry their velocities through the grid.
+    """
     update = hub.update
     return (
         update.method.frame.moves
@@ -112,7 +115,7 @@ def lone_point(hub: Hub) -> float:
 
 
 def bears_drift(hub: Hub) -> bool:
-    """Return whether a drifting body is as stable and conservative as a body at rest.
+    """Return True if a drifting body is as stable and conservative as a body at rest.
 
     With cubic splines, the energy hardly depends on the position in the cells; usavg adds none with
     smooth bases (50 periods at 0.05 to 0.5 of the wave speed, in 2D). Colliding disks fracture
@@ -133,9 +136,9 @@ def bears_drift(hub: Hub) -> bool:
 def own_weight_of_drift(hub: Hub) -> float:
     """Return the weight of the common velocity in the default step.
 
-    It is 1 in the standard rule h/(c + |v|), and 0 if drift is harmless. It is larger for two or
-    more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks that drift at 0.05 to
-    0.5 of the wave speed, the energy gain increases with speed.
+    The standard rule h/(c + |v|) has weight 1; if drift is harmless, the weight is 0. It is larger
+    for two or more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks that drift
+    at 0.05 to 0.5 of the wave speed, the energy gain increases with speed.
     """
     if bears_drift(hub):
         return 0.0
@@ -155,9 +158,9 @@ def common_velocity(simulation: SceneState, weight: float) -> np.ndarray:
 
 
 def courant_number(hub: Hub, *, longer: bool) -> float:
-    """Return the stable step / (h/c); `longer`: of points that remain in their cells.
+    """Return the stable step / (h/c); `longer`: for points that remain in their cells.
 
-    In the total frame, it is limited by nodes of thin and round bodies if points have moments.
+    In the total frame, if points have moments, light nodes of thin and round bodies limit it.
     """
     update = hub.update
     total = not (update.scheme.traits.implicit or update.method.frame.moves)
@@ -227,8 +230,8 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 def stable_conduction(hub: Hub) -> float:
     """Return the smallest stable step of conduction in undeformed bodies.
 
-    It is h^2 / (4 d) capacity / conductivity, half of the bound for lumped finite elements, since
-    points may be anywhere in a cell.
+    It is h^2 / (4 d) capacity / conductivity. This is half of the bound for lumped finite elements,
+    since points may be anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf

@@ -1,4 +1,4 @@
-"""A scene in arrays, as measurements, checks and files use it."""
+"""A scene in arrays, as seen by measurements, checks and files."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class SceneState(Protocol):
     tiles: Tiles
     domain: WholeDomain
     present: np.ndarray  # (N,) bool by id, False for deleted points
-    begun: set[Fix]  # fixes of the first step that have acted
+    begun: set[Fix]  # fixes that act only in the first step, and have acted
     mode: Tag
     threads: int
     count: int
     points: Fields
-    mapped: bool  # whether nodes have the present state
+    mapped: bool  # whether nodes show the present state
     moved_in_step: bool  # whether arrays are replaced after the first stage of a step
     implicit: bool
     notes_temperatures: bool

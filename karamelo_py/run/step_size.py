@@ -30,10 +30,10 @@ NO_STRIDE = 1e9  # path in cells that points never reach
 
 
 class StepPolicy(NamedTuple):
-    still: tuple[float, float]  # stable step / (h/c), and the fraction of it, at rest
+    still: tuple[float, float]  # stable step / (h/c), and the fraction used, at rest
     moving: tuple[float, float]
     weight: float  # weight of the common velocity
-    fixed_dt: float  # 0: the step is adapted to the fastest point
+    fixed_dt: float  # 0 if the step adapts to the fastest point
     heat_factor: float  # fraction of the limit of conduction
 
     @classmethod
@@ -48,7 +48,7 @@ class StepPolicy(NamedTuple):
         return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
-        """Return clock fields for points that have moved by a `path` in cells."""
+        """Return clock fields for points whose longest `path` so far is in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,
@@ -64,7 +64,7 @@ Carried = tuple[float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Return the last steps of motion and contact, and the path, for the next lowering."""
+    """Return the last dt, contact dt, and path, for the next lowering."""
     step = control.step[0]
     return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
 
@@ -81,7 +81,7 @@ def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> N
 
 
 class StepSize:
-    """Chooses the steps. No other Python code writes them to the clock."""
+    """Chooses the steps. No other Python code writes steps to the clock."""
 
     policy: StepPolicy
 
@@ -98,7 +98,7 @@ class StepSize:
         self._choose()
 
     def choose_first(self) -> None:
-        """Choose the first step again, as initial values may change the fastest point."""
+        """Choose the first step again, as fixes may have changed the fastest point."""
         simulation, step, motion = self.simulation, self.step, self.motion
         in_hundred_steps = 100 * simulation.fastest() * step.courant * step.dt_factor
         if simulation.step == 0 and in_hundred_steps > STILL * motion.rate:
@@ -166,7 +166,7 @@ class StepSize:
         return numbers != before or motion.stride != stride
 
     def _choose(self) -> None:
-        # A measured rate is used again, so that several runs take the same steps as one.
+        # A measured rate is reused, so that several runs take the same steps as one long run.
         if not self.measured:
             simulation, motion = self.simulation, self.motion
             self._measure(float(motion.weight))

@@ -35,22 +35,22 @@ from karamelo_py.run import boxes as grid_boxes
 from karamelo_py.scene.lattice import MAX_NODES, Lattice
 
 # Cells per direction in a tile of points; nodes per direction in a tile of nodes. Small boxes fit
-# into caches, large ones have fewer nodes in common.
+# into caches, large ones overlap less.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
 LONGER = 16  # factor of length along rows in 3D with one point per cell, for more points per tile
 SHARES = 64  # parts with about equal numbers of points in a block, for threads
-# Boxes with fewer rows than this number times the nodes are allocated at the start, as pages take
-# no memory until they are used.
+# Boxes are allocated at the start if they have fewer rows than this number times the nodes: pages
+# take no memory until they are used.
 ALLOCATED_UP_TO = 8
 DIRECT_UP_TO = 2000  # points up to which clearing and summing boxes costs more than threads save
 PART = 2000  # points per part, for sorting by threads
 MOST_DRIFT = 1.0  # cells that points may move between sorts
-# A smaller drift gives smaller boxes, and neighbouring points with the same nodes. In 2D this is
-# not worth more sorting.
+# With a smaller drift, boxes are smaller, and more neighbouring points have the same nodes. In 2D
+# this does not pay for the additional sorting.
 LEAST_DRIFT = {1: MOST_DRIFT, 2: MOST_DRIFT, 3: 0.25}
 SORT_STEPS = 32  # intended number of steps between sorts
-# If points scatter directly to nodes, drift only increases the number of nodes in use.
+# If points scatter directly to nodes, a larger drift only puts more nodes in use.
 DIRECT_DRIFT, DIRECT_STEPS = 4.0, 1000
 
 
@@ -80,7 +80,8 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # In the total frame, points reach at most two cells beyond their tile, with contact three.
+        # In the total frame, points reach at most two cells beyond their tile, or three with
+        # contact.
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)
@@ -133,7 +134,7 @@ class Tiles:
                     array[: self.rows] = 0
 
     def unsort(self, control: Control, *, limit: float | None = None) -> None:
-        """Let the points be sorted before the next step; `limit` replaces the drift limit."""
+        """Request a sort before the next step; `limit` replaces the drift limit."""
         motion = control.motion[0]
         motion.drift = np.inf
         if limit is not None:
@@ -183,8 +184,8 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Several parts per thread, as tiles differ in size. With few points, one thread would be
-        # ready before others start.
+        # Use several parts per thread, as tiles differ in size. With few points use one: the first
+        # thread would finish before others start.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
@@ -238,7 +239,7 @@ class Tiles:
             room[: len(rows)] = rows
 
     def _rows_to_clear(self, s: Setup) -> tuple[np.ndarray, ...]:
-        """Divide nodes as `_parts_to_sum` does, for few points: one set, with a part per span."""
+        """Divide nodes as `_parts_to_sum` does, but into one set, with a part per span."""
         boxes = Tiles._boxes(self, s)
         steps = self._steps[boxes.grid]
         self._tell_buffers(s, 0, 0, self._first_node[boxes.grid], steps)
@@ -252,14 +253,15 @@ class Tiles:
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
-        Nodes are in the order of the sets of points that reach most of them, so that a thread has
-        its contributions in its own caches. Fetching them from other caches is slower than the sum.
+        Each set of nodes is ordered like the set of points that reaches most of it, so that a
+        thread finds its contributions in its own caches. Fetching them from other caches takes
+        longer than summing.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)
         order = np.lexsort((boxes.order[reached.box], -reached.size, reached.tile))
         shares = self._shares(s)
-        local = order[reached.box[order] < len(shares)][::-1]  # the largest comes last and counts
+        local = order[reached.box[order] < len(shares)][::-1]  # assigned last: the largest
         beside = self._beside(reached.tile, boxes.grid[reached.box])
         owner = np.zeros(self._first_of_nodes[-1], np.int64)
         owner[beside[local]] = shares[reached.box[local]]
@@ -368,7 +370,7 @@ class Tiles:
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of grids.
 
-        Their rows in boxes are `first` + sum of `steps` (k, d) times indices.
+        The row of a node in its box is `first` + sum of `steps` (k, d) times indices.
         """
         d = self.dimension
         parts = np.ones((len(grid), 10), np.int64)
@@ -428,7 +430,7 @@ def _empty(s: Setup, spans: np.ndarray) -> None:
 
 
 def _evenly(parts: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Return the set of each of n tiles of nodes: ascending (n,), from 0 to SHARES - 1.
+    """Return the set, from 0 to SHARES - 1, of each of n tiles of nodes: ascending (n,).
 
     `parts` (n, 10) are the used nodes of each tile (see `Buffers`). All sets have about the same
     number of nodes. Consecutive tiles with equal `beside` (n,) are in the set of the first one.
@@ -447,7 +449,7 @@ def in_use(tiling: Tiling) -> list[tuple[str, int]]:
 
 
 def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
-    """Return the first tile (size,) of nearly equal sets of tiles with point ranges (T, 2)."""
+    """Return the first tiles (size,) of nearly equal sets of tiles with point ranges (T, 2)."""
     out = np.zeros(size, np.int64)
     out[shares] = len(ranges)
     if shares > 1:
@@ -457,6 +459,6 @@ def shares_of(ranges: np.ndarray, shares: int, size: int) -> np.ndarray:
 
 
 def one_after_another(ranges: np.ndarray) -> np.ndarray:
-    """Shift ranges (k, 2) so that each begins at the end of the one before."""
+    """Shift ranges (k, 2) so that each begins where the previous one ends."""
     ends = np.cumsum(ranges[:, 1] - ranges[:, 0])
     return np.stack([np.append(0, ends)[:-1], ends], axis=1)

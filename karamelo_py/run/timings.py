@@ -19,7 +19,7 @@ def _clocks() -> np.ndarray:
 
 
 class Timings:
-    """Seconds (2,): elapsed, and CPU time of all threads."""
+    """Seconds (2,): elapsed time, and CPU time of all threads."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -41,7 +41,7 @@ class Timings:
             yield
 
     def on_start(self, _: str) -> None:
-        """Note that a kernel is being compiled, by this process or one for which it waits."""
+        """Note that a kernel is being compiled, by this process or by another that it waits for."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

@@ -36,7 +36,7 @@ def _zero(kin):
 
 
 class Unweighted(NamedTuple):
-    """Contribution to the first node of a stencil, and its increments to the next ones."""
+    """A contribution to the first node of a stencil, and its increments from node to node."""
 
     value: tuple
     growths: tuple
@@ -80,7 +80,7 @@ def of_point(**functions: Callable) -> MappingProxyType:
 
 
 class NodalQuantity(NamedTuple):
-    """Base of quantities, in lanes. See `kernels.stencils` for `not_at_corners`."""
+    """Base of quantities that support lanes. See `kernels.stencils` for `not_at_corners`."""
 
     in_lanes = True
     not_at_corners = ()
@@ -96,7 +96,7 @@ class NodalQuantity(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Base of tasks in lanes, with ``empty``, ``gathered`` and ``updated``."""
+    """Base of tasks that support lanes, with ``empty``, ``gathered`` and ``updated``."""
 
     in_lanes = True
     not_at_corners = ()
@@ -149,7 +149,7 @@ def affine_part(quantity, w, stencil, load):
 def _register(kind: Any) -> None:
     groups = [(array, (*sums,)) for array, sums in groupby(kind.gives, lambda one: one.into.array)]
     made, takes = namedtuple("Load", kind.takes), tuple(kind.takes.values())  # type: ignore[misc]
-    zero_in_gaps = kind.__module__.startswith(__name__)  # each of these takes a mass, or its like
+    zero_in_gaps = kind.__module__.startswith(__name__)  # 0 for points without mass
     for take in takes:
         if not hasattr(take, "reads"):
             says = f"put @eq.reads(...) before {take.__name__}, with the fields of points it reads"
@@ -267,7 +267,7 @@ def updated_all(tasks, pt, totals, fastest):
 
 
 def load_all(quantities, pt):
-    """Return the load of each quantity, once for those that take the same."""
+    """Return the load of each quantity; equal loads are computed once."""
     kinds = [type(quantity).takes for quantity in quantities]
     firsts = [kinds.index(takes) for takes in kinds]
     loads = [load_of(quantities[k], pt) if k == firsts[k] else () for k in range(len(kinds))]

@@ -32,7 +32,7 @@ class AveragedStress(StepField):
 
 
 class PressureBeside(Field):
-    """Averaged pressure minus the point's pressure, in the last forces."""
+    """Averaged pressure minus the point's pressure, as used in the last forces."""
 
 
 class NodalStress(SummedField):
@@ -46,7 +46,7 @@ class PointByPoint(NamedTuple):
 
 
 class FBar(NamedTuple):
-    """Averages volume changes, against volumetric locking.
+    """Averages volume changes, to avoid volumetric locking.
 
     Volume rates d_p become sum_i N_ip sum_q N_iq V_q d_q / sum_q N_iq V_q. This map is
     self-adjoint: if the mean stress is averaged in the same way, the power of nodal forces is the

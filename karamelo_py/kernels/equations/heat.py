@@ -56,7 +56,7 @@ HEATED = Capacity, Temperature, Volume, Supply, TemperatureShare  # in the order
 
 
 def at_least_round_off(weight):
-    """Return `weight`, at least round-off: nodes with a gradient only need a temperature, too."""
+    """Return `weight`, or round-off if larger: nodes with only gradients need a temperature."""
     return max(weight, round_off(weight))
 
 

@@ -98,7 +98,7 @@ def energy_of(mass, momentum):
 
 
 def warm(pt, v):
-    """Heat a point by the energy lost to the nodes and back; `v` is the velocity before."""
+    """Heat a point by the energy lost on the way to the nodes and back; `v` is its old velocity."""
     if field(pt.w.nodes.fields, EnergyLoss) is not None:
         moment = transfers.zero_moment(pt.w.transfer, pt.kin, v[0])
         for node in pt.nodes:
@@ -115,8 +115,8 @@ def warm(pt, v):
 def in_company(pt, moment):
     """Return the part of the `moment` that a point of gas retains: none if the point is isolated.
 
-    Nodes of no other point would return its moment, and its pressure would expand it without bound.
-    The energy of the rest becomes heat.
+    Nodes without other points would return the whole moment, and the pressure would expand the
+    point without bound. The energy of the discarded part becomes heat.
     """
     lost = field(pt.w.nodes.fields, EnergyLoss)
     if lost is None or len(moment) == 0:

@@ -91,7 +91,10 @@ def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:
 
 
 def _corners_carried(pt, new, corners):
-    """Return the location `new` with corners moved by their velocities, known or interpolated."""
+    """Return the location `new` with corners moved by `corners`, their velocities (d,).
+
+    If `corners` is empty, velocities are interpolated from the nodes.
+    """
     w = pt.w
     for corner in range(carried(w.basis, w.kin)):
         if len(corners):

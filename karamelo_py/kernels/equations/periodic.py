@@ -1,8 +1,7 @@
 """Periodic directions: nodes a period apart are images of one node.
 
-The grid has `GHOSTS` extra cells at both ends of a periodic direction. All images get the total of
-the same sum, with the same bits. Points return to the domain every `EVERY` steps
-(`karamelo_py.run.periodic`).
+The grid has `GHOSTS` extra cells at both ends of a periodic direction. All images get the same sum,
+bit for bit. Points return to the domain every `EVERY` steps (`karamelo_py.run.periodic`).
 """
 
 from math import inf
@@ -20,7 +19,7 @@ EVERY = 10
 
 
 class InUse(StepField):
-    """1 at nodes that points may see."""
+    """1 at nodes that can be in a point's stencil."""
 
 
 class Axis(NamedTuple):

@@ -77,7 +77,7 @@ class RelativeVelocity(Field):
 
 
 class UnseenPressure(Field):
-    """Pressure minus its mean through the nodes and back, one step earlier (splines)."""
+    """Pressure minus its projection (to the nodes and back), one step earlier (splines)."""
 
     needed = RelativeVelocity.needed
 
@@ -97,9 +97,9 @@ def of_pressure(kin):
 class WaterSums(SummedField):
     """Nodal sums of water and pores.
 
-    Mass, momentum and force of the water, as in `Nodes.sums`, where a column is free for the drag;
-    volume, volume of pores, volume times pressure, the unseen part of this product; force of the
-    pressure (d,) and outward area (d,).
+    Mass, momentum and force of the water, as in `Nodes.sums`, with a column for the drag; volume,
+    volume of pores, volume times pressure, the unseen part of this product; force of the pressure
+    (d,) and outward area (d,).
     """
 
     shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension)
@@ -195,7 +195,7 @@ class WetPoint(NamedTuple):
     drag: arrays.Number  # force per unit relative velocity
     volumes: tuple  # of point and pores; their products with the pressure and its unseen part
     p: arrays.Number
-    area: tuple  # the volume as a stress
+    area: tuple  # volume times the unit tensor, in the frame of the gradients
 
 
 @eq.reads(
@@ -203,7 +203,7 @@ class WetPoint(NamedTuple):
     "unseen pressure",
 )  # fmt: skip
 def pores(pt):
-    """Return what a point gives to `WaterSums`, or () if dry."""
+    """Return a point's contribution to `WaterSums`, or () if it is dry."""
     if not _is_wet(pt):
         return ()
     law, state, f = pt.law_state_F
@@ -248,7 +248,7 @@ def _force_and_area_at(pt, node):
 
 
 def _affine_force_and_area(pt, w):
-    # The gradients at a cell's centre are the same but for signs.
+    # Gradients at a cell's centre differ only in sign.
     if not (len(pt.pores) and isinstance(w.basis, Linear)):
         return ()
     p, slope = pt.pores.p, 0.5 ** (w.kin.dimension - 1) * w.grid.inv_h
@@ -411,7 +411,7 @@ def _is_wet_node(nodes, kin, n):
 
 @node_task
 class ShareForces(NamedTuple):
-    """Sets the force on the water, and for fixes mass and force of a node with dragged water."""
+    """Sets the force on the water and, for fixes, a node's mass and force with dragged water."""
 
     rim: float  # |B| / V of closed nodes
     surface: float  # |B| / V of nodes at the surface
@@ -456,7 +456,7 @@ class ShareForces(NamedTuple):
 
 @node_task
 class DragWater(NamedTuple):
-    """Sets the relative velocity after the step from the soil's change, and the soil's mass."""
+    """Updates the relative velocity with the soil's velocity change; resets mass to the soil's."""
 
     says = "drag"
     goes_through = ("sums", "update", "water sums", "water update")
@@ -564,7 +564,7 @@ class MoveWater(eq.Task):
         part = m / (1 + m)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
         store(pt.w.points.v, pt.p, pt.v + part * unseen)
-        # Work of this impulse: for nodes, the step ends with the velocity after it.
+        # Work of this impulse. The nodes' work assumes that the step ends with the new velocity.
         way = dot(unseen, change) - new.squared() + (new - unseen).squared()
         increase(pt.of(WorkOfForces), pt.p, (0.5 * eq.mass(pt) * part * way,))
         return eq.Report(real(0, pt.dt), fastest)
@@ -573,7 +573,7 @@ class MoveWater(eq.Task):
 class Seep(eq.Task):
     """Gathers the flux before `Strain`; updates water, pores and the water's velocity."""
 
-    says = "water that comes and goes"
+    says = "inflow and outflow of water"
     reads = ("x", "state", "material", "deformation gradient", "v", "relative velocity")
     writes = ("state", "relative velocity", "unseen pressure")
 

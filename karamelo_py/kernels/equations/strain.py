@@ -131,7 +131,7 @@ def add_gradient(node, grad_v):
 
 
 def increment(dt, grad_v):
-    """Return dl = dt grad v, rounded before F + dl."""
+    """Return dl = dt grad v, rounded before it is added to F."""
     return grad_v._make(dt * grad_v)
 
 
@@ -151,7 +151,7 @@ def _deform_domain(task, pt, growth):
 
 
 def further_reach(basis, kin, grid, before, after):
-    """Return the cells by which a point's domain reaches further."""
+    """Return by how many cells a point's domain has grown."""
     further = extent(basis, kin, grid, after) - extent(basis, kin, grid, before)
     return max(further, 0)
 

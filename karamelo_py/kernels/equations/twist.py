@@ -98,7 +98,7 @@ TORQUE = eq.NodeColumns(SumsAround, lambda kin: 2, lambda kin: 1, lambda kin: 3)
 def rotation(pt, r):
     """Return inertia, angular velocity and its moment (or ()) of a point at radius r.
 
-    Velocity and moment are in both components of a plane vector, as transfers map vectors.
+    Velocity and moment are stored in both components of a plane vector, as transfers map vectors.
     """
     omega = pt.of(VelocityAround)[0, pt.p] / r
     moment = pt.load(MomentAround, (r, r))
@@ -192,7 +192,7 @@ def _force_around_twisted(kin, pt):
 
 @node_task
 class PushOutwards(NamedTuple):
-    """Adds the change of centrifugal force by the new w*, and sums the work of torques."""
+    """Adds the change of centrifugal force due to the new w*, and sums the work of torques."""
 
     says = "centrifugal force"
     goes_through = ("sums", "sums", "momentum around", "update around")

@@ -32,7 +32,7 @@ Stored = tuple[str, tuple[int, ...], Index, np.ndarray]
 
 
 def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the used part of every array that a step changes and that the next step needs."""
+    """Yield the used part of every array that steps change and the next step needs."""
     s = simulation.setup
     for k, block in enumerate(s.blocks):
         for name, rows in in_use(block.tiling):
@@ -63,7 +63,7 @@ def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, n
 
 
 def touched(simulation: SceneState) -> dict[str, np.ndarray]:
-    """Return nodes with recent contact, and what contact remembers of them.
+    """Return nodes with recent contact, and their contact memory.
 
     A single process searches all nodes, since liquids may return to nodes that are not in use now.
     Several processes search the nodes in use.
@@ -90,7 +90,8 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield the content of a restart file for the present state, or for the `kept` one.
 
-    All ranks call this; rank 0 gets the arrays, in the order and with the bits of a serial run.
+    All ranks call this; rank 0 gets the arrays, in the same order and bit for bit as in a serial
+    run.
     """
     if not kept:
         simulation.bring()
@@ -123,7 +124,7 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 
 
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
-    """Yield a state as it is stored in files, with the digits of exact sums normalised."""
+    """Yield a state in the form in which files store it: digits of exact sums are normalised."""
     work = state["work"].copy()
     carry(work)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
@@ -247,7 +248,7 @@ def _take_nodes(simulation: SceneState, state: ArraysByName) -> None:
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
     used[counted] = True
     nodes = state["node numbers"][()] if "node numbers" in state else counted[:0]
-    kept = {id(array) for _, array in kept_at_nodes(simulation.setup)}  # restored, with -0
+    kept = {id(array) for _, array in kept_at_nodes(simulation.setup)}  # -0 is restored, too
     for name, array in of_nodes(simulation.setup):
         if id(array) in kept:
             continue

@@ -1,11 +1,11 @@
 """States of the parts of a scene, for rollback and restart files.
 
-A class names the attributes of its state, in addition to the names in its bases::
+A class lists the attributes of its state; names in base classes are added::
 
     class Dose(Compute):
         remembers = ("total",)
 
-They may be numbers, texts, bytes, arrays, NumPy's random generators, lists, tuples, sets and
+Attributes may be numbers, texts, bytes, arrays, NumPy's random generators, lists, tuples, sets and
 dictionaries of these, and objects whose class has ``remembers``. The optional methods ``resumed()``
 and ``filed()`` are called after a part is restored and before a file stores it. If another script
 reads a restart file, outputs begin new files and restore only the names in ``carries``.
@@ -142,7 +142,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of a value that cannot be stored in a file, and the warning about it."""
+    """A copy of a value that cannot be stored in a file, with the reason."""
 
     kept: object
     fault: ScriptError
@@ -173,7 +173,7 @@ def _random_state(state: dict) -> np.random.RandomState:
     return generator
 
 
-# For types unknown to JSON: functions that give JSON arguments, and make the value of them.
+# Types that JSON does not have: functions that convert a value to JSON arguments, and back.
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
@@ -192,7 +192,7 @@ MADE = {kind.__name__: make for kind, (_, make) in KINDS.items()}
 
 
 def plain(value: object, arrays: list[np.ndarray]) -> Any:
-    """Convert a value to JSON types; arrays are appended to `arrays` and replaced by numbers."""
+    """Convert a value to JSON types; arrays go to `arrays` and are replaced by their indices."""
     kind = np.generic if isinstance(value, np.generic) else type(value)
     if value is None or (isinstance(value, (bool, int, float, str)) and kind is not np.generic):
         return value
@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve
-        self.halvings = self.returns = 0  # halvings in the run; returns to this state
+        self.halvings = self.returns = 0  # halvings so far in the run; returns to this state
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}
@@ -252,7 +252,10 @@ class RollbackPoint:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps to `end`; restore states of parts at noted steps. Return the status."""
+        """Repeat the steps to `end`, and return the status.
+
+        States of parts are restored at the steps where they were noted.
+        """
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

@@ -39,7 +39,7 @@ CONTENT = (
     "within", "statements", "values of statements", "presets", "variables", "runs", "chosen",
     "scene", "values", "begun", "parts", "run",
 )  # fmt: skip
-# HDF5 has checksums of everything except arrays, which have an attribute for theirs.
+# HDF5 stores checksums of everything except arrays. The checksum of an array is an attribute.
 CHECKED, CHECKSUM = "v110", "crc32"
 LARGE = ("/state/", "/good/")
 READ_AT_ONCE = 1 << 22  # bytes read at a time
@@ -130,9 +130,10 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 
 
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
-    """Raise ScriptError if arrays of a file do not agree with their checksums.
+    """Raise ScriptError if arrays of a file do not match their checksums.
 
-    Arrays of points and nodes (`large`), or all others, are compared, each by one process.
+    If `large`, arrays of points and nodes are compared, otherwise all other arrays; each array is
+    compared by one process.
     """
     import h5py
 
@@ -233,9 +234,9 @@ class Restart:
         return not self.content["within"] and len(hub.runs) == len(self.content["runs"])
 
     def take(self, hub: Hub, point: RollbackPoint | None = None, *, outputs: bool) -> None:
-        """Restore the state of the file; with `outputs`, outputs continue in their files.
+        """Restore the state stored in the file; with `outputs`, outputs continue in their files.
 
-        In an unfinished run, `point` gets the last good state of the file.
+        If the file is from an unfinished run, `point` gets the last good state in it.
         """
         check(hub, self)
         simulation, content = hub.simulation, self.content

@@ -30,7 +30,7 @@ class AveragedVolumes:
         return self.equations.weights.T @ np.concatenate(rows)
 
     def _average(self, nodes: np.ndarray, name: str) -> None:
-        """Fill a row of `Averages` with point averages of nodal values (m,)."""
+        """Fill a row of `Averages` with the averages at points of nodal values (m,)."""
         rows, begin = self.equations.weights @ nodes, 0
         for averages in self.averages:
             row = getattr(averages, name)[0]

@@ -16,8 +16,9 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     """Conduct heat for `dt`, before the points are strained; raises `Singular`.
 
     The equation is C (T' - T) / dt = q - K T', with nodal capacities C and conductances K. It is
-    linear, so one solution is exact. The split from an adiabatic step has an error of first order
-    in dt (Armero & Simo 1992). Conduction comes first, so that load steps end in equilibrium.
+    linear, so it is solved once, without iterations. The split from an adiabatic step has an error
+    of first order in dt (Armero & Simo 1992). Conduction comes first, so that load steps end in
+    equilibrium.
     """
     s, mode = equations.s, equations.mode
     take_rows(FLOW_TO_NODES, s, mode, hooks)
@@ -40,7 +41,7 @@ def conduct(equations: Equations, hooks: Tag, fixes: list[Fix], dt: float) -> No
     if np.any(free):
         change[free] = direct(A[free][:, free], (balance - K @ change)[free])
     new = mapped + change
-    # Fixes get the temperature that nodes would have without them, and publish the heat supplied.
+    # Fixes get the temperature that nodes would have without fixes, and publish the heat supplied.
     without = new - np.where(fixed, np.divide(
         A @ change - balance, stored, out=np.zeros(len(nodes)), where=some), 0.0)  # fmt: skip
     update[nodes, 0], update[nodes, 1] = without, without - T

@@ -17,13 +17,13 @@ from karamelo_py.kernels.equations.loss import FrictionalHeat
 from karamelo_py.run.implicit.equations import Equations
 
 STIFF = 1e3  # stiffness of the penalty spring / stiffness of a cell of the softer body
-LIGHT = 0.01  # fraction of an inner node's mass below which there is no contact
-SLIPPERY = 0.05  # the same, below which there is no friction
+LIGHT = 0.01  # fraction of an inner node's mass below which a node has no contact
+SLIPPERY = 0.05  # fraction below which it has no friction
 CLOSE = 1e-4  # gap in cells below which contact is assumed at first
 
 
 class Contact:
-    """Pairs (c) of nodes where bodies meet.
+    """Pairs of nodes where bodies meet; c is the number of pairs.
 
     `first`, `second` (c,) are indices of unknown nodes, `normal` (c, d) points to the second body,
     `close` (c,) masks pairs in contact before the step, `push` (c,) and `drag` (c, d) are normal
@@ -52,7 +52,7 @@ class Contact:
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
         h = float(np.min(s.grids.spacing))
-        self.gap[self.touched()] = 0  # pairs in contact have no gap, regardless of the measured one
+        self.gap[self.touched()] = 0  # contact is closed, whatever gap was measured
         self.close = (self.gap <= CLOSE * h) | self.touched()
         ones, at = np.ones(count), np.arange(count)
         m = len(nodes)
@@ -63,7 +63,10 @@ class Contact:
         self.respond(np.zeros((m, self.d)), supposed=True)
 
     def meet(self, nodes: np.ndarray) -> None:
-        """Suppose that the nearest pairs of a body, with `nodes` (m,), are closed if none is."""
+        """Assume that the closest pairs of a body are in contact, if none of its pairs is.
+
+        `nodes` (m,) are the nodes of the body.
+        """
         own = (nodes[self.first] | nodes[self.second]) & (self.stiffness > 0)
         if np.any(own) and not np.any(self.close[own]):
             near = CLOSE * float(np.min(self.s.grids.spacing))
@@ -101,7 +104,8 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and derivatives of the forces.
 
-        If `supposed`, contact and sticking are as in the last step, as `u` is not yet known.
+        With `supposed`, `u` is not yet known, and the contact and sticking of the last step are
+        assumed.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -151,7 +155,7 @@ class Contact:
         return (self.jumps.T @ C @ self.jumps).tobsr((d, d))
 
     def constraints(self, motions: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Return the constraints (r, k) of closed pairs on rigid `motions` (m, d, k)."""
+        """Return the rows (r, k) by which closed pairs constrain the rigid `motions` (m, d, k)."""
         rows = []
         for nodes in (self.first, self.second):
             chosen = self.close & mask[nodes]
@@ -170,8 +174,9 @@ class Contact:
     def accelerated(self, a: np.ndarray, v: np.ndarray, inverse: np.ndarray) -> np.ndarray:
         """Add the effect of contact at the beginning of the step to accelerations `a` (m, d).
 
-        Pairs in contact that approach get no relative normal acceleration, pairs that stuck no
-        relative acceleration at all; other pairs slide with the velocities `v` (m, d).
+        Approaching pairs in contact get zero relative normal acceleration. Pairs that stuck get
+        zero relative acceleration in all directions; other pairs slide with the velocities `v` (m,
+        d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # other pairs may separate

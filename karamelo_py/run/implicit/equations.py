@@ -25,8 +25,8 @@ from karamelo_py.run.implicit.solvers import rigid_motions
 from karamelo_py.scene.modify import Fix
 
 BATCH = 8192  # points assembled at a time
-MOST_MOVED = 0.5  # relative displacement towards other nodes in cells, per cell of distance
-# Arrays of the second list are reused while arrays of the first do not change.
+MOST_MOVED = 0.5  # displacement relative to other nodes, in cells per cell of distance
+# The arrays FOLLOWING are reused while the arrays FOLLOWED do not change.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 
@@ -35,7 +35,7 @@ def valid(seen: loops.Seen) -> np.ndarray:
 
 
 def interpolation(seen: Iterable[loops.Seen], nodes: int) -> sp.csr_matrix:
-    """Weights (n, nodes) of the nodes at all points of some blocks."""
+    """Return the weights (n, nodes) of the nodes at all points of some blocks."""
     counts, weights, numbers = [np.zeros(1, np.int32)], [np.zeros(0)], [np.zeros(0, np.int32)]
     for one in seen:
         some = valid(one)
@@ -50,7 +50,7 @@ def interpolation(seen: Iterable[loops.Seen], nodes: int) -> sp.csr_matrix:
 def summed(
     weights: sp.csr_matrix, blocks: Sequence[Block], values: Iterable[np.ndarray]
 ) -> np.ndarray:
-    """Nodal sums (m, k) of mass times values (k, n) of the points of each block."""
+    """Return nodal sums (m, k) of mass times the values (k, n) of the points of each block."""
     if not blocks:
         return np.zeros((weights.shape[1], 1))
     mass = sp.diags(np.concatenate([block.points.mass for block in blocks]))
@@ -79,7 +79,7 @@ class Moduli(NamedTuple):
 
 
 class Equations:
-    """Forces at the nodes of a step, and their derivatives.
+    """Nodal forces of a step, and their derivatives.
 
     `nodes` (m,) are the nodes in stencils of points. `mass` (m,) is 0 at nodes with gradients only,
     `places` (m, d) are grid indices, `per_node` is the number of unknowns per node (d, and one for
@@ -166,7 +166,7 @@ class Equations:
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
 
-        Pairs of the ghost stabilisation, and of each node with itself, are included.
+        The pairs include those of the ghost stabilisation, and each node with itself.
         """
         d, k, m = self.d, self.per_node, len(self.nodes)
         ways = (x[seen.nodes] for x in self.places.T for seen, _ in self.parts)
@@ -230,8 +230,8 @@ class Equations:
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
         """Return the largest displacement, in cells, of a node into nodes that move differently.
 
-        These nodes differ in displacement (m, d) by more than rotation or strain in a step allows,
-        or are `fixed` (nodes, d) and have no points.
+        A node moves differently if its displacement (m, d) differs by more than a step's rotation
+        or strain allows, or if it is `fixed` (nodes, d) and has no points.
         """
         cells = u[:, : self.d] / self.s.grids.spacing[self.grid][:, None]
         far, k = np.nonzero(np.abs(cells) > MOST_MOVED)
@@ -267,7 +267,7 @@ class Equations:
 
     @cached_property
     def weights(self) -> sp.csr_matrix:
-        """Weights (n, m) of the nodes at the points of all blocks."""
+        """Return the weights (n, m) of the nodes at the points of all blocks."""
         return interpolation((seen for seen, _ in self.parts), len(self.nodes))
 
     @cached_property
@@ -285,7 +285,7 @@ class Equations:
 
     @cached_property
     def levers(self) -> np.ndarray:
-        """Return lengths (m, k) per unit of the unknowns: 1, or the radius for an angle."""
+        """Return lengths (m, k) per unit of the unknowns: 1, or the radius for angles."""
         levers = np.ones((len(self.nodes), self.per_node))
         levers[:, self.d :] = self.positions[:, :1]
         return levers
@@ -359,8 +359,8 @@ class Equations:
     def ghost(self, moduli: "Moduli") -> sp.csr_matrix:
         """Return the matrix (m, m) that penalises jumps of gradients at the border of bodies.
 
-        It is in units of the mean modulus. The modulus at a node is the mean over its points by
-        volume; a difference has the smallest modulus of its nodes.
+        The matrix is in units of the mean modulus. The modulus at a node is the mean over its
+        points by volume; a difference uses the smallest modulus of its nodes.
         """
         lines, size, D = self.differences
         weights = size**self.d
@@ -380,8 +380,9 @@ class Equations:
     def differences(self) -> tuple[np.ndarray, np.ndarray, sp.csr_matrix]:
         """Return second differences at borders of bodies: nodes (n, 3), cells (n,), matrix (n, m).
 
-        With a linear basis they are the jumps of gradients across faces of border cells (Coombs
-        2023). Splines have no such jumps, but the differences stabilise their border nodes, too.
+        With a linear basis, second differences are the jumps of gradients across faces of border
+        cells (Coombs 2023). Splines have no such jumps, but the differences stabilise their border
+        nodes, too.
         """
         d, places = self.d, self.places
         touched = np.zeros((int(self.grid.max()) + 1, *(places.max(0) + 2)), bool)

@@ -13,7 +13,7 @@ from karamelo_py.schemes.newmark import Surplus
 
 
 class Rest:
-    diagonal = 0.0  # added to the stiffness, per nodal mass
+    diagonal = 0.0  # term added to the stiffness, per nodal mass
 
     def __init__(self, equations: Equations):
         self.blocks = equations.blocks
@@ -90,7 +90,7 @@ class Motion:
         return forces - self.mass * np.where(self.fixed, a, self._demand(a))
 
     def _demand(self, a: np.ndarray) -> np.ndarray:
-        """Forces per mass (m, d), at the end of the step, that balance accelerations `a` there."""
+        """Return the forces per mass (m, d) at the end of the step that balance `a` there."""
         weighted = (1 - self.am) * a + self.am * self.a
         return (weighted - self.af * self.of_forces) / (1 - self.af)
 
@@ -98,7 +98,7 @@ class Motion:
         return float(np.linalg.norm(self.mass * self.acceleration(u)))
 
     def work(self, u: np.ndarray, reaction: np.ndarray) -> float:
-        """Work done at held nodes in this step, with the mean of the forces at its two ends.
+        """Return the work at held nodes in this step, by the mean of the initial and final forces.
 
         For a linear body under the trapezoidal rule, it equals the change of the energy. `reaction`
         (m, d) are the forces of the fixes at the end.

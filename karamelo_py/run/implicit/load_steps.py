@@ -41,7 +41,7 @@ from karamelo_py.schemes.quasi_static import PUBLISHED
 from karamelo_py.script.errors import Mark, ScriptError
 
 SUBSTEP_HALVINGS = 10
-LONG_WAY = 1.0  # path of a point in a step, in cells, for a warning
+LONG_WAY = 1.0  # path of a point in a step, in cells, above which a warning is given
 
 
 class PointsWrong(Exception):
@@ -49,7 +49,7 @@ class PointsWrong(Exception):
 
 
 class NoEquilibrium(Exception):
-    """A load step has no equilibrium; some substeps may have been taken."""
+    """A load step has no equilibrium, though some of its substeps may have been taken."""
 
 
 class LoadSteps:
@@ -60,8 +60,8 @@ class LoadSteps:
         self.moduli: Moduli | None = None
         self.cached: dict[str, np.ndarray] = {}  # arrays of the last equations
         self.parts = 0
-        self.failure = ""  # reason why a step has no equilibrium
-        self.unknowns = self.corrections = 0  # number in the last equilibrium; number in all steps
+        self.failure = ""  # reason why no equilibrium was found
+        self.unknowns = self.corrections = 0  # of the last equilibrium; in all steps
         self.seconds: dict[str, float] = {}  # time by stage
 
     def advance(self, hooks: Tag, count: int) -> int:
@@ -189,7 +189,7 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         simulation.steps.load_step(dt)
         try:
-            # These sums also give the capacities for heat flow, which changes the stress.
+            # These sums also contain the capacities for heat flow. Heat changes the stress.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             loaded = simulation.hooks if self.dynamic else None
             loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
@@ -198,7 +198,7 @@ class LoadSteps:
                 self._conduct(hooks, dt)
             after = self._forces(hooks)
             if loads is not None:
-                # The work of loads is done by their mean in the step, as in Newmark's rule.
+                # The work of loads uses their mean over the step, as in Newmark's rule.
                 loaded.loads[:] = 0.5 * (loads + loaded.loads)
             equilibrium = self._equilibrium(hooks, dt, before if self.dynamic else None, after)
             self._tell_of_long_way(equilibrium)
@@ -245,7 +245,7 @@ class LoadSteps:
             torque[:] = 0
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        # Otherwise prescribed velocities would be differences to the last step.
+        # Otherwise prescribed velocities would be relative to the last step.
         with simulation.steps.altered(last_dt=0.0):
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
@@ -259,8 +259,8 @@ class LoadSteps:
     ) -> "Equilibrium":
         """Find the displacements at which forces balance.
 
-        `before` (None without inertia) and `after` are the nodal forces of the present stress with
-        the loads at the beginning and at the end of the step.
+        `before` and `after` are the nodal forces of the present stress, with the loads at the
+        beginning and at the end of the step; `before` is None without inertia.
         """
         simulation = self.simulation
         s = simulation.setup
@@ -346,7 +346,8 @@ class LoadSteps:
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at their nodes, and set nodal velocities.
 
-        A fix gets the velocity that nodes would have without it. Other forces act on rigid solids.
+        A fix gets the velocity that nodes would have without it. On rigid solids, all other forces
+        act.
         """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update
@@ -497,4 +498,4 @@ class ImplicitSimulation(Simulation):
         return self.load_steps.advance(hooks, count)
 
     def compile(self) -> None:
-        """Newton's method needs no compiled step."""
+        """Do nothing: Newton's method needs no compiled step."""

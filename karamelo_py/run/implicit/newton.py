@@ -17,9 +17,9 @@ from karamelo_py.run.implicit.rigid_bodies import MovingBodies
 from karamelo_py.run.implicit.tools import PushingTool
 from karamelo_py.script.errors import plural
 
-ROUNDING = 50 * float(np.finfo(float).eps)  # relative, for sums of some dozens of terms
+ROUNDING = 50 * float(np.finfo(float).eps)  # round-off of sums of some dozens of terms, relative
 SINGULAR = "the equations are singular"
-ASTRAY = 1e4  # displacement / largest allowed one above which the solution has diverged
+ASTRAY = 1e4  # displacement / largest allowed displacement above which the solution has diverged
 
 
 @contextmanager
@@ -40,11 +40,11 @@ class Failed(Exception):
 
 
 class TooFar(Failed):
-    """Points would move `at` times as far as is allowed in a step."""
+    """Points would move `at` times as far as a step allows."""
 
 
 class Loose(Failed):
-    """The equations are singular: node `at` is hardly held."""
+    """The equations are singular: node `at` is not held, or hardly."""
 
 
 class Wrong(Failed):
@@ -83,7 +83,7 @@ class Newton:
         self.spacing = float(np.min(equations.s.grids.spacing))
         self.ghost: sp.csr_matrix | None = None
         self.stiff = np.zeros_like(external)  # diagonal of the last matrix
-        self.kept: dict = {}  # data of the solver that are reused in the next correction
+        self.kept: dict = {}  # data of the solver that can be reused in the next correction
         self.seepage: Seepage | None = None
         self.bodies: MovingBodies | None = None
         with counted(seconds, "stress"):
@@ -152,7 +152,7 @@ class Newton:
         return float(np.linalg.norm((forces / self.lever)[free]))
 
     def _rounding(self, u: np.ndarray) -> float:
-        """Estimate the round-off of forces, due to strains (relative to 1) and to `u`."""
+        """Estimate the round-off of forces, from strains (relative to 1) and from `u`."""
         far = np.abs(u) + self.spacing / self.lever
         return ROUNDING * self._norm(self.stiff * far, self.free)
 

@@ -34,7 +34,7 @@ from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
 
 OUTLET = 1e3  # conductance of a seepage face / conductance of its cells
-CAVITATION = -1e5  # Pa
+CAVITATION = -1e5  # Pa relative to the atmosphere: vacuum
 NUMBERS = "n", "drag", "K", "rho", "suction"
 EPS = 50 * float(np.finfo(float).eps)
 
@@ -46,7 +46,8 @@ def is_wet(equations: Equations) -> bool:
 class Seepage:
     """Nodal pressures `p` (m,) of a step, and their equations.
 
-    Arrays of points have an entry per point with water, in the order of `wet` (blocks, stencils).
+    Arrays of points have one entry per point with water, in the order of `wet`, a list of pairs
+    (block, stencils).
     """
 
     def __init__(self, equations: Equations, hooks: Tag, dt: float):
@@ -95,7 +96,7 @@ class Seepage:
             per_mass = np.array([float(specific_volume(one)) for one in records])[of]
             M = np.array([_modulus(one.law, kin) for one in records])[of]
             numbers = [law.n, law.K, law.rho, law.suction, mobility, M, grids.spacing[points.grid]]
-            content = state.content / law.rho  # a volume
+            content = state.content / law.rho  # volume of the water
             columns.append((per_mass * points.mass, content, state.pores, *numbers))
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
         self.V0, self.content, self.pores, self.n, self.K, self.rho, *more = every
@@ -103,7 +104,7 @@ class Seepage:
         self.drains = self.suction < self.K
         ratio = self.content / self.pores
         self.before = self._scale(ratio - 1) * np.log(ratio)
-        # Weight and mobility are computed for the water in full pores.
+        # Weight and mobility are those of water that fills the pores.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)
@@ -138,7 +139,7 @@ class Seepage:
             self.rate = sum(g.T @ sp.diags(slope * (g @ self.p - f)) @ self.N for g, f in pairs)
 
     def _flux(self) -> np.ndarray:
-        """Return the volume (m,) given to nodes; store the mass flow rate, as `MakeFlux` does."""
+        """Return the volume (m,) supplied to nodes; store mass flow rates, as `MakeFlux` does."""
         flux = field(self.equations.s.nodes.fields, GivenFlux)
         if flux is None:
             return np.zeros(self.m)
@@ -232,7 +233,7 @@ class Seepage:
     def _change(self, step: np.ndarray) -> None:
         """Add a change of the pressures.
 
-        In unsaturated soil, the change is made linearly in the saturation exp(p/a).
+        In unsaturated soil, p changes such that the saturation exp(p/a) changes linearly.
         """
         a, whole = self.softest, self.p + step
         S = np.exp(np.minimum(self.p, 0) / a)
@@ -241,11 +242,11 @@ class Seepage:
         self.p = np.where((a < np.inf) & (left < 1), dried, whole)
 
     def cavitates(self) -> bool:
-        """Return whether water in full pores is below -1 bar."""
+        """Return True if water in full pores is below -1 bar."""
         return bool(np.any(((self.N @ self.p) < CAVITATION) & ~self.drains))
 
     def end(self, fixes: Iterable[Fix]) -> None:
-        """Store the water of the points; let fixes publish what has left through their nodes."""
+        """Store the water of the points; fixes publish the water that left through their nodes."""
         first = 0
         for block, seen in self.wet:
             some = slice(first, first := first + len(seen.count))

@@ -16,15 +16,15 @@ from karamelo_py.run.implicit.equations import Equations
 from karamelo_py.run.state import SceneState
 from karamelo_py.styles.fixes.rigid_body import WAYS, RigidBody, bodies_of
 
-WEAK = 1e-9  # relative size below which constraints hold nothing
-UNSUPPORTED = 1e-2  # fraction of a load; a ball meets few nodes at first
+WEAK = 1e-9  # relative size of a constraint below which it holds nothing
+UNSUPPORTED = 1e-2  # tolerated unsupported fraction of a load; a ball touches few nodes at first
 
 
 class LoadedBody:
     """Motion of one body, its `nodes` (n,) among the nodes of the equations, and the loads on it.
 
-    `motions` (n, d, 6) are velocities of the nodes per unit of the body's velocity and spin,
-    `ways` (k,) its unknown components. `led` (6,) is the prescribed velocity and spin.
+    `motions` (n, d, 6) are nodal velocities per unit of the body's velocity and spin. `ways` (k,)
+    are indices of its unknown components. `led` (6,) is the prescribed velocity and spin.
     """
 
     def __init__(self, fix: RigidBody, body: motion.FreeBody, equations: Equations):
@@ -49,7 +49,7 @@ class LoadedBody:
     def finish(
         self, q: np.ndarray, forces: np.ndarray, blocks: tuple[Block, ...], control: Control
     ) -> None:
-        """Move the body by `q` (6,), publish, and let its points move with it in this step."""
+        """Move the body by `q` (6,), publish its values, and move its points in this step."""
         fix, body, dt, d = self.fix, self.body, float(control.values[DT]), forces.shape[1]
         state, work = fix.state[0], body.solution
         total = np.einsum("ncw,nc->w", self.motions, forces[self.nodes])
@@ -67,7 +67,7 @@ class LoadedBody:
 
 
 class MovingBodies:
-    """Unknown motions (k) of all free bodies, within Newton's method."""
+    """The k unknown motions of all free bodies, within Newton's method."""
 
     def __init__(self, equations: Equations, simulation: SceneState):
         hub, tags = simulation.hub, simulation.setup.bodies.bodies
@@ -97,17 +97,17 @@ class MovingBodies:
         return float(np.linalg.norm(forces / self.lever))
 
     def couple(self, contact: sp.spmatrix, free: np.ndarray, balance: np.ndarray) -> None:
-        """Take the stiffness of contact (n, n) and the forces left (m, d) at all nodes."""
+        """Store the stiffness of contact (n, n) and the unbalanced forces (m, d) at all nodes."""
         below = self.T.T @ contact
         unknown = sp.diags(free.ravel().astype(float))
         own = (below @ self.T).tocsr()
-        # Directions without contact have no load, and do not move.
+        # Regularise directions without contact, which have no load.
         weak = max(WEAK * float(np.abs(contact.data).max(initial=0.0)), 1e-300) * self.lever**2
         self.parts = unknown @ contact @ self.T, below @ unknown, own + sp.diags(weak)
         self.left = self.rest(balance)
 
     def solve(self, A: sp.spmatrix, b: np.ndarray, kept: dict) -> np.ndarray:
-        """Solve with the motions of the bodies; return the changes of displacements (m, d)."""
+        """Solve together with the motions of the bodies; return changes of displacements (m, d)."""
         right, below, own = self.parts
         whole = sp.bmat([[A, right], [below, own]]).tocsr()
         x = solvers.direct(whole, np.concatenate([b, self.left]), kept)
@@ -132,9 +132,9 @@ class MovingBodies:
         return [one.fix.body.id for one in self.bodies if np.any(np.isin(one.nodes, nodes))]
 
     def loose(self, contact: Contact) -> tuple[str, str] | None:
-        """Let bodies meet what is near; return a solid and a direction not held.
+        """Return a solid and a direction in which it is loaded but not held, or None.
 
-        Directions without load or contact need not be held.
+        A body without contact is assumed to touch the closest nodes of other bodies.
         """
         first = 0
         for one in self.bodies:

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import MatrixRankWarning, SuperLU, splu
 
-AMG_FROM = 5000  # unknowns above which multigrid is faster than a direct solver
+AMG_FROM = 5000  # unknowns above which multigrid is faster than the direct solver
 AMG_FROM_IN_3D = 2000
 MANY_ITERATIONS = 25  # iterations above which the hierarchy is built again
 
@@ -20,7 +20,7 @@ class Singular(Exception):
 
 
 class Unconverged(Exception):
-    """Multigrid has reduced the residual by less than a factor of 100."""
+    """Multigrid has reduced the residual by a factor below 100."""
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
@@ -50,11 +50,11 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # before the next factors, which take most of the memory
+    release(kept)  # before the next factorisation, which takes most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
-            # The transposed matrix by columns has the arrays of B, which is by rows.
+            # The transpose in column format has the same arrays as B in row format.
             factors = splu(B.T, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
         except (RuntimeError, MatrixRankWarning):
             raise Singular from None
@@ -82,10 +82,10 @@ def amg(
 ) -> np.ndarray:
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
-    `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones: the near null space
-    for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final residual over
-    b. To build the hierarchy takes most of the time, so it is stored in `kept` and reused for
-    similar matrices as long as few iterations are needed.
+    `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones. They are the near
+    null space for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final
+    residual / b. Most of the time is spent building the hierarchy, so it is stored in `kept` and
+    reused for similar matrices while few iterations are needed.
     """
     import pyamg
 
@@ -130,7 +130,7 @@ def from_one_seed() -> Iterator[None]:
     np.random.seed(0)
     try:
         yield
-    except ValueError:  # a coarse matrix has infinite numbers
+    except ValueError:  # a coarse matrix is not finite
         raise Unconverged from None
     finally:
         np.random.set_state(state)
@@ -153,7 +153,7 @@ def solve(
 
 
 def rigid_motions(positions: np.ndarray, free: int) -> np.ndarray:
-    """Return rigid motions (m, d, k) of nodes; translations from direction `free` on."""
+    """Return rigid motions (m, d, k) of nodes, with translations from direction `free` on."""
     m, d = positions.shape
     x = positions - positions.mean(0)
     motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(free, d)]

@@ -1,4 +1,4 @@
-"""Free rigid bodies, and unsupported combinations."""
+"""Free rigid bodies, and scenes in which they are not supported."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ from karamelo_py.styles.fixes.rigid_body import (
 from karamelo_py.styles.fixes.rigid_links import contacts, joints
 from karamelo_py.styles.methods.base import LOADS, slots_of_loads
 
-APART = 1e-3  # distance in cells of a point from its position in a rigid body, well above round-off
+APART = 1e-3  # tolerated distance of a point from its position in a rigid body, in cells
 
 
 def lower_bodies(hub: Hub, lattices: Sequence[Lattice]) -> kernel.FreeBodies:
@@ -94,9 +94,9 @@ def _formulas(hub: Hub, fix: RigidBody) -> motion.Formulas:
 
 
 def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
-    """Raise ScriptError for bodies whose points are not at the positions by the fix.
+    """Raise ScriptError if points of a body are not where its fix has put them.
 
-    Warn of rigid solids that rotate without a fix, as their points move along straight lines.
+    Warn of rigid solids that rotate without a fix, because their points move along straight lines.
     """
     count, d = sum(solid.count for solid in hub.solids.values()), hub.domain.dimension
     x, v = np.full((2, count, d), np.nan)
@@ -109,7 +109,7 @@ def check_bodies(hub: Hub, blocks: Sequence[Block], now: int) -> None:
         body = fix.body
         present = x[body.first_id : body.first_id + body.count]
         away = np.abs(present - fix.rigid_positions()).max()
-        if not away <= APART * hub.domain.h:  # also for NaN, of deleted points
+        if not away <= APART * hub.domain.h:  # also if NaN, as for deleted points
             message = f"points of '{body.id}' are not at the position stored by its fix"
             if np.isnan(away):
                 message = f"points of '{body.id}' are missing"
@@ -159,14 +159,14 @@ def _refuse(hub: Hub, moving: list[RigidBody]) -> None:
 
 
 def _driven(hub: Hub, moving: list[RigidBody]) -> set:
-    """Return the bodies on which loads act, directly or through contacts and joints."""
+    """Return the bodies that loads move, directly or through contacts and joints."""
     driven = set()
     for fix in moving:
         if fix.has_load or np.any(fix.state.v) or np.any(fix.state.spin) or surfaces_of(fix):
             driven.add(fix.body)
     links = [fix.linked for fix in (*contacts(hub), *joints(hub))]
     for joint in joints(hub):
-        if joint.spring and joint.spring[2] is not None:  # initial extension
+        if joint.spring and joint.spring[2] is not None:  # initial extension of a spring
             driven.update(joint.linked)
     driven -= {None}  # the ground
     while more := {s for some in links if driven & set(some) for s in some} - driven - {None}:

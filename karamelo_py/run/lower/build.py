@@ -222,7 +222,8 @@ def lower(
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
     """Make the arrays of a run from the scene, with the `previous` state of existing points.
 
-    With `ids` (first, end), they contain only these points, with tiles of a process of `comm`.
+    With `ids` (first, end), the arrays contain only these points, and the tiles of this process of
+    `comm`.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method
@@ -297,9 +298,9 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 
 
 def returns_loss(hub: Hub) -> bool:
-    """Return whether kinetic energy that the transfer dissipates heats points.
+    """Return True if kinetic energy that the transfer dissipates heats points.
 
-    FLIP 1 without moments dissipates only energy that vanishes as the step goes to 0. For XPIC see
+    The loss of FLIP 1 without moments vanishes as the step goes to 0. For XPIC see
     `kernels.equations.loss.reflect`.
     """
     transfer = hub.update.transfer
@@ -384,7 +385,7 @@ def lower_points(
     count = int(ends[-1])
 
     def joined(values: Iterable, dtype: type) -> np.ndarray:
-        """Join values of solids (numbers, columns or values per point) to (n,) or (k, n)."""
+        """Join values of solids (numbers, columns or per point) into an array (n,) or (k, n)."""
         array = np.empty(0)
         for s, end, value in zip(solids, ends, map(np.asarray, values), strict=True):
             if not array.size:

@@ -85,7 +85,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
     Without `setup`, checks that need arrays are skipped.
     """
     scheme = hub.update.scheme
-    from karamelo_py.run.gpu import Card  # the import registers rows of steps
+    from karamelo_py.run.gpu import Card  # registers rows of steps
 
     rows = scheme.rows if setup is None else table.plain(scheme.rows, setup)
     for kind in untaken(rows, Card):

@@ -105,7 +105,7 @@ def _one(setup: Setup) -> Number:
 
 @contextmanager
 def _trial(hub: Hub, plugin: PartInUse) -> Iterator[None]:
-    """Report faults of a plug-in, but not invalid results for sample numbers."""
+    """Report faults of a plug-in, but ignore invalid results that sample numbers cause."""
     with attributed(hub, plugin), np.errstate(all="ignore"):
         try:
             yield
@@ -142,7 +142,7 @@ def _numbers(plugin: PartInUse, name: str, values: Iterable, one: Number) -> Non
 def try_law(
     hub: Hub, material: Material, kin: Tag = None, law: Tag = None, one: Number = 1.0
 ) -> None:
-    """Try a plug-in's law in its solid, or in a unit cell at 293 K."""
+    """Try a plug-in's law: in its solid, or in a unit cell at 293 K."""
     kinds = laws.law_kind(material.law)
     if not any(map(registry.is_foreign, kinds)):
         return

@@ -55,7 +55,7 @@ def lower_hooks(
         rigid_fields=builder.rigid_fields,
         torques=hub.values.torques,
         mode=mode or Serial(),
-        # Padded, so that threads do not write to a common cache line.
+        # Padded, so that threads do not write to the same cache line.
         apart=arrays.Apart(
             chosen=np.zeros((copies, BLOCK), np.int64),
             scratch=np.zeros((copies, STACK + ROWS + 1, BLOCK)),
@@ -82,7 +82,7 @@ def is_wet(hub: Hub) -> bool:
 
 
 class Programs:
-    """Code and constants of formulas, one after another."""
+    """Code and constants of all formulas, one after another."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -115,7 +115,7 @@ class _Builder:
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
-        self.whole: list[Tag] = []  # hooks that get whole points
+        self.whole: list[Tag] = []  # hooks of whole points
         self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:
@@ -141,7 +141,7 @@ class _Builder:
         after_contact = late and fix.brakes and apart
         stage = arrays.POST_CONTACT if after_contact else STAGES[moment]
         self.rows.append((address, stage, begin, end, slot, *uses))
-        whole = hook.tag is not None  # functions for all directions
+        whole = hook.tag is not None  # functions of all directions at once
         formulas_of_hook = (Expression(0.0) if f is None and whole else f for f in fix.formulas)
         programs = list(map(self.formulas.add, formulas_of_hook))
         programs += [NO_PROGRAM] * (FRICTION - len(programs))
@@ -224,10 +224,12 @@ class ActingFixes:
 
 
 def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | NodesView) -> None:
-    """Call a hook; if each process calls it for its points, check that processes agree.
+    """Call a Python hook.
 
-    If their collective calls differed, processes would deadlock; if published values differ, they
-    are partial sums.
+    If each process calls it for its own points, check that all processes agree.
+
+    With different collective calls, processes would deadlock; published values that differ are
+    partial sums.
     """
     with blaming(fix.mark):
         hook(view)
@@ -259,7 +261,7 @@ def _on_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
 
 
 def _on_heat_nodes(hooks: ActingFixes, s: Setup, stage: int, target: int) -> None:
-    # In this view, temperature and capacity take the positions of velocity and mass.
+    # In this view, temperature and capacity are stored as velocity and mass.
     nodes = s.heat.nodes._replace(fields=s.nodes.fields)
     _on_nodes(hooks, s._replace(nodes=nodes), stage, target)
 
@@ -331,7 +333,7 @@ def _sets_initial_state(fix: Fix) -> bool:
 class FixesOfRun(NamedTuple):
     once: list[Fix]  # fixes that set the initial state
     new: list[Fix]
-    first: ActingFixes | None  # fixes of the first step, if some act only in this step
+    first: ActingFixes | None  # fixes of the first step, if some act only in it
     lasting: ActingFixes
 
     @property

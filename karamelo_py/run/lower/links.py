@@ -17,8 +17,8 @@ from karamelo_py.styles.fixes.rigid_body import RigidBody
 from karamelo_py.styles.fixes.rigid_links import ContactBodies, Joint, contacts, joints
 
 ROUNDED = 0.05  # radius of balls in corners, in cells
-BLUNT = 0.95  # cosine between normals of faces above which their edge needs no balls
-MOST = 20_000  # number of contacts at a time
+BLUNT = 0.95  # cosine between normals of faces above which the edge between them needs no balls
+MOST = 20_000  # largest number of contacts at a time
 OVERLAP = 0.1  # cells by which bodies may overlap at the start
 
 
@@ -55,7 +55,7 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
             still = not (free[[one.body, other.body]] >= 0).any()
             twice = _is_ball(one.shape) and _is_ball(other.shape) and a > b
             if still or twice or {fix.parts[a].solid, fix.parts[b].solid} in apart:
-                one = one._replace(balls=one.balls[:0])  # for equal kernels
+                one = one._replace(balls=one.balls[:0])  # without balls, but with the same kernel
             sign = 1 if a == 0 else -1 if b == 0 else 0
             slots = np.array([slot, int(hub.values.torques[slot]), sign])
             touch = kernel.Meeting(one, other, np.array([fix.mu, fix.restitution]), slots)
@@ -143,8 +143,8 @@ def _is_ball(shape: Tag) -> bool:
 def balls_of(region: Region, h: float) -> np.ndarray:
     """Return balls (n, 4), centre and radius, that touch the surface of `region` from inside.
 
-    A disk or sphere is one ball. Other shapes have small balls in convex corners, and in 3D at
-    distances of a cell along edges and on round faces.
+    A disk or sphere is one ball. In other shapes, small balls are placed in convex corners and, in
+    3D, at intervals of a cell along edges and on round faces.
     """
     d, shape = region.dimension, region.outline()
     if _is_ball(shape):
@@ -242,7 +242,7 @@ def _faces(shape: Tag) -> Iterator[np.ndarray]:
 
 
 def _in_corners_of(faces: np.ndarray, radius: float, h: float) -> np.ndarray:
-    """Return positions below corners of `faces` (m, d, d), in 3D below sharp edges."""
+    """Return ball centres below the corners of `faces` (m, d, d); in 3D, below sharp edges."""
     m, d = len(faces), faces.shape[2]
     side = faces[:, 1:] - faces[:, :1]
     normals = (

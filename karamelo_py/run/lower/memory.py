@@ -1,6 +1,7 @@
-"""Memory of a scene or of a process's part of it; scenes that do not fit are refused.
+"""Memory of a scene, or of the part on one process; a scene that does not fit is refused.
 
-Only the minimum that a run needs is compared, so that no scene is refused that could run.
+The minimum that a run needs is compared with the memory, so a scene that could run is never
+refused.
 """
 
 import gc
@@ -65,7 +66,7 @@ def _held(item: object, seen: set[int]) -> int:
 def bytes_in(spans: np.ndarray, array: np.ndarray) -> int:
     """Return the bytes of array rows in ascending spans (k, 2).
 
-    For large arrays, Linux uses pages of 2 MiB, which may include gaps between nodes in use.
+    For large arrays, Linux uses pages of 2 MiB; these may include nodes not in use.
     """
     row = array.nbytes // max(len(array), 1)
     page = PAGE if array.nbytes >= LARGE else row
@@ -98,7 +99,7 @@ def bytes_per_point(simulation: SceneState) -> int:
     return round(np.dot(counts, of_one) / max(1, sum(counts)))
 
 
-FITS_EVERYWHERE = 100_000  # points of a scene that fits into any machine
+FITS_EVERYWHERE = 100_000  # points of a scene that fits into the memory of any machine
 
 
 def check_room(hub: Hub, *, copied: bool) -> None:
@@ -108,7 +109,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         return
     need = comm.share_here * least_bytes(hub, PRECISIONS[hub.settings.precision], copied)
     if need > memory.free:
-        # Earlier scenes are in reference cycles.
+        # Free earlier scenes, which are in reference cycles.
         gc.collect()
         memory = machine_memory(comm.on_machine) or memory
     if need <= memory.free:
@@ -130,7 +131,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def _ways(hub: Hub, need: float, free: float, copied: bool) -> str:
-    # Two digits, rounded up.
+    # Factor for the cell size, two digits, rounded up.
     larger = ceil(10 * (need / max(free, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)
@@ -152,7 +153,7 @@ def least_bytes(hub: Hub, real: type, copied: bool) -> float:
         sizes = {name: size for name, _, size in point_fields(block)}
         of_one = sum(sizes.values())
         points += solid.count * (of_one + (of_one - sizes["x moved"] if copied else 0))
-        ppc = solid.ppc  # without it the number of cells is unknown
+        ppc = solid.ppc  # without ppc, the number of cells is unknown
         cells.append(solid.count / ppc**solid.domain.dimension if ppc else 0.0)
     d, per_cell = kin.dimension, hub.update.method.basis.traits.nodes_per_cell**kin.dimension
     of_node = np.dtype(real).itemsize * (

@@ -1,4 +1,4 @@
-"""Pore water of a material, and unsupported combinations."""
+"""Pore water of a material, and scenes in which it is not supported."""
 
 from typing import NamedTuple
 
@@ -54,7 +54,7 @@ class PoreWater(NamedTuple):
         return 1 + self.n * self.rho / dry
 
     def time_scale(self, solid: Solid, duration: float) -> str:
-        """Return words for the drainage of a solid in a time, along its shortest side."""
+        """Describe the drainage of a solid along its shortest side in a time `duration`."""
         law, kin = solid.material.whole, Space()
         M = wave_speed_squared(law, kin, initial_state(law, kin, 1.0)) / specific_volume(law)
         consolidation = M * self.stiffness / (M + self.stiffness) / self.drag

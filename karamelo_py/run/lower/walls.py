@@ -44,10 +44,10 @@ def with_walls(fixes: list[Fix], lattices: list[Lattice], basis: NamedTuple) -> 
 
 
 def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Yield directions of walls, and the cells (n, d) above walls in this direction.
+    """Yield each direction with walls, and the cells (n, d) on the upper side of these walls.
 
-    A face is a wall if all its nodes are held, except inside a block of held nodes, where the next
-    faces on both sides are held, too. The ends of the grid are always walls.
+    A face is a wall if all its nodes are held. Faces inside a block of held nodes, with held faces
+    on both sides, are not walls. The ends of the grid are always walls.
     """
     d = lattice.dimension
     places = lattice.places(nodes)[:, :d]
@@ -62,7 +62,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
         wall = face.copy()
         wall[1:-1] &= ~(face[:-2] & face[2:])
         cell = np.argwhere(np.moveaxis(wall, 0, k)) + corner
-        # Not next to the ends of the grid: a stencil of three nodes does not fit into one cell.
+        # Omit cells at the ends of the grid: the stencil of three nodes does not fit into one cell.
         cell = cell[(cell[:, k] > 0) & (cell < lattice.cells[:d]).all(axis=1)]
         if len(cell):
             yield k, cell
@@ -71,7 +71,7 @@ def _walls(lattice: Lattice, nodes: np.ndarray) -> Iterator[tuple[int, np.ndarra
 def mark_sides(hub: Hub, s: Setup) -> None:
     """Mark the nodes at edges of grids, and the nodes that fixes hold in this run (`Sides`)."""
     sides = field(s.nodes.fields, Sides)[:, 0]
-    if sides.any():  # otherwise nothing is written, as pages that are never written take no memory
+    if sides.any():  # pages take no memory until they are written
         sides[:] = 0
     for fix in hub.fixes.values():
         for k, formula in enumerate(fix.formulas if fix.prescribes_velocity else ()):

@@ -1,6 +1,6 @@
 """Division of tiles among processes, and messages between the processes.
 
-Nodes in reach of several processes are summed by each of these, in the same order.
+If several processes reach a node, each of them computes its sum, in the same order.
 """
 
 from collections.abc import Sequence
@@ -61,10 +61,11 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
 
 
 IMBALANCE = 1.1  # factor by which a new division must reduce the largest work
-# Ratio of lengths above which bodies are cut along long tiles. Rows with gaps are half as fast.
+# Ratio of lengths above which bodies are cut along long tiles. Loops over rows with gaps are half
+# as fast.
 ROWS = 4
 OF_TILES = ("number", "range", "grid", "box", "rows")
-FINE = 1000  # integers per unit of cost
+FINE = 1000  # the cost of a tile is an integer, in this fraction of a unit
 
 
 class Needs(NamedTuple):
@@ -73,7 +74,7 @@ class Needs(NamedTuple):
     hi: np.ndarray  # (k, d)
 
     def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
-        """Return the overlap with boxes (m, d) in tiles (m,): indices, first and last nodes."""
+        """Return overlaps with boxes (m, d) in tiles (m,): indices, first nodes, last nodes."""
         at = np.minimum(np.searchsorted(self.tile, tile), len(self.tile) - 1)
         low, high = np.maximum(begin, self.lo[at]), np.minimum(end, self.hi[at])
         which = np.flatnonzero((self.tile[at] == tile) & (low <= high).all(axis=1))
@@ -141,7 +142,7 @@ class SharedTiles(Tiles):
 
     def migrate(self, s: Setup, costs: np.ndarray) -> Setup:
         tiles = [self.tiles_of(s, block.points) for block in s.blocks]
-        # The nodes in reach are known from the last sort.
+        # Use the nodes in reach at the last sort.
         loads = self.loads(s.blocks)
         loads[:-1] = [np.bincount(of, minlength=self.count) for of in tiles]
         self.balance(work_of(loads, costs))
@@ -184,7 +185,7 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
-            give_up(old)  # so that only one field has two copies at a time
+            give_up(old)  # frees it, so that only one field has two copies at a time
             for parts in come:
                 parts[i] = None
         return made_of(points, arrays)
@@ -321,7 +322,7 @@ class SharedTiles(Tiles):
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        # A node is counted by the first process that uses it.
+        # The first process that uses a node counts it.
         self.foreign[self._marked] = 0
         nodes, me = [self._marked[:0]], self.comm.rank
         if self._looks_beyond:

@@ -17,7 +17,7 @@ from karamelo_py.run.tiles import SHARES
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.styles.fixes.pairs import SENT
 
-MAY_CHANGE = 1.25  # largest number of points of a process divided by the mean
+MAY_CHANGE = 1.25  # threshold of (largest number of points of a process) / mean
 
 
 class ProcessShare(NamedTuple):

@@ -25,10 +25,10 @@ LEARN_EVERY = 100  # steps between checks of the load balance
 
 
 class Load:
-    """Time in sweeps over the points of each block, and in everything else except waiting."""
+    """Measured time of sweeps over the points of each block, and of all other work."""
 
     def __init__(self, blocks: int):
-        # Cost per step of a point, by block, and of a node in reach.
+        # Cost per step of a point of each block, and of a node in reach.
         self.costs = np.append(np.ones(blocks), 0.0)
         self._spent = np.zeros((2, blocks + 1), np.int64)  # nanoseconds; points times steps
         self._rest = self._at = blocks
@@ -75,7 +75,7 @@ class Subdomain(WholeDomain):
         self.load = Load(len(s.blocks))
         self.control = s.control
         self.at_once = False  # published values are summed in each step
-        self.due: set[int] = set()  # otherwise: slots to be summed after the last step
+        self.due: set[int] = set()  # slots that are summed only after the last step
         linked = Linked(address_of_python(self.answer, ranks.CALL), self.tiles.foreign)
         simulation.setup = s._replace(control=s.control._replace(ranks=linked))
         self._counted_at = self._learned_at = int(s.control.values[TIMESTEP])
@@ -174,7 +174,7 @@ class Subdomain(WholeDomain):
         simulation, tiles = self.simulation, self.tiles
         s = simulation.setup
         motion = s.control.motion[0]
-        sorted_next = motion.drift > motion.drift_limit  # a sort divides the scene anew
+        sorted_next = motion.drift > motion.drift_limit  # a sort may move the boundaries
         due = abs(simulation.step - self._learned_at) >= LEARN_EVERY
         due = due and not (tiles.direct or sorted_next)
         if not due or not tiles.balance(partition.work_of(tiles.loads(s.blocks), self.learn())):
@@ -211,7 +211,7 @@ class Subdomain(WholeDomain):
             self.comm.allreduce_max(self.control.answer[:a])
         elif request == ranks.NUMBER:
             return int(self.comm.allreduce(np.array([a]))[0])
-        return 0  # other requests only note the time
+        return 0  # other requests only record the time
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)

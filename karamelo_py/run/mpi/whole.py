@@ -21,7 +21,7 @@ from karamelo_py.script.errors import Quit
 
 
 class PointsMoved(Exception):
-    """A Python fix has moved points to other processes, so the step must begin again."""
+    """A Python fix has moved points to other processes, so the step must start again."""
 
 
 class Whole:
@@ -35,7 +35,7 @@ class Whole:
     def act(self, function: Callable[[Setup], None]) -> None:
         """Call a function of the whole scene on rank 0, and send its changes to all ranks.
 
-        Raises `PointsMoved` if it moved points; the step must then begin again.
+        Raises `PointsMoved` if the function moved points; the step must then start again.
         """
         simulation, comm = self.simulation, self.simulation.comm
         self.gather()
@@ -121,7 +121,7 @@ class Whole:
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
-            array[nodes] = 0  # also nodes that no box reaches
+            array[nodes] = 0  # including nodes that no box reaches
         memory = self.subdomain.memory()
         for share in parts:
             for (_, array), rows in zip(of_nodes(whole), share["at nodes"], strict=True):
