@@ -42,8 +42,8 @@ def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
 NEXT_TO_NOTHING = 1e-9  # fraction of a step
 ROUNDING = 1e-6  # fraction of a step: round-off of a million additions
 
-# If dt drops suddenly (set_dt), the dt of the contact stiffness decreases by this fraction per
-# step, so that loaded springs stiffen over several periods.
+# If dt drops suddenly (set_dt), the dt of the contact stiffness decreases by this fraction of the
+# new dt per step, so that loaded springs stiffen over several periods.
 FOLLOWING = 0.01
 STILL = 0.25  # path in cells after which the smaller stable step for crossing cells applies
 # Cells that a point may move in a step if the step ignores a common drift.

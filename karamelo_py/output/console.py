@@ -14,8 +14,8 @@ from typing import Any, TextIO
 # Seconds between redraws of the bar, and between progress lines in a pipe.
 REDRAW = 0.1
 REPORT = 10.0
-# Rich redraws the bar after every line, in 0.25 ms. After BURST lines at intervals below QUICK
-# seconds, lines are written together every LINES seconds.
+# Rich redraws the bar after every line, which takes 0.25 ms. After BURST lines at intervals below
+# QUICK seconds, lines are collected and written every LINES seconds.
 QUICK = 0.02
 BURST = 8
 LINES = 0.05
@@ -123,7 +123,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show progress, and the activity `within` a step; may be called in every step.
+        """Show progress, and the activity `within` a step. May be called in every step.
 
         `fraction` is None if the end is unknown (run_until, run_while).
         """
@@ -188,7 +188,7 @@ def _print(stream: TextIO, text: str) -> None:
     try:
         stream.write(text + "\n")
     except UnicodeEncodeError:
-        # The encoding of the stream (a pipe of Windows) may lack characters.
+        # The encoding of the stream (such as a pipe on Windows) may lack characters.
         encoding = stream.encoding or "ascii"
         stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()

@@ -83,7 +83,7 @@ class Fields(PointTable):
         return Rows(setup, parts, np.arange(len(present)), present, comm)
 
     def members(self, group: PointGroup) -> np.ndarray:
-        """Return the 0-based ids of existing points."""
+        """Return the numbers of existing points, from 0."""
         present = self.simulation.present
         ids = np.arange(len(present)) if group.all else group.ids
         return ids if present.all() else ids[present[ids]]
@@ -119,11 +119,11 @@ class Fields(PointTable):
         return PointTable(self.hub, Rows(self.setup, parts, ids, np.ones(len(ids), np.bool_)))
 
     def added_up(self, owner: Grouped, name: str = "terms", *arguments: object) -> np.ndarray:
-        """Sum terms exactly over the points of the group of `owner`.
+        """Sum terms exactly over the points in the group of `owner`.
 
-        ``owner.name(points, *arguments)`` is called with tables of some points. It returns terms
-        (k, n) of k sums, or the number of sums, the index (n,) of the sum of each term, and terms
-        (n,).
+        ``owner.name(points, *arguments)`` is called with tables of some points. It returns either
+        terms (k, n) of k sums, or three values: the number of sums, the index (n,) of the sum to
+        which each term belongs, and terms (n,).
         """
         limbs = np.empty((0, LIMBS), np.int64)
         for some in self.some(owner.group):
@@ -140,7 +140,7 @@ class Fields(PointTable):
             for k in range(count):
                 add_all(limbs, k, np.ascontiguousarray(terms[k], float))
         totals = self.comm.allreduce(limbs)
-        # A quantile has thousands of sums, most of which are 0.
+        # A quantile uses thousands of sums, most of which are 0.
         return np.array([rounded(total) if total.any() else 0.0 for total in totals])
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Return numbers of points within `half` (n, d) of one of `x` (n, d) along all axes."""
+        """Return numbers of points within `half` (n, d) of any of `x` (n, d) along all axes."""
         size, numbers = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -217,7 +217,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*point_table.COLUMNS, *of_scene]))
 
     def shown_names(self) -> list[str]:
-        """Names of columns, then of groups and solids (1 for their points, else 0)."""
+        """Return the names of columns, then of groups and solids."""
         return [*self.particle_names(), *point_table.named_sets(self.hub)]
 
     def node_names(self) -> list[str]:
@@ -225,7 +225,7 @@ class Fields(PointTable):
         return list(dict.fromkeys([*node_columns.COLUMNS, *of_scene]))
 
     def rate_is_asked_for(self) -> bool:
-        """Return whether a dump or compute uses ``epdot``, which points then store."""
+        """Return True if a dump or compute uses ``epdot``, which points then store."""
         askers = [*self.hub.dumps.values(), *self.hub.computes.values()]
         return any("epdot" in asker.columns for asker in askers)
 
@@ -288,7 +288,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Return the initial energy of a gas, to which stored energy is relative, for more digits."""
+    """Return the initial energy of a gas, which is subtracted from the stored one for precision."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
@@ -310,7 +310,7 @@ SUMMED = {
 class ColumnFormula:
     """Script argument: a formula of dump columns, groups and solids, time and values.
 
-    Groups and solids are 1 for their points, else 0.
+    The name of a group or solid is 1 for its points, 0 for other points.
     """
 
     script_kind = "a condition of columns of dump particle, such as damage > 0.9"
@@ -394,6 +394,6 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
             last = name[-1].translate(str.maketrans("123", "xyz"))
             error.alike = f"u{last}" if last in "xyz" else "ux"
             error.hint = f"did you mean '{error.alike}'?"
-    if name[:2] in ("v_", "c_"):  # names of LAMMPS
+    if name[:2] in ("v_", "c_"):  # as in LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error

@@ -96,7 +96,7 @@ def savefig(figure: Any, path: Path) -> None:
     import matplotlib
 
     ending = picture_format(path)
-    # Reproducible bytes need no date, and a fixed salt for the ids of SVG.
+    # Reproducible files need no date, and a fixed salt for the ids in SVG.
     undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(ending)
     with matplotlib.rc_context({"svg.hashsalt": "karamelo-py"}), unwarned(), whole(path) as file:
         figure.savefig(file, format=ending, metadata=undated)
@@ -162,7 +162,7 @@ class Frames:
         from PIL import Image
 
         first, *others = (Image.open(BytesIO(frame)) for frame in self._frames)
-        hundredths = max(2, round(100 / self.fps))  # viewers show frames below 2/100 s more slowly
+        hundredths = max(2, round(100 / self.fps))  # viewers slow frames below 2/100 s down
         first.save(
             file,
             format="GIF",
@@ -184,18 +184,18 @@ class Frames:
 
 
 class Claim:
-    """Lock of a folder or file that one program writes, until `release` or the program's end."""
+    """Lock of a folder or file that one program writes, until `release` or the program ends."""
 
     def __init__(self, handle: int):
         self.release = weakref.finalize(self, os.close, handle)
 
 
-# By device and inode: all simulations of a process have the same claim.
+# Claims by device and inode, so that all simulations of a process use the same one.
 _held: weakref.WeakValueDictionary[tuple[int, int], Claim] = weakref.WeakValueDictionary()
 
 
 def claim(path: Path) -> Claim | None:
-    """Lock a path, if the system supports it; return None if another program has locked it."""
+    """Lock a path, if the system supports locks; return None if another program has locked it."""
     try:
         import fcntl
 

@@ -1,7 +1,8 @@
-"""Read HDF5 files that are open or damaged, or were left open by a killed program.
+"""Read HDF5 files that are open, damaged, or not closed because the program was killed.
 
-The HDF5 library opens them only in SWMR mode, in which it retries damaged data for minutes to
-years. Here the header is changed as if the file were closed (HDF5 File Format 3.0, II.A, VII.B).
+The HDF5 library opens such files only in SWMR mode, in which it retries damaged data for minutes to
+years. This module presents the file with a header that says it is closed (HDF5 File Format 3.0,
+II.A, VII.B).
 """
 
 from __future__ import annotations
@@ -16,15 +17,15 @@ from typing import Any
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, addresses: 44 bytes
-_NEW = (2, 3)  # versions with such a header
+_NEW = (2, 3)  # versions that have such a header
 _MASK = 0xFFFFFFFF
 
 
 @contextmanager
 def reading(path: Path) -> Iterator[Any]:
-    """Open a file for reading, with its present content.
+    """Open a file for reading, with the content that it has now.
 
-    Raises OSError if it is not HDF5, truncated or damaged.
+    Raises OSError if it is not HDF5, or is truncated or damaged.
     """
     import h5py
 

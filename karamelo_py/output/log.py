@@ -23,7 +23,7 @@ class Log(Rhythmic):
 
     It can be read by ``numpy.loadtxt("log.mpm", skiprows=1)`` or ``pandas.read_csv("log.mpm",
     sep=r"\\s+")``. Later runs append rows. If the columns change, a comment line (``#``) lists the
-    new ones. In log.csv there are commas between the columns.
+    new ones. In log.csv, commas separate the columns.
     """
 
     remembers = ("_header", "_end")
@@ -33,12 +33,12 @@ class Log(Rhythmic):
         self.every: int | ByTime = 1
         self.file = Path(FILE)
         self.is_asked_for = False
-        self.columns: list[Quantity] = []  # empty: step, dt, time
+        self.columns: list[Quantity] = []  # empty for step, dt, time
         self.last_step: int | None = None
         self._file: TextIO | None = None
         self._claims: list[Claim] = []
         self._is_kept = True
-        # Headings and numbers of each row, if a Python program reads them.
+        # Headings and numbers of each row, if a Python program reads them; otherwise None.
         self.rows: list[tuple[list[str], list[float]]] | None = None
         self._header: str | None = None
         self._end = 0
@@ -72,7 +72,8 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # The blank is for a minus sign, except in the first column, for pandas.
+        # The blank is for a minus sign. The first column has none, since pandas would read it as a
+        # column.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
         self._put(cells)
@@ -85,7 +86,7 @@ class Log(Rhythmic):
     def close(self) -> None:
         if self._file is not None:
             file, self._file, self._claims = self._file, None, []
-            with reported(self.path, "the log file "):  # tries again to write a line that failed
+            with reported(self.path, "the log file "):  # writes a line that has failed again
                 file.close()
 
     def _go_on(self) -> None:

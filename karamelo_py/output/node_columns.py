@@ -18,14 +18,14 @@ from karamelo_py.points.laws import can, constrained_velocity
 
 
 class NodeTable(NamedTuple):
-    """Columns of nodes with consecutive numbers; nodes without mass are at rest."""
+    """Columns of nodes with consecutive numbers. Nodes without mass are at rest."""
 
     hub: Scene
     ids: np.ndarray
     kin: Any
     arrays: dict[str, np.ndarray]  # arrays by name, as in restart files
-    brought: dict[str, np.ndarray]  # sums over points, by names in `BROUGHT`
-    loaded: dict[str, int]  # number of nodes with mass, by ID of fixes with a total force
+    brought: dict[str, np.ndarray]  # sums over points, by their name in `BROUGHT`
+    loaded: dict[str, int]  # number of nodes with mass, by ID of the fixes with a total force
 
     def node(self, name: str) -> np.ndarray:
         if name == "T" and self.hub.update.thermal:
@@ -74,8 +74,8 @@ def _among(members: np.ndarray, nodes: NodeTable) -> np.ndarray:
 def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
     """Return the kind of each node along one axis, as in Karamelo.
 
-    With splines it is -2 at the lower edge and -1 next to it, 2 and 1 likewise at the upper edge.
-    With Bernstein functions it is 1 in the middle of a cell. Otherwise it is 0.
+    With splines, the kind is -2 at the lower edge and -1 next to it, 2 at the upper edge and 1 next
+    to it. With Bernstein polynomials, it is 1 in the middle of a cell. Otherwise it is 0.
     """
     basis = nodes.hub.update.method.basis
     splines = type(basis).__name__ in ("QuadraticSpline", "CubicSpline")
@@ -92,7 +92,7 @@ def kind_of_node(axis: int, nodes: NodeTable) -> np.ndarray:
 
 
 def load(axis: int, nodes: NodeTable) -> np.ndarray:
-    """Return loads of fixes on nodes, and of fixes on points as mapped by the basis."""
+    """Return the loads of fixes on nodes, and the loads on points mapped to nodes by the basis."""
     hub = nodes.hub
     out = nodes.brought[f"b{AXES[axis]}"].copy()
     if axis >= hub.domain.dimension:
@@ -128,7 +128,7 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
     }
 
 
-# None: only certain scenes have the column; otherwise it is 0.
+# None: the column exists in certain scenes; in other scenes it is 0.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
@@ -172,9 +172,10 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 
 
 def brought(simulation: Any, name: str) -> np.ndarray:
-    """Return sums of N times a value over points of this process, (nodes, 2).
+    """Return sums (nodes, 2) of N times a value over the points of this process.
 
-    The sum of both columns, multiples of a unit and a remainder, has more digits than a double.
+    The columns are a multiple of a unit and a remainder, so that their sum has more digits than a
+    double.
     """
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))

@@ -10,10 +10,10 @@ from contourpy import contour_generator
 
 FINE = 300  # steps along the longest side of a tool's outline
 # For sections of 3D tools: search points per axis, steps along a section, bisections to find the
-# ends of the tool, sections between them.
+# ends of the tool, sections between the ends.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of angles between face normals
-# Smallest and largest sample for the point spacing; distances per batch.
+# Smallest and largest number of points from which the spacing is measured; distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # depth (n,) in a tool at positions (n, d)
@@ -40,7 +40,7 @@ class Tool(NamedTuple):
 
 
 def outlines(x: np.ndarray) -> list[np.ndarray]:
-    """Return lines (m, 2) around points x (n, 2), where they fill half of the area.
+    """Return lines (m, 2) around points x (n, 2), along which points fill half of the area.
 
     Points are spread over three cells, so that nodes at the surface get half as much as inner ones.
     """
@@ -69,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return sums at nodes of linear weights of points at `at` (in cells)."""
+    """Return nodal sums of the linear weights of points at `at` (in cells)."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -92,7 +92,7 @@ def smoothed(values: np.ndarray) -> np.ndarray:
 
 
 def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.ndarray]:
-    """Return lines (m, 2) of zero depth between corners `lo` and `hi` (2,), by `fine` steps."""
+    """Return lines (m, 2) of zero depth between corners `lo` and `hi` (2,), on `fine` steps."""
     steps = np.ceil(fine * (hi - lo) / (hi - lo).max()).astype(int)
     x, y = (np.linspace(*ends) for ends in zip(lo, hi, steps + 1, strict=True))
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -103,8 +103,8 @@ def zeros(depth: Depth, lo: np.ndarray, hi: np.ndarray, fine: int) -> list[np.nd
 def section_lines(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> Iterator[np.ndarray]:
     """Yield lines (m, 3) on the surface of a tool between two corners (3,).
 
-    They are sections normal to each axis, at the ends, where faces meet, and between them if the
-    surface is curved. For a box they are its edges, for a ball circles.
+    The lines are sections normal to each axis: at the ends, where faces meet, and between these if
+    the surface is curved. A box gives its edges, a ball circles.
     """
     lattice = _lattice_around(depth, lo, hi)
     for axis in range(3) if lattice else ():
@@ -126,7 +126,7 @@ def _on_lattice(depth: Depth, axes: list[np.ndarray]) -> np.ndarray:
 
 
 def _lattice_around(depth: Depth, lo: np.ndarray, hi: np.ndarray) -> _Lattice | None:
-    """Return depths on a lattice close around the surface between corners (3,), or None."""
+    """Return depths on a lattice around the surface between two corners (3,), or None."""
     for _ in range(3):
         axes = [np.linspace(*ends, COARSE) for ends in zip(lo, hi, strict=True)]
         depths = _on_lattice(depth, axes)
@@ -160,12 +160,15 @@ def _ends(depth: Depth, lattice: _Lattice, axis: int) -> list[float]:
 def _sections(
     depth: Depth, lattice: _Lattice, axis: int, ends: list[float], cuts: tuple[float, float]
 ) -> Iterator[np.ndarray]:
-    """Yield lines (m, 3) on the surface normal to an axis, except on planes `cuts` that end it."""
+    """Yield lines (m, 3) on the surface, in planes normal to an axis.
+
+    Lines on the planes `cuts`, where the surface is cut off, are omitted.
+    """
     others = [k for k in range(3) if k != axis]
     lo, hi = lattice.lo[others], lattice.hi[others]
     heights = np.linspace(ends[0], ends[1], BETWEEN + 2)
     apart = (heights[1] - heights[0]) / 2 * np.eye(3)[axis]
-    # A section at an end is taken a step further inside.
+    # A section at an end is taken one step inside the tool.
     step = (hi - lo).max() / SECTION
     inset_of = {ends[0]: min(step, apart.sum() / 2), ends[1]: -min(step, apart.sum() / 2)}
     for height in heights:
@@ -186,12 +189,12 @@ def _sections(
 
 
 def edges(faces: np.ndarray) -> np.ndarray:
-    """Return sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections across slight bends."""
+    """Return sharp edges (n, 2, 3) of triangles (m, 3, 3), and sections of curved surfaces."""
     corner = np.unique(faces.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(-1, 3)
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     sides = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(sides.T)  # makes equal sides neighbours
+    order = np.lexsort(sides.T)  # equal sides become neighbours
     shared = (sides[order[:-1]] == sides[order[1:]]).all(axis=1)
     first, second = order[:-1][shared], order[1:][shared]
     cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))

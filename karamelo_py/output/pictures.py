@@ -43,13 +43,13 @@ MARGIN = 4
 MARKS = 1 << 16
 MOST_CELLS = 1 << 23
 HIDDEN = (0.0, 0.0, 0.0, 0.25)
-# Diameter of the circle with the area of a unit square.
+# Diameter of a circle with the area of a unit square.
 ROUND = np.sqrt(4 / np.pi)
-STEPS = (1, 2, 2.5, 5, 10)  # intervals of ticks / a power of ten
-# Direction to the light: right, up, towards the viewer.
+STEPS = (1, 2, 2.5, 5, 10)  # intervals of ticks / power of ten
+# Direction towards the light: right, up, towards the viewer.
 LIGHT = np.array([-0.35, 0.6, 0.72])
 AMBIENT = 0.5
-LIT = 8  # number of points above which a body has a surface
+LIT = 8  # number of points from which on a body has a lit surface
 
 
 Window = Sequence[tuple[float | None, float | None]]
@@ -59,7 +59,7 @@ class Options(NamedTuple):
     column: str
     label: str
     solids: tuple[str, ...] = ()
-    limits: tuple[float | None, float | None] = (None, None)  # None: widened by the values
+    limits: tuple[float | None, float | None] = (None, None)  # None: widened to include the values
     symmetric: bool = False  # limits symmetric about 0
     cmap: str = "viridis"
     azimuth: float = -60.0
@@ -93,7 +93,7 @@ class DrawnPoints(Artist):
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # an image also in .pdf and .svg, as viewers cannot show so numerous circles
+        if many:  # .pdf and .svg get an image, as viewers cannot show so numerous circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.draw(self.rows[:, first : first + MARKS])
@@ -109,7 +109,7 @@ class DrawnPoints(Artist):
 class Picture:
     """Axes, labels and colour bar, with the points of a state on top.
 
-    Drawing the axes takes most of the time, so their pixels are stored until the limits change.
+    Most of the time is spent drawing the axes, so their pixels are stored until the limits change.
     """
 
     def __init__(self, domain: Any, size: tuple[float, float], dpi: int, options: Options):
@@ -135,17 +135,17 @@ class Picture:
         self._add_legend()
 
     cuts = False
-    _prepare: Callable[[], Any]  # returns the artist of the points
-    # Rows of visible points among x (n, 3), in drawing order.
+    _prepare: Callable[[], Any]  # returns the artist that draws the points
+    # Function that returns the rows of the visible points among x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
     draw: Callable[[np.ndarray], None]
     _apply_limits: Callable[[float, float], None]
 
     def _apply_beyond(self, below: bool, above: bool) -> None:
-        """Draw arrows at the ends of the colour bar that values exceed."""
+        """Draw arrows at the ends of the colour bar beyond which there are values."""
 
     def _name_lengths(self, axis: Axis, name: str) -> None:
-        """Label an axis in a unit that suits the numbers; without a unit, in a power of 1000."""
+        """Label an axis in a unit that suits the numbers; without units, in a power of 1000."""
         factor, name = self._lengths_as(name)
         if factor != 1:
             axis.set_major_formatter(FuncFormatter(lambda value, _: _number(value * factor)))
@@ -252,7 +252,7 @@ class Picture:
         self.canvas.restore_region(self._background)
         self.axes.draw_artist(self.title)
         self.axes.draw_artist(self.marks)
-        # Pictures are opaque, so three channels suffice.
+        # Three channels suffice, as pictures are opaque.
         pixels = np.asarray(self.canvas.buffer_rgba())[:, :, :3]
         image = Image.fromarray(np.ascontiguousarray(pixels))
         image.save(file, format="PNG", compress_level=compression)
@@ -261,13 +261,13 @@ class Picture:
         """Reserve space for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
-        for _ in range(2):  # twice, as the aspect ratio moves the axes
+        for _ in range(2):  # twice, since the aspect ratio moves the axes
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
-            if axes is not self.axes:  # a colour bar, not taller than the axes
+            if axes is not self.axes:  # the axes of a colour bar, which must not be taller
                 bar, box = axes.get_position(), self.axes.get_position()
                 high = min(bar.height, box.height)
                 low = box.y0 + (box.height - high) / 2
@@ -295,7 +295,7 @@ class Picture:
 def grown(limits: tuple[float, float] | None, values: np.ndarray) -> tuple[float, float]:
     """Return limits widened to include the finite values.
 
-    They are rounded outwards to multiples of 2^k / 8, so that they change rarely.
+    Limits are rounded outwards to multiples of 2^k / 8, so that they change rarely.
     """
     finite = values[np.isfinite(values)]
     lo, hi = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -377,7 +377,7 @@ class PlanePicture(Picture):
             shown = ScalarMappable(self.norm, self.options.cmap)
             bar = self.figure.colorbar(
                 shown, ax=self.axes, shrink=0.8,
-                ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # for decades
+                ticks=MaxNLocator(7, steps=STEPS, integer=self.options.log),  # whole powers of ten
                 format=FuncFormatter(_power if self.options.log else _number),
             )  # fmt: skip
             bar.set_label(self.options.label, fontsize=self.options.fontsize)
@@ -397,7 +397,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # A minimum size, larger if there are few points.
+        # Use a minimum size, which is larger if there are few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])
@@ -485,7 +485,8 @@ class SpacePicture(PlanePicture):
         places = self._project(x)
         shows = np.flatnonzero(self._shows(places, side))
         ids, places, values = ids[shows], places[shows], values[shows]
-        # Sort from far to near, then by id. Bits of negative floats are in the order of magnitude.
+        # Sort from far to near, then by id. As integers, the bits of negative floats are ordered by
+        # magnitude.
         bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
         keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
         rows = super()._rows(keys, places, values, side)
@@ -494,7 +495,7 @@ class SpacePicture(PlanePicture):
         return np.vstack([rows, self._light(x, side, shows)[np.argsort(keys)]])
 
     def _shows(self, places: np.ndarray, side: float) -> np.ndarray:
-        """Return a mask of points that are not completely hidden, such as the surface of a body."""
+        """Return a mask of points that are not completely hidden, such as those at the surface."""
         # The circle of a point covers the adjacent cells, and lies within three cells.
         low, high = np.transpose([self.axes.get_xlim(), self.axes.get_ylim()])
         cell = side * self.options.pointsize / 5
@@ -508,7 +509,7 @@ class SpacePicture(PlanePicture):
             Front(self._project(x), low, high, max(side / 3, (high - low).max() / (2 * FINE)), 2)
             for x in bodies
         ]
-        groups = []  # by tool: projected lines, their heights, the surface that hides others
+        groups = []  # by tool: projected lines, their heights, the surface that hides other tools
         for front in fronts:
             if lines := front.outlines():
                 seen = np.concatenate(lines)
@@ -538,7 +539,10 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Return the light on `some` points; the normal points to the side with fewer points."""
+        """Return the light on `some` points.
+
+        The normal of the surface points to the side with fewer points.
+        """
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

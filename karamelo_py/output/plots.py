@@ -1,4 +1,4 @@
-"""Plots of logged quantities; the style of all plots."""
+"""Plots of logged quantities, and the style of all plots."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -105,12 +105,12 @@ def blank_figure(width: float, height: float) -> Any:
 
 
 def in_mathtext(lead: str, exponent: int) -> str:
-    """Format lead x 10^exponent; a `lead` of 1 is omitted."""
+    """Format lead x 10^exponent, without a `lead` of 1."""
     return rf"${lead}\cdot10^{{{exponent}}}$" if lead else f"$10^{{{exponent}}}$"
 
 
 def tick_texts(numbers: Sequence[float], power: Callable = in_mathtext) -> list[str]:
-    """Format all numbers of an axis in one way: as 0.02, 500, or as 10^-7, 3·10^-7."""
+    """Format all numbers of an axis in one way: either like 0.02, 500 or like 10^-7, 3·10^-7."""
     plain = all(a == 0 or 1e-4 <= abs(a) < 1e5 for a in numbers)
     return [f"{a:g}" if plain or a == 0 else power(*_parts(a)) for a in numbers]
 

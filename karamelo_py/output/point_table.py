@@ -56,7 +56,7 @@ class Rows(NamedTuple):
     parts: list[Part]
     ids: np.ndarray
     present: np.ndarray
-    comm: Any = None  # communicator of the processes that have parts of the table
+    comm: Any = None  # communicator of the processes that hold parts of the table
 
     def of_all(self, local: list[tuple]) -> Iterator[tuple]:
         if self.comm is None:
@@ -82,7 +82,7 @@ class Rows(NamedTuple):
     def declared(self, kind: type) -> np.ndarray | None:
         """Return a declared field (n, components), or None if no block stores it.
 
-        Points whose law lacks the field have its initial values.
+        Points whose law lacks the field get its initial values.
         """
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
@@ -92,11 +92,11 @@ class Rows(NamedTuple):
         return self._filled(field, local)
 
     def computed(self, of: Callable[[Block], Callable | None], *columns: int) -> np.ndarray:
-        """Return values (n, *columns) of ``of(laws)(matter, rows)``; 0 if ``of(laws)`` is None."""
+        """Return values (n, *columns) of ``of(laws)(matter, rows)``, 0 if ``of(laws)`` is None."""
         local, s = [], self.s
         for piece in self.parts:
             points = known_to_laws(piece.points)
-            # Not for empty arrays, whose different type would be compiled again.
+            # Skip empty arrays: their type differs, so the function would be compiled again.
             if len(points.id) and (fill := of(piece.block.laws)):
                 rows = np.zeros((len(points.id), *columns))
                 fill(Matter(s.kin, points, piece.block.laws), rows)
@@ -105,7 +105,7 @@ class Rows(NamedTuple):
 
 
 class PointTable:
-    """Arrays and columns of points in order of ids: copies, with 0 for deleted points."""
+    """Arrays and columns of points, ordered by id: copies, with 0 for deleted points."""
 
     def __init__(self, hub: Scene, rows: Rows):
         self.hub = hub
@@ -113,7 +113,7 @@ class PointTable:
         self._cache: dict[str, np.ndarray] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], np.ndarray]) -> np.ndarray:
-        rows = self._rows  # this access clears the cache after a step
+        rows = self._rows  # clears the cache if a step has been taken
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
@@ -171,7 +171,7 @@ class PointTable:
     def velocity_moment(self) -> np.ndarray | None:
         """Sums of N v (X - x), (n, d d), if the transfer stores them; otherwise None.
 
-        X - x are present vectors: in the total frame, F times the reference vectors.
+        The vectors X - x are present ones: in the total frame, F times the reference vectors.
         """
         rows = self._rows
         have = [
@@ -192,7 +192,7 @@ class PointTable:
         return {name for law in laws for name in columns_of(law)}
 
     def particle(self, name: str) -> np.ndarray:
-        """Return a column (n,) of existing points; 0 if the scene lacks it, as in Karamelo."""
+        """Return a column (n,) of existing points, 0 if the scene lacks it (as in Karamelo)."""
         values, present = self._particle(name), self.present
         return values if present.all() else values[present]
 
@@ -212,7 +212,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # Component 12 is the fourth in 2D, too.
+        # In 2D, component 12 is also the fourth.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -244,13 +244,13 @@ def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.
 
 
 def named_sets(hub: Scene) -> list[str]:
-    """Return names of groups and solids, as columns that are 1 for their points, else 0."""
+    """Return the names of groups and solids, which serve as columns."""
     groups = [name for name, group in hub.groups.items() if group.kind == "particles"]
     return [*groups, *hub.solids]
 
 
 def members(hub: Scene, name: str, numbers: np.ndarray) -> np.ndarray:
-    """Return (n,): 1 for points `numbers` that are in a group or solid, 0 for others."""
+    """Return 1 for each point in `numbers` (n,) that is in the group or solid, else 0."""
     if name in hub.groups:
         return hub.groups[name].has(numbers).astype(float)
     solid = hub.solids[name]
@@ -266,9 +266,11 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Return velocities (d, n), at the time of positions if points store accelerations.
+    """Return velocities (d, n).
 
-    Otherwise velocities are half a step earlier.
+    If points store accelerations, the velocities are at the time of the positions.
+
+    Otherwise they are half a step earlier.
     """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:
@@ -336,12 +338,12 @@ def _exported(k: int, table: PointTable) -> np.ndarray:
 
 
 def _total_stress(k: int, table: PointTable) -> np.ndarray:
-    """Return the stress (n,) of soil and water; p is weighted by saturation (Bishop 1959)."""
+    """Return the total stress (n,) of soil and water; saturation weights p (Bishop 1959)."""
     load = table._particle("saturation") * table._particle("pore_pressure") if k < 3 else 0.0
     return table._exported[:, k] - load
 
 
-# None: only with certain materials or fields; otherwise 0, as in Karamelo.
+# None: the column exists only with certain materials or fields; otherwise it is 0, as in Karamelo.
 COLUMNS: dict[str, Callable[[PointTable], np.ndarray] | None] = {
     "id": lambda table: table.ids,
     "type": lambda table: table.solid + 1,

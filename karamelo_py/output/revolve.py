@@ -1,11 +1,11 @@
-"""Copies of points around the axis y, in 3D."""
+"""Copies of axisymmetric points around the axis y, in 3D."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 FRAME = {"11": (0, 0), "22": (1, 1), "33": (2, 2), "12": (0, 1), "13": (0, 2), "23": (1, 2)}
-# For vectors, by their names in 3D: columns along radius, axis and circumference (None: 0).
+# Components of vectors along radius, axis and circumference (None: 0), by their names in 3D.
 VECTORS = {
     ("x", "y", "z"): ("x", "y", None),
     ("x0", "y0", "z0"): ("x0", "y0", None),
@@ -19,8 +19,8 @@ def revolved(
 ) -> list[np.ndarray]:
     """Return columns (n,) of a copy at an angle from x to z, in 3D.
 
-    `column` returns the columns of the half plane. Positions and tensors are also rotated by the
-    angle of twist, reference positions are not.
+    `column` returns a column of the half plane. Positions and tensors, but not reference positions,
+    are also rotated by the angle of twist.
     """
     made: dict[str, np.ndarray] = {}
     twist = column("twist")

@@ -15,7 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step at or after each multiple of `span`, of which `passed` are done."""
+    """Output at the first step at or after each multiple of `span`; `passed` multiples are done."""
 
     def __init__(self, span: float):
         self.span = span
@@ -54,7 +54,7 @@ class Rhythmic:
 
 
 class Every:
-    """Script argument: a number of steps, or ``time(T)``; int or `ByTime`."""
+    """Script argument: a number of steps (int), or ``time(T)`` (`ByTime`)."""
 
     script_kind = "a whole number above 0, of steps, or time(T)"
 
@@ -78,10 +78,10 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 
 
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
-    """Return the first step that may be due.
+    """Return the first step at which output may be due.
 
-    For an interval in time, and unless dt is `fixed`, it is only half as far as dt predicts, since
-    steps may become longer.
+    For an interval in time and a variable dt, this is only half as far as dt predicts, since steps
+    may become longer.
     """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every

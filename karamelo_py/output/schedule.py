@@ -1,4 +1,4 @@
-"""Schedule of output."""
+"""Schedule of output: log, dumps and plots."""
 
 import os
 import re
@@ -20,8 +20,9 @@ RESTART = "restart"
 class Output:
     """Writes log, dumps and plots when due.
 
-    The first and last state of every run are due, and states at multiples of `every`, in steps or
-    time since the start of the scene. No state is written twice to a file, or in a rehearsal.
+    Output is due at the first and last state of every run, and at multiples of `every`, in steps or
+    time since the start of the scene. No state is written twice to a file, and nothing is written
+    in a rehearsal.
     """
 
     def __init__(self, hub: Scene):
@@ -84,7 +85,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due; at the `last` state of a run, all that has not been written yet."""
+        """Write what is due; at the `last` state of a run, everything not written yet."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time
@@ -166,7 +167,7 @@ def _located(error: ScriptError, mark: Mark | None) -> ScriptError:
 
 
 def _may_be(path: Path, other: Path) -> bool:
-    """Return whether `path`, whose first ``*`` becomes a number, can be the file `other`."""
+    """Return True if `path`, whose first ``*`` becomes a number, may be the file `other`."""
     if "*" not in str(path):
         try:
             return path.resolve() == other.resolve() or path.samefile(other)

@@ -27,7 +27,10 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield snapshots from the `first` on; raises ScriptError if the file is no dump."""
+    """Yield snapshots from number `first` on.
+
+    Raises ScriptError if the file is not a dump.
+    """
     readers: dict[str, Callable[[Path, int], Iterator[Snapshot]]] = {
         ".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd,
     }  # fmt: skip
@@ -39,7 +42,7 @@ def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
         yield from reader(path, first)
     except ScriptError:
         raise
-    except Exception as error:  # damaged files raise exceptions of many kinds
+    except Exception as error:  # damaged files raise many kinds of exceptions
         reason = error.strerror if isinstance(error, OSError) else None
         raise ScriptError(
             f"{path} cannot be read: {reason}"
@@ -81,13 +84,13 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                 yield Snapshot(step, time, columns, *box.T, named)
             elif item[0] == "UNITS":
                 words = file.readline().split()
-                units = Units(*words) if words[0] in LENGTHS else None  # others are LAMMPS's
+                units = Units(*words) if words[0] in LENGTHS else None  # other units are LAMMPS's
             else:
                 file.readline()
 
 
 def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
-    """Add id, type and x, y, z, if necessary from unwrapped (xu) or scaled (xs) positions."""
+    """Add id, type, and x, y, z; these may follow from unwrapped (xu) or scaled (xs) positions."""
     count = len(next(iter(columns.values()), ()))
     columns.setdefault("id", np.arange(1.0, count + 1))
     columns.setdefault("type", np.ones(count))

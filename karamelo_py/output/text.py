@@ -1,9 +1,9 @@
 """Tables of numbers as text, with the bytes of ``"%.9g" % x`` and ``"%d" % n``.
 
 The nine digits of x are the digits of x 10^k, computed in twice the precision of a double. Within
-`DOUBT` of a tie they are undecided, unless 10^k is exact (0 <= k <= 22). Python formats undecided
-and extreme numbers, and all numbers without compilation or on big-endian machines. Surplus digits
-are written and overwritten, which is faster than branches.
+`DOUBT` of a tie the last digit is undecided, unless 10^k is exact (0 <= k <= 22). Python formats
+undecided and extreme numbers; without compilation or on big-endian machines, it formats all.
+Surplus digits are written and then overwritten, which is faster than branching.
 """
 
 import sys
@@ -70,10 +70,10 @@ def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
 def write_rows(table, start, text, at):
     """Write rows up to the first number that Python must format.
 
-    Returns the index of this number (or the count), and the end of the text. `table` consists of
-    the numbers (rows, columns), the same memory as integers, and a mask of integer columns. `start`
-    is the index of the first number, along the rows. `text` has `NUMBER_BYTES` per number, and is
-    written from `at` on.
+    Returns the index of this number (the number of numbers if there is none), and the end of the
+    text. `table` consists of the numbers (rows, columns), the same memory viewed as integers, and a
+    mask of integer columns. `start` is the index of the first number to write, counted row by row.
+    `text` has `NUMBER_BYTES` bytes per number, and is written from index `at` on.
     """
     numbers, integers, is_integer = table
     rows, columns = numbers.shape
@@ -173,7 +173,7 @@ def _decimal(x, binary):
 
 
 def _eight(n):
-    """Return the eight digits of n < 10^8 as bytes, by halving the number three times."""
+    """Return the eight digits of n < 10^8 as bytes, by splitting the number three times."""
     four = n * 109951163 >> 40  # n // 10^4
     word = four | (n - 10_000 * four) << 32
     two = (word * 5243 >> 19) & 0x7F0000007F  # // 100

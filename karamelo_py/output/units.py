@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from math import isclose, log10
 from typing import Any, NamedTuple
 
-# In SI units.
+# Value in SI units.
 LENGTHS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254}
 MASSES = {"kg": 1.0, "t": 1e3, "g": 1e-3, "mg": 1e-6, "ug": 1e-9, "lb": 0.45359237}
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
@@ -25,7 +25,7 @@ DENSITY, VELOCITY, STRESS = Powers(-3, 1), Powers(1, 0, -1), Powers(-1, 1, -2)
 FORCE, ENERGY = Powers(1, 1, -2), Powers(2, 1, -2)
 NAMED = {FORCE: "N", STRESS: "Pa", ENERGY: "J", Powers(2, 1, -3): "W"}
 
-# Dimensions of columns of dumps and words of the log.
+# Dimension of each column of dumps and word of the log.
 COLUMNS = {
     r"[xyz]0?": LENGTH,
     r"v[xyz](_update)?": VELOCITY,
@@ -87,10 +87,10 @@ def time_text(time: float, unit: str) -> str:
 
 
 def suited(unit: str, size: float, units: Mapping[str, float]) -> tuple[float, str]:
-    """Return the factor and name of a metric unit that suits `size`, given in `unit`.
+    """Return the factor and name of a metric unit that suits a `size` given in `unit`.
 
-    It is the largest metric unit in which `size` is at least 0.1, or else the smallest. `unit` is
-    returned with the factor 1 for a size of 0 or from 0.1 to 10^4, and if it is not metric.
+    This is the largest metric unit in which `size` is at least 0.1, or else the smallest. If `size`
+    is 0 or from 0.1 to 10^4, or if `unit` is not metric, `unit` is returned with the factor 1.
     """
     metric = {name: si for name, si in units.items() if isclose(log10(si) % 3, 0, abs_tol=1e-9)}
     if unit not in metric or not size or 0.1 <= size < 1e4:

@@ -1,4 +1,4 @@
-"""VTKHDF files: virtual arrays of HDF5 dumps, for ParaView (VTK File Formats, VTKHDF 2.0)."""
+"""VTKHDF files, which refer to arrays of HDF5 dumps (ParaView; VTK File Formats, VTKHDF 2.0)."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,10 +15,10 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write a file of the name `path` with the ending .vtkhdf, for the points of the dump `path`.
+    """Write a .vtkhdf file next to the dump `path`, for its points.
 
-    It has no data, only views of positions, columns and vectors in the dump. VTK does not draw
-    deleted points, whose positions are NaN.
+    The file has no data, only views of positions, columns and vectors in the dump. VTK does not
+    draw deleted points, as their positions are NaN.
     """
     import h5py
 
@@ -59,7 +59,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
             cells = top.create_group(kind)
             n = count if kind == CELLS[0] else 0
             cells["NumberOfCells"] = cells["NumberOfConnectivityIds"] = [n]
-            if n:  # the numbers 0, 1, ... n; ids of points begin with 1
+            if n:  # 0, 1, ... n, since ids of points begin with 1
                 numbers(cells, "Offsets", "id", 1)
                 numbers(cells, "Connectivity", "id", 1)
             else:

@@ -1,7 +1,7 @@
 """Unstructured grids in VTK's XML format, written in pieces (VTK File Formats, 2015).
 
-A file has one array after another, but rows arrive with all columns. Compressed blocks are stored
-in unnamed temporary files until the last row has arrived.
+A file stores one array after another, but rows arrive with all columns. Therefore compressed blocks
+go to unnamed temporary files until the last row has arrived.
 """
 
 import sys
@@ -18,7 +18,7 @@ KINDS = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
 BLOCK = 1 << 15  # bytes that are compressed together
 COMPRESSION = 4  # takes 33 % of the time of level 6, for slightly larger files
-IN_MEMORY = 1 << 16  # bytes of an array that are stored in memory
+IN_MEMORY = 1 << 16  # bytes of an array that stay in memory
 PIECE = 3 << 16  # bytes that are encoded together, a multiple of 3, so that padding is not needed
 
 
@@ -30,7 +30,7 @@ ARRAYS = {
 
 
 def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
-    """Return arrays whose components are all among the columns `names`, or 0 in this dimension."""
+    """Return arrays whose components are among the columns `names`, or are 0 in this dimension."""
 
     def vanishes(name: str) -> bool:
         axes = {"xyz123".index(axis) % 3 for axis in name[1:]}
@@ -82,7 +82,10 @@ class Column:
 
 
 class Vtu:
-    """Points with columns `names`, and cells; temporary files in `folder` have the same size."""
+    """Points with columns `names`, and cells.
+
+    Temporary files in `folder` take as much space as the file.
+    """
 
     def __init__(self, names: Iterable[str], folder: Path):
         self.points = Column("Points", folder)

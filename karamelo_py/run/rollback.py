@@ -68,7 +68,7 @@ class RollBack:
             self.point.note(always=self._always)
 
     def after(self, status: int) -> bool:
-        """Handle steps that ended with `status`; return False if the run went back."""
+        """Handle steps that ended with `status`; return False after going back to a state."""
         simulation, point = self.simulation, self.point
         if status == STOPPED and boundary.delete_leaving(self.hub, simulation, self._repeat):
             self._keep()

@@ -47,7 +47,7 @@ class Simulation(SceneArrays):
 
     states_every = 100  # steps between stored states
     remedy = "a smaller time step (set_dt, dt_factor)"
-    repeats_steps = True  # steps from a stored state can be repeated; load steps take too long
+    repeats_steps = True  # whether steps from a stored state are repeated; load steps take too long
     implicit = False
     failure = ""  # reason why a load step found no equilibrium
     notes_temperatures = True

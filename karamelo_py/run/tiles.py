@@ -159,7 +159,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        """Return a bound, until the next sort, of the distance in cells from `x` to nodes."""
+        """Return a bound, valid until the next sort, of the distance in cells from `x` to nodes."""
         far = 0.0
         if len(x) > self.dimension:
             at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)

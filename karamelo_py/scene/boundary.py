@@ -34,10 +34,10 @@ RESTRICTIONS = {
 
 
 def delete_leaving(hub: Scene, simulation: Any, repeat: Callable[[], None]) -> bool:
-    """Undo a step in which points left the domain, and delete them; return whether there are any.
+    """Undo a step in which points left the domain, and delete them; return True if there are any.
 
-    `repeat` restores the state before the step. The result is independent of the number of threads
-    and of how a run is divided.
+    `repeat` restores the state before the step. The result does not depend on the number of
+    threads, nor on how a simulation is divided into runs.
     """
     if hub.update.boundary != "delete":
         return False

@@ -1,7 +1,7 @@
 """Volumes and centroids of point boxes clipped at the edge of a region.
 
 The surface in a box is approximated by a plane, fitted to `Region.depth` at the corners and the
-centre. A box in which this is not accurate is halved, up to `HALVED` times.
+centre. Where the plane is not accurate, the box is halved, up to `HALVED` times.
 """
 
 import itertools
@@ -14,35 +14,38 @@ from karamelo_py.scene.region import Region
 
 HALVED = 5  # number of halvings of a box in each direction
 PLANE = 0.01  # tolerated distance of the surface from a plane / box size
-EDGE = 0.05  # the same for the smallest sub-boxes
-SHEET = 0.01  # the same for a surface that may belong to a thin sheet
+EDGE = 0.05  # tolerance for the smallest sub-boxes
+SHEET = 0.01  # tolerance for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off / box size
-# Fraction of a box that consists of smallest sub-boxes with a surface that is not plane: 1/3 of
-# ROUGH at a corner in 2D or an edge in 3D, more in thin sheets.
+# Limit of the fraction of a box in smallest sub-boxes whose surface is not plane. A corner in 2D or
+# an edge in 3D has 1/3 of ROUGH; thin sheets have more.
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # pieces of a box face per direction
-SLOPE = 1e-3  # smaller slopes, relative to the largest, count as 0: sums would lose their digits
+SLOPE = 1e-3  # smaller slopes, relative to the largest, count as 0: sums would lose digits
 
 
 class Pieces(NamedTuple):
     number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) of the box volume
-    # (m,) fraction of each box in smallest sub-boxes with a surface that is not plane
+    # (m,) fraction of each box in smallest sub-boxes whose surface is not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
-        """Return the smallest thickness that is resolved; 0: any thickness."""
+        """Return the smallest thickness that is resolved; 0 means any thickness."""
         mostly = self.rough.sum() > MOSTLY * self.fraction.sum()
         return size / 2**HALVED if mostly or self.rough.max(initial=0) > ROUGH else 0.0
 
 
 def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.ndarray, Pieces]:
-    """Clip boxes of edge `size` around `x` (n, d); return a mask, and pieces of cut boxes.
+    """Clip boxes of edge `size` around `x` (n, d).
 
-    Boxes are first cut at the domain and the region's bounding box: faces along axes are exact.
+    Returns the mask of boxes that reach into the region, and the pieces of cut boxes.
+
+    Boxes are first cut at the domain and at the region's bounding box, so that faces along axes are
+    exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -69,7 +72,10 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger ones in adjacent boxes, with 0 as fraction."""
+    """Merge small pieces into the nearest larger pieces of adjacent boxes.
+
+    The fractions of the small pieces become 0.
+    """
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -115,7 +121,7 @@ def _measure(
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
     box = np.flatnonzero((edges > NOTHING * size).all(axis=1))
-    # Rows of one direction are contiguous, as regions use one direction after another.
+    # Rows of one component are contiguous, as regions read one component after another.
     lo, edges = lo[box].T, edges[box].T
     corners = np.array(list(itertools.product((0.0, 1.0), repeat=d)))
     places = np.concatenate([corners, np.full((1, d), 0.5)])
@@ -134,7 +140,8 @@ def _measure(
         whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
         passed = (np.abs(inmost) < reach) & ~whole
         slopes[:, ~passed] = 0
-        # If corners and centre are on the same side, the surface may belong to a sheet.
+        # If corners and centre are on the same side, the surface may still cross the box as a thin
+        # sheet.
         unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
         edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
         bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))

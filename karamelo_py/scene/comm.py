@@ -12,7 +12,8 @@ import numpy as np
 from karamelo_py.script.errors import ScriptError
 
 T = TypeVar("T")
-# Sent by Ctrl-C; by batch systems and kill; and when a terminal closes (not on Windows).
+# SIGINT comes from Ctrl-C, SIGTERM from batch systems and kill, SIGHUP from a closed terminal (not
+# on Windows).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 
@@ -25,7 +26,7 @@ def handled_signals(
         yield
         return
     before = {number: signal.getsignal(number) for number in numbers}
-    # Signals that are ignored stay ignored, as for nohup.
+    # Signals that the process ignores remain ignored, as with nohup.
     heeded = [number for number, now in before.items() if now != signal.SIG_IGN]
     for number in heeded:
         signal.signal(number, handler)
@@ -40,7 +41,7 @@ class SerialComm:
     """Communicator of one process; methods are collective."""
 
     rank, size = 0, 1
-    beside = 1  # number of processes that use the cores of this one, including itself
+    beside = 1  # number of processes on the same cores, including this one
     on_machine = 1
     waited = 0.0  # seconds
     failed_within = False
@@ -70,7 +71,10 @@ class SerialComm:
         self.at_end = True
 
     def agree(self, word: int, patience: float = np.inf) -> np.ndarray | None:
-        """Return the words (size,) of all processes; None if one is late by `patience` seconds."""
+        """Return the words (size,) of all processes.
+
+        The result is None if a process is late by more than `patience` seconds.
+        """
         return np.array([word])
 
     def bcast(self, thing: T | None = None) -> Any:
@@ -83,7 +87,7 @@ class SerialComm:
         return [thing]
 
     def everyone(self, request: str, thing: T) -> list[T]:
-        """Gather the objects of all processes; raises ScriptError if their `request` differs."""
+        """Gather the objects of all processes; raise ScriptError if their `request` differs."""
         asked, answers = zip(*self.allgather((request, thing)), strict=True)
         if other := next((one for one in asked if one != asked[0]), None):
             raise ScriptError(
@@ -113,7 +117,7 @@ class SerialComm:
         return numbers
 
     def allreduce(self, array: np.ndarray) -> np.ndarray:
-        """Sum integers, which have equal bits in any order."""
+        """Sum integers over processes; the result is exact in any order."""
         return array
 
     def allreduce_max(self, array: np.ndarray) -> np.ndarray:

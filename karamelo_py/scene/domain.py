@@ -30,17 +30,17 @@ THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 
 
 class Domain:
-    """A box with a grid of square cells from its lower corner.
+    """A box with a grid of square cells that begins at its lower corner.
 
     If a side is not a multiple of `h`, the grid extends past the upper corner by less than a cell.
-    `lo` and `hi` (3,) are 0 in unused directions. Without `h`, the first solid sets it.
+    `lo` and `hi` (3,) are 0 in unused directions. If `h` is not given, the first solid sets it.
     """
 
     thin = False
     thickness = 1.0  # thickness in 2D, cross-section in 1D
-    across: Any = None  # fix that prescribes the strain across a 2D scene
+    across: Any = None  # fix that prescribes the strain normal to a 2D scene
     mark: Mark | None = None
-    periodic: tuple[int, ...] = ()  # directions
+    periodic: tuple[int, ...] = ()  # periodic directions
     shear = 0.0  # velocity gradient dvx/dy of periodic images
     node_fields: tuple[type, ...] = ()
 
@@ -72,7 +72,10 @@ class Domain:
         return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Return a factor of volumes at `x` (n, d): the thickness, or length or area per angle."""
+        """Return the factor from area (2D) or length (1D) to volume at `x` (n, d).
+
+        It is the thickness or cross-section; in axisymmetry, the length or area per radian.
+        """
         hoops = self.kin.hoops
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness
 

@@ -20,11 +20,11 @@ NOTHING_THERE = "fixes of this group have no effect there"
 
 
 class AnyGroup(Named):
-    """A group of points or nodes; `all` includes those that are added later.
+    """A group of points or nodes; `all` includes members that are added later.
 
     Subclasses have ``total()``, the number of all points or nodes; ``chosen()``, the members of a
-    group other than `all`; and ``add(region, solids)``, which returns the number of new members, 0
-    if the region is not known yet.
+    group other than `all`; and ``add(region, solids)``, which returns the number of new members (0
+    if the region is not known yet).
     """
 
     kind = ""
@@ -42,7 +42,7 @@ class AnyGroup(Named):
 
     @property
     def members(self) -> np.ndarray:
-        """Return numbers of members from 0, ascending: (n,) int64."""
+        """Return the numbers of members, ascending from 0: (n,) int64."""
         return np.arange(self.total(), dtype=np.int64) if self.all else self.chosen()
 
     total: Callable[[], int]
@@ -72,7 +72,7 @@ class AnyGroup(Named):
 class ParticleGroup(AnyGroup):
     kind = "particles"
     script_kind = "a group of points, or all"
-    # Membership from the lowest bit of each byte on, with 64 spare bits at the end.
+    # One bit per point, from the lowest bit of each byte on, with 64 spare bits at the end.
     _bits = np.zeros(8, np.uint8)
 
     @classmethod
@@ -85,7 +85,7 @@ class ParticleGroup(AnyGroup):
     def __len__(self) -> int:
         return sum(map(len, self.pieces()))
 
-    ids = AnyGroup.members  # id - 1
+    ids = AnyGroup.members  # ids - 1
 
     def total(self) -> int:
         return sum(solid.count for solid in self.hub.solids.values())
@@ -107,7 +107,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Return the membership of `count` points, one bit each, in whole 64-bit words."""
+        """Return the membership of `count` points as bits, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -149,7 +149,7 @@ def _numbers_of(solid: Solid) -> Iterator[np.ndarray]:
 
 
 class NodeGroup(AnyGroup):
-    """Nodes by position; its definition is stored, so that nodes of later grids are included."""
+    """Nodes by position. The definition is stored, so that nodes of later grids are included."""
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
@@ -182,7 +182,7 @@ class NodeGroup(AnyGroup):
         return len(self._find(region, solids))
 
     def refuse_past_domain(self) -> None:
-        """Refuse a group of nodes meant as a wall at an upper edge but outside the domain."""
+        """Raise ScriptError for a wall at an upper edge whose nodes lie outside the domain."""
         domain, method = self.hub.domain, self.hub.update.method
         if domain.h is None or self.all or method is None or method.own_grids:
             return
@@ -220,7 +220,7 @@ class NodeGroup(AnyGroup):
 
 
 def with_images(lattice: Lattice, domain: Any, numbers: np.ndarray) -> np.ndarray:
-    """Return nodes inside the periodic cell and their images one period apart, ascending."""
+    """Return nodes inside the periodic cell and their images one period away, ascending."""
     places = lattice.places(numbers)
     for k in domain.periodic:
         period = domain.cells_of_period(k)

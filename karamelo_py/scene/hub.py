@@ -122,11 +122,11 @@ class Update:
     def __init__(self, values: Values):
         self.values = values
         self.method: Any = None
-        self.chosen: Any = None  # `advice.choosing.Chosen` by method(auto)
+        self.chosen: Any = None  # `advice.choosing.Chosen`, set by method(auto)
         self.transfer: Any = None
         self.scheme: Any = MUSL()
         self.scheme_mark: Mark | None = None
-        self.scheme_behind = 0  # number of runs before it was chosen
+        self.scheme_behind = 0  # number of runs before the scheme was chosen
         self.thermal = False
         self.anti_locking = False  # F-bar
         self.half_start = False  # the first kick lasts half a step
@@ -137,7 +137,7 @@ class Update:
         self.boundary_mark: Mark | None = None
         self.warned_of_bounces = False
         self.warned_of: list[str] = []
-        # Largest speed / wave speed and wave speed, if a run began faster than its waves.
+        # Largest speed / wave speed, and the wave speed, if a run began faster than its waves.
         self.above_waves: list[float] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run; its start
 
@@ -192,14 +192,14 @@ class Hub:
         self.settings = Settings()
         self.folder = Path.cwd()
         self.mark: Mark | None = None
-        # In a rehearsal nothing runs, and nothing is written.
+        # In a rehearsal no steps are taken and no files are written.
         self.rehearsing = False
         self.rehearsed = False
-        self.scouting = False  # end the rehearsal at the first run
+        self.scouting = False  # ends the rehearsal at the first run
         self.begun = 0  # runs begun, including those in the rehearsal
         self.answered = False  # the script has printed or written something
         self.checking = False  # for ``check``: the first run only reports
-        self.pausing = False  # stop before runs, which a Python program controls
+        self.pausing = False  # stops before runs, for a Python program that controls them
         self.open_ended = False  # a Python program may add commands after the script
         self.in_runs: list[Any] = []
         self.interpreter: Any = None
@@ -213,7 +213,7 @@ class Hub:
         self.elements = Catalogue("element", self)
         self.solids = Catalogue("solid", self)
         self.groups = Catalogue("group", self)
-        # Ids of points that enter later, and of points deactivated by the script.
+        # Ids of points that enter later, and of points that the script has deactivated.
         self.waiting, self.inactive = np.empty((2, 0), np.int64)
         self.fixes = Catalogue("fix", self)
         self.computes = Catalogue("compute", self)
@@ -222,15 +222,15 @@ class Hub:
         self.update = Update(self.values)
         self.output = Output(self)
         self.fields = Fields(self)
-        self.asked: set[str] = set()  # values and columns that statements use, including later ones
+        self.asked: set[str] = set()  # values and columns that statements use
         self.functions: dict[str, Any] = {}  # Python functions passed by a program
         self.in_run = 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
-        self._fits_run = 0  # last run whose arrays still fit the scene
+        self._fits_run = 0  # number of the last run whose arrays still fit the scene
         self.runs: list[dict[str, float]] = []
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []
-        self.later: list[Any] = []  # `known_failures.Step` of later runs, from the rehearsal
+        self.later: list[Any] = []  # `known_failures.Step` of later runs, as found in the rehearsal
         self._simulation: Any = None
         self._lattices: tuple[tuple, list[Lattice]] | None = None
 
@@ -241,7 +241,7 @@ class Hub:
 
     @property
     def has_run(self) -> bool:
-        """True after a run has begun, in a rehearsal also one that will begin."""
+        """True after a run has begun; in a rehearsal, also before a run that will begin."""
         return bool(self.begun or self.update.step)
 
     @property
@@ -260,7 +260,7 @@ class Hub:
 
     @property
     def lattices(self) -> list[Lattice]:
-        """Return the grids of the method, or the grid of the domain."""
+        """Return the grids of the method; without a method, the grid of the domain."""
         key, method = self._key_of_lattices, self.update.method
         if self._lattices is None or self._lattices[0] != key:
             self._lattices = key, method.lattices(self) if method else [self.domain.lattice]
@@ -299,7 +299,7 @@ class Hub:
                         item.mark,
                         hint="in the plug-in, call self.publish in refresh, or set published = ()",
                     )
-        # Values of all processes must agree, even if a plug-in uses random numbers.
+        # Published values of all processes must agree, even if a plug-in uses random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(
@@ -321,7 +321,7 @@ class Hub:
             self.console.warn(text)
 
     def rehearse(self) -> None:
-        """Read the rest of the script once for errors, before the first expensive work."""
+        """Read the rest of the script once to find errors before any expensive work."""
         if not self.rehearsed:
             self.rehearsed = True
             other = self.rehearsal() if self.interpreter.has_more else self

@@ -12,18 +12,19 @@ from karamelo_py.script.errors import ScriptError
 
 # Points up to this distance past a face (in cells) are on it.
 RELATIVE_TOLERANCE = 1e-9
-MAX_NODES = 2**31 - 1  # 32 bits in kernels
-# Points or nodes per batch: many for NumPy's overhead, few for caches and memory.
+MAX_NODES = 2**31 - 1  # limit of 32-bit numbers in kernels
+# Points or nodes per batch: enough to hide NumPy's overhead, few enough for caches and memory.
 CHUNK = 1 << 18
 
 
 class Lattice:
     """A grid of square cells of size `h` from the lower corner of a box.
 
-    It extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with nodes at
-    cell centres, too. At least `least_nodes` are made per direction; extra ones have no mass. Nodes
-    are numbered from `first` and cells from `first_cell`; `shape` and `cells` (3,) are their counts
-    per direction, 1 in unused ones. Raises ScriptError for more than `MAX_NODES` nodes.
+    The grid extends past the upper corner by less than a cell. `nodes_per_cell` is 1, or 2 with
+    additional nodes at cell centres. Each direction has at least `least_nodes` nodes; surplus nodes
+    have no mass. Nodes are numbered from `first` and cells from `first_cell`; `shape` and `cells`
+    (3,) are their counts per direction, 1 in unused ones. Raises ScriptError for more than
+    `MAX_NODES` nodes.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class Lattice:
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """Return positions (n, 3) of nodes, by default of all."""
+        """Return positions (n, 3) of nodes, of all by default."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing
@@ -86,13 +87,16 @@ class Lattice:
             yield number + self.first, corner + index * self.spacing
 
     def cells_of(self, x: np.ndarray) -> np.ndarray:
-        """Return cells (n, d) of positions; outside the grid, the nearest cells."""
+        """Return the cells (n, d) that contain positions; outside the grid, the nearest cells."""
         used = slice(self.dimension)
         cell = np.floor((x - self.lo[used]) / self.h).astype(np.int64)
         return np.clip(cell, 0, np.array(self.cells[used]) - 1)
 
     def around(self, cells: np.ndarray, steps: Sequence[int]) -> np.ndarray:
-        """Return numbers (k, n) of nodes `steps` along each axis from the first node of `cells`."""
+        """Return numbers (k, n) of nodes around cells.
+
+        A node is `steps` away, along each axis, from the first node of its cell.
+        """
         shape = np.array(self.shape[: self.dimension])
         places = (
             np.clip((cells + np.array(step)) * self.nodes_per_cell, 0, shape - 1)
@@ -137,7 +141,10 @@ def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield indices (m, d), m about CHUNK / `weight`, from `first` to `last`, last axis fastest."""
+    """Yield indices (m, d) from `first` to `last`, last axis fastest.
+
+    m is about CHUNK / `weight`.
+    """
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 

@@ -1,4 +1,4 @@
-"""Memory of this machine or job."""
+"""Memory that is available on this machine or to this job."""
 
 import warnings
 from collections.abc import Callable
@@ -29,7 +29,10 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes, including swap; caches that the system does not report (ZFS) are not `free`."""
+    """Numbers of bytes, including swap.
+
+    Caches that the system does not report (ZFS) do not count as `free`.
+    """
 
     free: float
     whole: float
@@ -38,12 +41,13 @@ class MachineMemory(NamedTuple):
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
     """Return the memory available to `processes`, or None if the system does not report it.
 
-    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) apply.
+    The limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) are
+    respected.
     """
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # about numbers that are not used
+        with warnings.catch_warnings(action="ignore"):  # warnings about numbers that are not used
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
@@ -65,7 +69,7 @@ def _of_groups(root: Path, swap: MachineMemory) -> list[MachineMemory]:
             continue
         top = root / "sys/fs/cgroup" / ("memory" if controllers else "")
         limit_file, used_file, dropped = _OF_GROUPS[bool(controllers)]
-        # A container may see its path in the host; its limit is then at the top.
+        # A container may see its path on the host; the limit is then in the top folder.
         inner = top / path.strip("/")
         for folder in (inner, *inner.parents[: len(inner.parts) - len(top.parts)]):
             limit, used = (_number(folder / name) for name in (limit_file, used_file))
@@ -110,7 +114,7 @@ def in_words(count: float) -> str:
 
 class Room(NamedTuple):
     whole: float  # bytes
-    of_one: int  # bytes of a point, at least
+    of_one: int  # smallest number of bytes of a point
     already: int
     single: bool  # single precision
     say: Callable[[str], None] = lambda text: None
@@ -136,10 +140,10 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Return the room for points whose law has `state` state variables.
+    """Return the room for points, each with `state` state variables.
 
-    A point has two positions, a velocity, a mass, the state and three integers; the last good state
-    that a run stores has a position, a velocity and the state again.
+    A point has two positions, a velocity, a mass, the state and three integers. The last good state
+    that a run stores holds a position, a velocity and the state again.
     """
     settings = hub.settings
     memory, comm = machine_memory(settings.comm.on_machine), settings.comm

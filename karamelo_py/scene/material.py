@@ -8,9 +8,12 @@ from karamelo_py.language.arguments import Named
 
 
 class MaterialPart(Named):
-    """A named law or component of a law, of a `kind` such as ``eos`` and a `style`.
+    """A named law, or component of a law.
 
-    `made` is the law (if the style has several, `laws` are laws by kind), `given` the arguments.
+    `kind` is a family such as ``eos``, and `style` its member.
+
+    `made` is the law; if the style makes several, `laws` are the laws by kind. `given` are the
+    arguments.
     """
 
     def __init__(
@@ -30,7 +33,7 @@ class MaterialPart(Named):
         return self.laws[self.kind]
 
     def parts(self) -> Iterator["MaterialPart"]:
-        """Yield this part, the parts of which it consists, and their parts."""
+        """Yield this part, the parts it consists of, and their parts."""
         yield self
         for value in self.arguments.values():
             for one in value if isinstance(value, tuple) else (value,):
@@ -41,7 +44,7 @@ class MaterialPart(Named):
 class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
-    flat: type | None = None  # wrapper of the law in thin bodies and generalised plane strain
+    flat: type | None = None  # wrapper of the law for thin bodies and generalised plane strain
     fluid: Any = None  # pore water; ``around(law)`` wraps the law
 
     @property

@@ -55,7 +55,7 @@ class Publisher:
     id: str = ""
     style: str = ""
     mark: Mark | None = None
-    columns: Sequence[str] = ()  # dump columns that it reads
+    columns: Sequence[str] = ()  # dump columns that the class reads
     # Suffixes of published values: "x" for ``ID_x``, "" for ``ID``.
     published: tuple[str, ...] = SUFFIXES
     has_published = False
@@ -100,12 +100,13 @@ class Fix(Publisher):
     formulas: tuple = ()  # for compiled hooks: a formula or None per component
     components: tuple = ()  # for a force in Python: a formula or None per direction
     first_step_only = False  # acts only in the first step after its definition
-    # True: Python hooks treat each point or node separately and move none. They get points of this
-    # process in any order, before the first step in several calls. Sums need ``total``.
+    # True: Python hooks treat each point or node separately and move none. Hooks then get the
+    # points of this process in any order; before the first step, they get them in several calls.
+    # Sums need ``total``.
     point_by_point = False
-    for_method = False  # used by the method; it has no hooks
-    # Prescribes nodal velocities in ``post_update_grid_state`` in directions with a formula.
-    # Contact does not change them.
+    for_method = False  # used by the method; the fix itself has no hooks
+    # Prescribes nodal velocities in ``post_update_grid_state``, in directions with a formula.
+    # Contact does not change these velocities.
     prescribes_velocity = False
     prescribes_rotation = False  # prescribes the angular velocity of nodes, whose torque is ID_s
     # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
@@ -114,15 +115,15 @@ class Fix(Publisher):
     # Friction coefficient (formula) of this wall in directions without a formula; None:
     # frictionless.
     wall_friction: Any = None
-    # Declared fields (`compiler.fields`); `Force` for forces on points set in
-    # ``initial_integrate``.
+    # Declared fields (`compiler.fields`). A fix that sets forces on points in ``initial_integrate``
+    # lists `Force`.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
     by_sizes = False  # takes sizes of points from their volumes, for a thickness of 1
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes velocities of points
-    reads_itself = False  # its formulas may contain its own values
-    moves: Any = None  # rigid solid that it moves by the forces on it
+    reads_itself = False  # formulas may contain values that this fix publishes
+    moves: Any = None  # rigid solid that this fix moves by the forces on it
     touches: Any = None  # rigid solid that is in contact with points
     links = False  # is a contact or joint between rigid bodies
     ignites = False
@@ -130,18 +131,19 @@ class Fix(Publisher):
     depth_of: Any = None  # function: depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # function: present faces (m, d, d) of a tool or a body
     accelerates = False  # formulas are forces per unit mass
-    exerts = False  # publishes a force as ID_x, ID_y, ID_z, and on request its torque
-    pressure: Any = None  # formula of the pressure, if it is a pressure on whole surfaces
-    presses = False  # is the force of a surface on points
+    exerts = False  # publishes a force as ID_x, ID_y, ID_z and, if used, its torque
+    pressure: Any = None  # formula of a pressure on whole surfaces; None for other fixes
+    presses = False  # exerts the force of a surface on points
     brakes = False
     water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
-    # True: Python hooks add no energy except summed work. Otherwise the balance is not monitored.
+    # True: Python hooks add no energy except work that is summed. If False, the energy balance is
+    # not monitored.
     conserves = False
     # Steps between calls of ``between_steps()``, which returns True if it deleted points;
     # 0: no calls.
     every = 0
-    friction: float | None = None  # between its two `solids`, in contact on the grid
+    friction: float | None = None  # between the two `solids`, in contact on the grid
     solids: tuple = ()  # solids of a fix without a group
 
     def __init__(self, hub: Scene, group: Any = None):
@@ -172,7 +174,7 @@ class Fix(Publisher):
         return self.group.nodes
 
     def prescribed(self, nodes: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return a mask (m, k) of prescribed components of `nodes` at `x` (m, d), and values.
+        """Return a mask (m, k) of prescribed components of `nodes` at `x` (m, d), and their values.
 
         Implicit schemes call this instead of the hooks of the fix. The default reads `formulas`.
         """
@@ -185,17 +187,17 @@ class Fix(Publisher):
         return mask, values
 
     def points_within(self) -> np.ndarray | None:
-        """Return numbers of the points on which the fix acts; None: all of its group."""
+        """Return numbers of the points on which the fix acts, or None for all of its group."""
         return None
 
     def defined(self) -> None:
-        """Called when the fix has its ID."""
+        """Called once the fix has its ID."""
 
     def deleted(self) -> None:
         """Called before the fix is deleted; raises ScriptError if other fixes need it."""
 
     def seconds(self) -> float:
-        """Return the estimated core seconds per step, for ``check``."""
+        """Return the estimated time per step on one core, in seconds, for ``check``."""
         from_python = any(not isinstance(hook, CompiledHook) for hook in self.hooks().values())
         return FROM_PYTHON if from_python and not self.first_step_only else 0.0
 
@@ -217,7 +219,7 @@ class Fix(Publisher):
 
 
 class InitialFix(Fix):
-    """Base of fixes that set something of each point or node once, in the next step."""
+    """Base of fixes that set a value of each point or node once, in the next step."""
 
     published = ()
     first_step_only = True
@@ -238,9 +240,9 @@ def _is_nothing(formula: Expression | None) -> bool:
 def per_direction(
     hub: Scene, name: str, formulas: Sequence, *, all_given: bool = False, around: bool = False
 ) -> tuple:
-    """Require one formula (or NULL, unless `all_given`) per direction of the domain.
+    """Check that there is one formula (or NULL, unless `all_given`) per direction of the domain.
 
-    Components beyond the dimension may be NULL or 0, as in published inputs. With `around`, the
+    Components beyond the dimension may be NULL or 0, as in published scripts. With `around`, the
     third component acts around the axis of bodies that twist.
     """
     domain = hub.require_domain()

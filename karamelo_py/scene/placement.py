@@ -17,17 +17,17 @@ from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
 SAMPLE = 4096
-LOOKS = 9  # doublings of the sample, up to a million
+LOOKS = 9  # doublings of the sample size, up to a million
 FITS_EVERYWHERE = 1_000_000  # number of points that any machine can store
-# Above this number, points outside the domain are not counted.
+# Above this number, points outside the domain are not counted for the warning.
 _MAX_COUNTED = 20_000_000
 
 
 class Placement(NamedTuple):
-    """Points and their initial domains; a value that is equal for all points may be a scalar."""
+    """Points and their initial domains. A value that is equal for all points may be a scalar."""
 
     x0: Any  # (n, d) positions: array or Filled
-    volume: float | np.ndarray  # (n,) per unit thickness (2D) or area (1D), without the radius
+    volume: float | np.ndarray  # (n,) per thickness (2D) or cross-section (1D), without the radius
     half_size: np.ndarray  # (n, d) of initial domains
     lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray
@@ -64,7 +64,7 @@ class Filled:
         self._ends.append(self._ends[-1] + count)
 
     def beside(self, number: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Return numbers (n,) of the positions `step` (n, d) away in the regular pattern, or -1."""
+        """Return the numbers (n,) of positions `step` (n, d) away in the regular pattern, or -1."""
         cell, index_in_cell = self._cell_and_place(number)
         index = cell * self._ppc + self._subs[index_in_cell] + step
         none = ((index < 0) | (index >= np.array(self._counts) * self._ppc)).any(axis=1)
@@ -122,7 +122,7 @@ def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Latt
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (ppc,) of points along a unit cell, from its centre, and lengths (ppc,).
+    """Return positions (ppc,) of points along a cell of length 1, from its centre, and lengths.
 
     Rule ``gauss`` is Gauss-Legendre. The default is Karamelo's rule: equally spaced, except that
     three points are rounded Gauss points with equal lengths.
@@ -139,7 +139,7 @@ def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
 def cell_pattern(
     ppc: int, dimension: int, rule: str | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions and sizes (m, d) in Karamelo's order (x before y; lowest z first)."""
+    """Return positions and sizes (m, d) in Karamelo's order (y fastest, z slowest)."""
     places, lengths = (_in_order(along, dimension) for along in offsets(ppc, rule))
     return places, lengths if rule == "gauss" else lengths[0]
 
@@ -160,7 +160,7 @@ def fill(
 ) -> Placement:
     """Fill a region in chunks of cells, x outermost.
 
-    Raises ScriptError for more points than numbers or `room` allow.
+    Raises ScriptError if the points exceed the memory (`room`) or 32-bit numbers.
     """
     dimension, h = domain.dimension, lattice.h
     used = slice(0, dimension)
@@ -176,10 +176,10 @@ def fill(
     last_cell = np.array(lattice.cells[used]) - 1
     if region.unknown or (lo > hi).any():
         return placed
-    # One more cell at either end, so that round-off loses no point on a face.
+    # One more cell at both ends, so that round-off loses no point on a face.
     first = np.floor((lo - corner) / h) - 1
     last = np.floor((hi - corner) / h) + 1
-    # An open region ends at the domain; for others, points beyond it cause a warning.
+    # An open region ends at the domain. Other regions give a warning for points outside the domain.
     first = np.where(np.isinf(lo), 0, first)
     last = np.where(np.isinf(hi), last_cell, last)
     inner_first = np.clip(first, 0, last_cell + 1)
@@ -189,7 +189,7 @@ def fill(
         raise ScriptError(
             f"about {inner:.3g} points would be needed", expected=f"at most {MAX_POINTS}"
         )
-    # No warning past an axis or plane of symmetry, where the region has its mirror image.
+    # No warning for points beyond an axis or plane of symmetry, where the mirror image is.
     ends = domain.lo[used], domain.hi[used]
     with np.errstate(invalid="ignore"):
         at_side = [np.abs((lo + hi) / 2 - end) <= domain.tolerance for end in ends]
@@ -197,7 +197,7 @@ def fill(
     reaches_out = (lo < ends[0] - domain.tolerance) & np.isfinite(lo) & ~at_side[0]
     reaches_out |= (hi > ends[1] + domain.tolerance) & np.isfinite(hi) & ~at_side[1]
     whole = math.prod(np.maximum(last - first + 1, 0).tolist()) * float(ppc) ** dimension
-    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # doubles are exact integers
+    near = max(np.abs(first).max(), np.abs(last).max()) < 2**53  # doubles are exact here
     counted = reaches_out.any() and near and whole <= max(_MAX_COUNTED, 4 * inner)
     if not counted:
         first, last = inner_first, inner_last
@@ -247,7 +247,7 @@ def fill(
 
 
 def _least(region: Region, domain: Domain, spacing: float, most: float) -> float:
-    """Return a lower bound of the number of points, by samples that grow up to `most`."""
+    """Return a lower bound of the number of points, from samples that grow up to `most`."""
     used = slice(0, domain.dimension)
     lo, size = region.lo[used], region.hi[used] - region.lo[used]
     places, inside, whole = 0, 0, math.prod((size / spacing).tolist())

@@ -50,7 +50,7 @@ SAID = {"basis": ("traits",), "transfer": ("traits",), "scheme": ("rows", "trait
 TRAITS = {"basis": BasisTraits, "transfer": TransferTraits, "scheme": SchemeTraits}
 COLUMNS: dict[str, Any] = {"point_fields": point_table.COLUMNS, "node_fields": node_columns.COLUMNS}
 HOOKS_BEGIN = ("initial_", "post_", "final_", "supply_")
-ALIKE = 0.85  # similarity at which a method is reported as a misspelt hook
+ALIKE = 0.85  # similarity above which a method is reported as a misspelt hook
 
 
 def check_fix(hub: Scene, fix: Fix) -> None:
@@ -277,7 +277,10 @@ def _wrong_size(kind: type[Field], domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Return what else shows a column than this field (None: than a law), or ""."""
+    """Return what else in the scene shows `column`, or "".
+
+    `kind` is the field that declares the column, or None if a law does.
+    """
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():
@@ -322,7 +325,7 @@ def foreign_parts(hub: Scene) -> list[PartInUse]:
 
 @contextmanager
 def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
-    """Convert exceptions in plug-ins to ScriptErrors that name the plug-in or the `usual` part."""
+    """Convert exceptions in plug-ins to ScriptErrors that name the plug-in, or the part `usual`."""
     try:
         yield
     except faults.KNOWN:
@@ -338,7 +341,7 @@ def attributed(hub: Scene, usual: PartInUse | None = None) -> Iterator[None]:
         if not suspects:
             raise
         plugin, mark = suspects[0]
-        if not (mark or isinstance(error, Undefined)):  # mark the line of the script that called it
+        if not (mark or isinstance(error, Undefined)):  # mark the calling line of the script
             mark = f", in '{linecache.getline(*next(places_of(error))).strip()}'"
         cause = f"{faults.cause_of(error)}{mark}"
         raise faults.fault(plugin.name, cause, plugin.mark, faults.TRACEBACK) from error

@@ -19,11 +19,11 @@ HALVINGS = 12  # bisections that locate a surface
 class Region(Named):
     """Base of region styles, which override `contains`.
 
-    `lo` and `hi` (d,) bound the shape and are infinite where it is open; `exterior` inverts the
-    region; `parts` are the regions that it combines.
+    `lo` and `hi` (d,) bound the shape; they are infinite where it is open. `exterior` inverts the
+    region. `parts` are the regions that it combines.
     """
 
-    skin: Any = None  # `Skin`, of a region from a file
+    skin: Any = None  # `Skin` of a region from a file
     catalogue = "regions"
 
     def __init__(
@@ -92,11 +92,11 @@ class Region(Named):
         return ~inside if self.exterior else inside
 
     def distance(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth (n,) of `x` (n, >= d), negative outside; `exterior` is ignored.
+        """Return the depth (n,) of `x` (n, >= d), negative outside, ignoring `exterior`.
 
-        A lower bound of the distance from the surface is enough, up to `reach`, but it must be
-        linear near plane parts of the surface. The default tests `contains` along the axes, and
-        misses shapes thinner than `reach`.
+        Depths may be underestimated and cut off at `reach`, but must be linear near plane parts of
+        the surface. The default tests `contains` along the axes, and misses shapes thinner than
+        `reach`.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -113,7 +113,7 @@ class Region(Named):
         return np.where(inside, 1, -1) * near.min(axis=1) / math.sqrt(d)
 
     def coincides(self, other: Any, x: np.ndarray) -> np.ndarray | None:
-        """Return the mask (n,) of positions where both surfaces coincide; None: unknown."""
+        """Return the mask (n,) of positions where both surfaces coincide, or None if unknown."""
         return None
 
     def shape(self) -> Any:
@@ -125,7 +125,7 @@ class Region(Named):
         return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth (n,) in the region, see `distance`."""
+        """Return the depth (n,) in the region, as `distance` does, with `exterior`."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 
@@ -137,7 +137,10 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Raise ScriptError if the lower end (argument number `argument`) is above the upper end."""
+    """Raise ScriptError if a lower end is above its upper end.
+
+    `argument` is the argument number of the lower end.
+    """
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

@@ -10,7 +10,10 @@ from karamelo_py.script.errors import ScriptError
 
 
 def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
-    """Return a placement of the points `kept` of a solid: a mask, or numbers that may repeat."""
+    """Return a placement with some points of a solid.
+
+    `kept` is a mask, or numbers that may repeat.
+    """
     volume = solid.volume0 / solid.domain.depth(solid.x0[:])
     return Placement(
         x0=solid.x0[kept],
@@ -24,7 +27,7 @@ def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
 
 
 def refuse_chosen(hub: Hub, solid: Solid, command: str) -> None:
-    """Raise ScriptError if groups of points or contacts store the numbers that would change."""
+    """Raise ScriptError if groups or contacts have stored point numbers that would change."""
     later = [one for one in hub.solids.values() if one.index >= solid.index]
     affected = [("fix", "made for", fix) for fix in hub.fixes.values() if fix.point_fields]
     for group in hub.groups.values():

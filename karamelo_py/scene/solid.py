@@ -19,7 +19,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # K: T0 < COLD, and WARM less than in others, is in Celsius
+COLD, WARM = 60.0, 200.0  # K: a T0 below COLD, if others are WARM higher, is in Celsius
 
 
 class Solid(Named):
@@ -39,11 +39,11 @@ class Solid(Named):
 
     catalogue = "solids"
     source = "region"  # name of the argument for the points, for messages
-    # Volumes of the points, and of the shape in a file; per radian if axisymmetric.
+    # Volume of all points, and volume of the shape in a file; per radian if axisymmetric.
     volumes: tuple[float, float] | None = None
     elements = ""
     region: Region | None = None
-    ppc, cut = 0, False  # points per cell and direction; clipped at the edge of the region
+    ppc, cut = 0, False  # points per cell and direction; True if clipped at the edge of the region
     warm = False  # points have different temperatures
 
     @property
@@ -77,7 +77,7 @@ class Solid(Named):
         self.first_id = sum(other.count for other in hub.solids.values())
 
     def _compare_temperatures(self, hub: Scene) -> None:
-        # Karamelo scripts have a T0 in mechanical runs, too: no error.
+        # Only warn, as Karamelo scripts give T0 in mechanical runs, too.
         if hub.update.thermal and self.T0 and not can(self.material.law, initial_heat):
             hub.warn(
                 f"T0 = {self.T0:g} has no effect: the material has no temperature",
@@ -113,7 +113,10 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Store the points; raise ScriptError for none, too many, or points left of the axis."""
+        """Store the points.
+
+        Raises ScriptError for no points, too many, or points at x < 0 if axisymmetric.
+        """
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -127,7 +130,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.kin.hoops:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # a point on the axis would have no mass
+            if count and radius.min() <= 0:  # a point on the axis has no mass
                 raise ScriptError(
                     f"points at x = {radius.min():g}: x is the radius here "
                     f"({self.domain.kin.word}), and points lie at x > 0",
@@ -227,7 +230,7 @@ def warn_of_coinciding(hub: Scene, new: Solid, ID: str) -> None:
 
 
 def coinciding(a: Solid, b: Solid) -> bool:
-    """Return whether points of the two solids coincide; large solids are sampled."""
+    """Return True if points of the two solids coincide; large solids are sampled."""
     lo = np.maximum(a.lo, b.lo) - a.domain.tolerance
     hi = np.minimum(a.hi, b.hi) + a.domain.tolerance
     if not a.count or not b.count or (lo > hi).any():
@@ -242,7 +245,7 @@ def _within(x: np.ndarray, lo: np.ndarray, hi: np.ndarray) -> np.ndarray:
 
 
 def _keys(x: np.ndarray, h: float) -> np.ndarray:
-    """Return hashes (n,) of positions, ignoring round-off."""
+    """Return hashes (n,) of positions, which ignore round-off."""
     places = np.rint(x * (1e4 / h)).astype(np.int64)
     # Primes make hashes of different positions differ; overflow does no harm.
     return places @ np.array([1, 1_000_003, 998_244_353_001], np.int64)[: x.shape[1]]

@@ -16,7 +16,7 @@ from karamelo_py.script.terms import number_of
 
 
 class FileColumns:
-    """Script argument: columns of a file or dump, or of arrays passed to `Simulation`."""
+    """Script argument: columns of a file or dump, or arrays passed to `Simulation`."""
 
     script_kind = "the name of a file of columns"
 
@@ -66,7 +66,7 @@ def _of_dump(hub: Scene, path: Path) -> dict[str, np.ndarray]:
 def read_xyz(path: Path) -> dict[str, np.ndarray]:
     """Read positions, velocities and masses from the last frame of an .xyz file.
 
-    Rows are element, x, y, z, unless the second line has the Properties of extended XYZ.
+    Rows contain element, x, y, z, unless the second line gives Properties (extended XYZ).
     """
     lines = read_text(path).rstrip().splitlines()
     begin, first = 0, 0
@@ -99,7 +99,7 @@ def read_xyz(path: Path) -> dict[str, np.ndarray]:
 def read_table(path: Path) -> dict[str, np.ndarray]:
     """Read columns separated by commas, semicolons or blanks; # begins a comment line.
 
-    Names are in the first row; without names, columns are "1", "2", ...
+    The first row may contain names; without names, columns are "1", "2", ...
     """
     rows = []
     try:

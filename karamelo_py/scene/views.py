@@ -1,7 +1,7 @@
 """Views of nodes and points for Python hooks.
 
-Arrays have a row per node or point of the group. Changes, by assignment or in place, are written
-back when the hook returns; other fields are read-only.
+Arrays have one row per node or point of the group. Changes, by assignment or in place, are written
+back when the hook returns; arrays marked "read only" cannot be changed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -83,7 +83,7 @@ class View:
         cls._shown = frozenset(name for name, value in attributes if isinstance(value, Shown))
 
     def __init__(self) -> None:
-        # By attribute or field class: the array given to the hook, and a copy of it.
+        # The array given to the hook, and a copy of it, by attribute or field class.
         self._handed_out: dict[str | type, tuple[np.ndarray, np.ndarray]] = {}
 
     def _take_times(self, control: arrays.Control) -> None:
@@ -233,7 +233,7 @@ class NodesView(View):
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d) before the momentum update; later, for the velocity gradient."""
+        """Velocities (n, d) before the momentum update; in later stages, those for the gradient."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:
@@ -267,9 +267,9 @@ class NodesView(View):
 class PointsView(View):
     """The points of a group at one stage of a step, ordered by id.
 
-    For hooks that treat each point separately (`Fix.point_by_point`), they are the points of this
-    process in storage order, as `pieces` (block, rows), and positions are read-only. Before the
-    first step (`in_steps` False) a view has only some of the points.
+    For hooks that treat each point separately (`Fix.point_by_point`), the view has the points of
+    this process in storage order, as `pieces` (block, rows), and positions are read-only. Before
+    the first step (`in_steps` False) a view has only some of the points.
     """
 
     _fields = ("dt", "kick", "contact_dt", "contact_kick", "time", "ids", "moved")
@@ -307,7 +307,7 @@ class PointsView(View):
         return numbers
 
     def total(self, terms: ArrayLike) -> np.ndarray:
-        """Sum terms (n,) or (n, k) over the group's points, exactly rounded; collective."""
+        """Sum terms (n,) or (n, k) over the group's points, exactly rounded; all ranks call it."""
         if not self._in_steps:
             raise ValueError(
                 "points.total(terms) is known only in steps; before the first, points come in "
@@ -394,8 +394,8 @@ class PointsView(View):
         """Set the velocity gradient of points that store one (APIC, TPIC ...).
 
         ``gradient(moves, step)``, which is called only if it is needed, returns derivatives (n, d)
-        of a velocity `component`, by present positions if `moves`, otherwise by reference ones.
-        `step`, for finite differences, is much smaller than a cell.
+        of a velocity `component`, with respect to present positions if `moves`, otherwise to
+        reference positions. `step`, for finite differences, is much smaller than a cell.
         """
         simulation, slopes = self._simulation, None
         s, d = simulation.setup, simulation.kin.dimension
@@ -408,7 +408,7 @@ class PointsView(View):
                 slopes = np.nan_to_num(gradient(s.frame.moves, simulation.hub.domain.h / 16)).T
             moment = np.zeros((d * d, len(rows)), kept.dtype)
             moment[here] = slopes[:, places]
-            if not s.transfer.traits.keeps_gradient:  # store B = D grad v
+            if not s.transfer.traits.keeps_gradient:  # these store B = D grad v
                 x = points.x[simulation.now] if points.home is None else points.home
                 x = np.ascontiguousarray(x[:, rows])
                 gradients, grid = moment, points.grid[rows]
@@ -418,7 +418,7 @@ class PointsView(View):
             kept[here, rows] = moment[here]
 
     def set_stress(self, components: dict[str, np.ndarray]) -> None:
-        """Set components of Cauchy stress of rate-form laws: ``{"11": (n,), ...}``."""
+        """Set components of the Cauchy stress, ``{"11": (n,), ...}``, in laws in rate form."""
         s = self._simulation.setup
         names = s.kin.symmetric_names
         columns = [components.get(name, 0.0) for name in names]
@@ -434,11 +434,14 @@ class PointsView(View):
         self.impose(impose_temperature, values)
 
     def ignite(self, since: np.ndarray) -> None:
-        """Ignite explosives at times (n,) before now; negative times are in the future."""
+        """Ignite explosives at the times now - `since` (n,); negative values are in the future."""
         self.impose(impose_lighting, since)
 
     def impose(self, kernel: Callable, values: np.ndarray, law: type = tuple) -> None:
-        """Call ``kernel(matter, rows, numbers)`` for points whose law is a `law`; `values` (n,)."""
+        """Call ``kernel(matter, rows, numbers)`` for points whose law is a `law`.
+
+        `numbers` are the `values` (n,) of these points.
+        """
         s = self._simulation.setup
         for block, rows, places in self._rows.parts:
             if not isinstance(block.laws, law):
@@ -501,8 +504,8 @@ def set_columns(
 ) -> None:
     """Set columns of points between steps, to numbers or arrays (n,).
 
-    `ids` are counted from 0; by default all points are set. Raises ScriptError for derived columns,
-    wrong shapes, and values that are not finite.
+    `ids` are counted from 0; by default all points are set. Raises ScriptError for columns that
+    cannot be set, wrong shapes, and values that are not finite.
     """
     present = simulation.present
     ids = np.arange(len(present)) if ids is None else ids

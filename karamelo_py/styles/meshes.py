@@ -20,7 +20,7 @@ from karamelo_py.scene.region import EXTERIOR, Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
-# A shape of fewer than CELLS cells, or OUT times as long as the domain, may be in other units.
+# A shape smaller than CELLS cells, or OUT times as long as the domain, is probably in other units.
 CELLS, OUT = 3, 20
 UNITS = {
     1e-3: "a file in millimetres, a script in metres",

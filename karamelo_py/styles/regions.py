@@ -63,7 +63,7 @@ class Primitive(region.Region):
 
 
 def _between(d: int, axis: int, lo: float, hi: float) -> list[np.ndarray]:
-    """Return planes (d + 1,) of a slab, see `Convex`; none at open ends."""
+    """Return the planes (d + 1,) of a slab, as in `Convex`; open ends have none."""
     normal = np.eye(d)[axis]
     return [np.append(n, at) for n, at in ((normal, lo), (-normal, -hi)) if math.isfinite(at)]
 
@@ -224,7 +224,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """None (unknown): the domain cuts the half-space."""
+        """None, since the domain cuts the half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)

@@ -20,9 +20,9 @@ from karamelo_py.scene.solid import Solid, own_grids
 from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
-MISSED = 0.01  # fraction of a shape's volume, for a warning
-COARSE = 0.08  # the same for a box or ball
-MANY = 10  # points per cell and direction, for a warning
+MISSED = 0.01  # difference in volume, as a fraction, above which a warning is given
+COARSE = 0.08  # the same fraction for boxes and balls
+MANY = 10  # points per cell and direction above which a warning is given
 
 
 class RegionSolid(Solid):
@@ -184,7 +184,7 @@ class PointsSolid(Solid):
 
     Notes
     -----
-    If the basis needs domains, they are squares or cubes with the volume of the point. The cpdi
+    If the basis needs domains, each is a square or cube with the volume of its point. The cpdi
     methods refuse this style, since their domains must tile a body.
 
     Materials start without a history: other columns of a dump (``ep``, ``damage`` ...) are ignored.

@@ -129,18 +129,18 @@ class Heights(Enclosed):
 
 
 def _next_to(at: np.ndarray, lo: float, hi: float) -> np.ndarray:
-    """Return for each centre the number of the nearest one in the domain or next to it."""
+    """Return, for each centre, the index of the nearest centre in or next to the domain."""
     first, last = int(np.searchsorted(at, lo, "right")) - 1, int(np.searchsorted(at, hi))
     return np.clip(np.arange(len(at)), max(first, 0), min(last, len(at) - 1))
 
 
 def _filled(z: np.ndarray, nearest: list[np.ndarray]) -> np.ndarray:
-    """Continue the ground level where heights outside the domain are unknown."""
+    """Fill unknown heights outside the domain with the nearest known ones."""
     return np.where(np.isnan(z), z[np.ix_(*nearest)], z)
 
 
 def _cut(at: np.ndarray, z: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cut columns of `z` (m, n) to positions (n,) from lo to hi, extended at constant height."""
+    """Cut the columns of `z` (m, n) to positions (n,) from lo to hi; extend the ends level."""
     first = max(int(np.searchsorted(at, lo)) - 1, 0)
     last = min(int(np.searchsorted(at, hi)) + 1, len(at))
     at, z = at[first:last], z[:, first:last]

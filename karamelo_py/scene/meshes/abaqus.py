@@ -1,6 +1,7 @@
 """Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
-Other keywords that move or copy nodes are refused (Abaqus Keywords Reference; CalculiX manual).
+Further keywords that move or copy nodes raise ScriptError (Abaqus Keywords Reference; CalculiX
+manual).
 """
 
 import re
@@ -76,9 +77,9 @@ def _flat(keyword: DeckKeyword) -> np.ndarray:
 
 
 def _rows(keyword: DeckKeyword, count: int) -> np.ndarray:
-    """Return elements (n, count), each of which may continue over several lines.
+    """Return elements (n, count); an element may continue over several lines.
 
-    As in CalculiX, further numbers on the last line, such as inner nodes of C3D8I, are ignored.
+    As in CalculiX, surplus numbers on the last line, such as inner nodes of C3D8I, are ignored.
     """
     flat = _flat(keyword)
     if len(flat) == count * len(keyword.lines):
@@ -147,7 +148,7 @@ class _Deck:
         self.parts: dict[str, DeckPart] = {}
         self.instances: list[DeckBody] = []
         self.whole = self.scope = DeckPart()
-        # Sets of the assembly: whether of nodes, name, instance, items numbered in the instance.
+        # Sets of the assembly: True for nodes, name, instance, items numbered in the instance.
         self.assembly: list[tuple[bool, str, str, list]] = []
         for keyword in _keywords(path):
             reads = _READ.get(keyword.name)
@@ -238,7 +239,7 @@ class _Deck:
         family, count = kind
         of_mesh = family if count == len(SHAPES[family].corners) else f"{family}{count}"
         table = _rows(keyword, count + 1)
-        if of_mesh == "line3":  # the second node is in the middle
+        if of_mesh == "line3":  # the second node is the middle one
             table = table[:, [0, 1, 3, 2]]
         self.scope.elements.append(DeckElements(of_mesh, name, table[:, 0], table[:, 1:]))
         into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])
@@ -305,7 +306,7 @@ class _Deck:
                     sets.extend(name, f"{instance}.{item}")
                 else:
                     sets.add(name, owner, item)
-        if self.instances:  # sets of the assembly may contain INSTANCE.SET and each other
+        if self.instances:  # sets of the assembly may contain INSTANCE.SET and other sets
             pairs = (self.whole.nodes, merged.nodes), (self.whole.groups, merged.elements)
             for of_deck, sets in pairs:
                 for name, items in of_deck.items():

@@ -16,7 +16,7 @@ from karamelo_py.script.errors import ScriptError
 
 READS = (".msh", ".msh2", ".msh4", ".med", ".unv", ".cgns")
 _LIBRARIES = "libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1"
-# Families whose name is not Gmsh's in lower case.
+# Families whose name is not Gmsh's name in lower case.
 _FAMILIES = {"Quadrilateral": "quad", "Point": "vertex", "Tetrahedron": "tetra", "Prism": "wedge"}
 
 
@@ -26,7 +26,7 @@ class NoGmsh(Exception):
 
 @contextlib.contextmanager
 def _model(path: Path) -> Iterator[ModuleType]:
-    """Open a new model; other models of the process stay open."""
+    """Open a new Gmsh model; other models of the process stay open."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -48,7 +48,7 @@ def _model(path: Path) -> Iterator[ModuleType]:
 def begin(gmsh: ModuleType) -> None:
     """Initialize Gmsh, but undo its reset of SIGPIPE.
 
-    Otherwise a closed pipe, or a closed live page, would end the program.
+    Otherwise closing a pipe, or the live page, would end the program.
     """
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
@@ -99,7 +99,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
             expected="its libraries installed: on Debian and Ubuntu, apt install " + _LIBRARIES,
             hint=f"or mesh it elsewhere: gmsh -{dimension} {path.name} -o {path.stem}.msh",
         ) from None
-    except Exception as error:  # Gmsh raises no subclass
+    except Exception as error:  # Gmsh raises plain Exceptions
         raise ScriptError(
             f"Gmsh cannot mesh {path.name}: {_reason(error, path)}",
             argument="file",
@@ -120,9 +120,10 @@ def read_by_gmsh(path: Path) -> Mesh:
 
 
 class _Header:
-    """Content of a file that Gmsh's library drops: names of empty groups, and groups by element.
+    """File content that Gmsh's library drops: names of empty groups, and groups by element.
 
-    When Gmsh reads versions 1 and 2, it gives all elements of an entity all groups of the entity.
+    When Gmsh reads format versions 1 and 2, it puts all elements of an entity into all groups of
+    the entity.
     """
 
     def __init__(self, path: Path):

@@ -1,4 +1,4 @@
-"""Mesh data of all readers."""
+"""Mesh data in the form that all readers return."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import NamedTuple, TypeVar
@@ -7,22 +7,22 @@ import numpy as np
 
 from karamelo_py.script.errors import unknown
 
-# By family of cells: meshio's type without the number of nodes.
+# meshio's type without the number of nodes, by family of cells.
 DIMENSIONS = {
     "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "polygon": 2, "pixel": 2,
     "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3, "voxel": 3, "hexa_prism": 3,
 }  # fmt: skip
 
 
-_MANY = 100  # names; if there are more, messages list only a few
+_MANY = 100  # number of names above which messages list only a few
 
 
 class CellBlock(NamedTuple):
     type: str  # meshio's, such as tetra10
     nodes: np.ndarray  # (n, c) from 0, corners first
-    # (c, d) natural coordinates of the nodes; None: VTK's order
+    # (c, d) natural coordinates of the nodes; None: the order of VTK
     reference: np.ndarray | None = None
-    label: str = ""  # name in the file, if different
+    label: str = ""  # name in the file, if it differs
 
     @property
     def family(self) -> str:
@@ -57,10 +57,10 @@ class Mesh(NamedTuple):
     cells: list[CellBlock]
     sets: Mapping[str, list[np.ndarray]]  # masks (n,), one per block of `cells`
     node_sets: Mapping[str, np.ndarray]  # masks (N,)
-    left_out: dict[str, int]  # number of other elements by type, such as springs
+    left_out: dict[str, int]  # number of ignored elements by type, such as springs
 
     def chosen(self, group: str | int | None) -> list[CellBlock]:
-        """Cells of an element set, outer faces of a node set, or all cells.
+        """Return cells of an element set, outer faces of a node set, or all cells.
 
         Raises ScriptError if the group is unknown or empty.
         """
@@ -83,7 +83,7 @@ class Mesh(NamedTuple):
         name = group if group in names else alike[0] if len(alike) == 1 else None
         message = f"the mesh has no physical group '{group}' with elements"
         if name is None:
-            # Gmsh numbers its groups and may name them. A number that occurs in one dimension only
+            # Gmsh numbers its groups and may name them. A number that occurs in a single dimension
             # needs no prefix.
             taken = {*names}
             once = [n for n in names if n.rpartition(":")[2] not in taken or ":" not in n]
@@ -105,7 +105,7 @@ class Mesh(NamedTuple):
         return name
 
 
-# Counter-clockwise as seen from outside; in 2D the interior is on the left.
+# Corners of faces, counter-clockwise as seen from outside; in 2D the interior is on the left.
 FACES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -138,6 +138,6 @@ def outer_faces_of(mesh: Mesh, mask: np.ndarray) -> list[CellBlock]:
         outer = nodes[first[count == 1]]
         if len(outer):
             blocks.append(CellBlock(FACE_TYPES[corners], outer))
-    if not blocks:  # nodes without a face
+    if not blocks:  # only nodes, without a face
         blocks.append(CellBlock("vertex", np.flatnonzero(mask)[:, None]))
     return blocks

@@ -1,4 +1,4 @@
-"""Content of keyword decks by part, merged to one mesh."""
+"""Content of keyword decks by part, merged into one mesh."""
 
 import itertools
 from collections import Counter, defaultdict
@@ -11,7 +11,7 @@ import numpy as np
 from karamelo_py.scene.meshes.data import FACE_TYPES, CellBlock, Mesh, OnDemand
 from karamelo_py.script.errors import ScriptError
 
-_MOST = 2**31  # bytes of an included file
+_MOST = 2**31  # largest size of an included file in bytes
 # Corners, from 0, of faces S1, S2, ... (Abaqus Analysis User's Guide, "Two- and three-dimensional
 # solid element library").
 _FACES = {
@@ -25,7 +25,7 @@ _FACES = {
     ),
     "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
 }
-SetItems = dict[str, list[np.ndarray | str]]  # numbers, and names of other sets
+SetItems = dict[str, list[np.ndarray | str]]  # numbers, and names of further sets
 
 
 class DeckKeyword(NamedTuple):
@@ -52,9 +52,9 @@ def included(keyword: DeckKeyword, name: str, above: tuple[Path, ...]) -> Path:
 
 
 def table_of(keyword: DeckKeyword, least: int, most: int, widths: Sequence[int] = ()) -> np.ndarray:
-    """Return numbers (n, most) of data lines, separated by commas or in columns of `widths`.
+    """Return numbers (n, most) from data lines, separated by commas or in columns of `widths`.
 
-    Omitted numbers are 0. Raises ScriptError for fewer than `least`.
+    Omitted numbers are 0. Raises ScriptError if a line has fewer than `least` numbers.
     """
     ends = list(itertools.accumulate(widths))
     starts = [0, *ends[:-1]]
@@ -86,7 +86,7 @@ def _is_number(text: str) -> bool:
 
 
 class DeckElements(NamedTuple):
-    type: str  # meshio's
+    type: str  # meshio's type
     label: str  # name of the type in the deck
     numbers: np.ndarray  # (n,)
     nodes: np.ndarray  # (n, c) node numbers of the deck
@@ -102,14 +102,14 @@ class DeckPart:
         self.groups: SetItems = {}
         self.sides: dict[str, list[tuple[str, str]]] = {}  # (element or set, S1 or S2 ...)
         self.faces: dict[str, list[np.ndarray]] = {}  # node numbers of the deck (n, c)
-        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # for later nodes
+        self.system: Callable[[np.ndarray], np.ndarray] = lambda x: x  # applied to later nodes
 
     def add_nodes(self, numbers: np.ndarray, places: np.ndarray) -> None:
         self.numbers.append(numbers)
         self.places.append(places)
 
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return ascending node numbers (n,) and positions, by the last definition of each node."""
+        """Return ascending node numbers (n,) and positions, as last defined in the deck."""
         if not self.numbers:
             return np.empty(0, np.int64), np.empty((0, 3))
         numbers, places = np.concatenate(self.numbers), np.concatenate(self.places)
@@ -134,7 +134,7 @@ def into(sets: dict, name: str | None, item: np.ndarray | str) -> None:
 
 
 def into_by_owner(sets: SetItems, owners: np.ndarray, numbers: np.ndarray) -> None:
-    """Add numbers (n,) to the sets of their owners (n,), such as parts or properties."""
+    """Add numbers (n,) to the sets named by `owners` (n,), such as parts or properties."""
     order = np.argsort(owners, kind="stable")
     names, first = np.unique(owners[order], return_index=True)
     for name, of in zip(names, np.split(numbers[order], first[1:]), strict=True):
@@ -160,7 +160,7 @@ class Numbering(NamedTuple):
     mesh: np.ndarray  # (n,)
 
     def of(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the numbers (m,) in the mesh, or -1."""
+        """Return the numbers (m,) in the mesh, -1 if there is none."""
         if not len(self.deck):
             return np.full(len(numbers), -1)
         at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
@@ -175,7 +175,10 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, as functions that list numbers of the mesh, since a deck may have many sets."""
+    """Sets by name.
+
+    A deck may have many sets, so each is a function that lists its numbers in the mesh.
+    """
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)
@@ -207,7 +210,7 @@ class Merged:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.points: list[np.ndarray] = []
-        # By type and label: numbers (n,) and nodes (n, c).
+        # Numbers (n,) and nodes (n, c), by type and label.
         self.blocks: dict[tuple[str, str], list[tuple[np.ndarray, np.ndarray]]] = defaultdict(list)
         self.count = 0
         self.nodes, self.elements = Sets(), Sets()

@@ -10,13 +10,13 @@ import numpy as np
 from karamelo_py.scene.meshes.data import CellBlock, Mesh
 from karamelo_py.script.errors import ScriptError
 
-# smallest volume relative to size^dimension
+# Smallest accepted volume / size^dimension.
 _FLAT = 1e-12
-# Distance from the plane of a 2D mesh, relative to its size.
+# Accepted distance from the plane of a 2D mesh, relative to its size.
 _PLANE = 1e-9
 _CHUNK = 4096
 # If fewer curved elements than this fraction are folded at an edge, the mesher made the folds, and
-# signed sums are right. Otherwise the nodes are in another order.
+# signed sums are right. If more are folded, the nodes are in the wrong order.
 _FOLDED = 0.01
 
 
@@ -26,7 +26,7 @@ class Shape(NamedTuple):
     dimension: int
     mirrored: tuple[int, ...]
     corners: tuple[tuple[float, ...], ...]  # natural coordinates
-    simplex: bool = False  # coordinates >= 0 with a sum <= 1; else from -1 to 1
+    simplex: bool = False  # natural coordinates >= 0 with a sum <= 1; otherwise from -1 to 1
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
@@ -49,7 +49,7 @@ SHAPES = {
     )
 }
 
-# Corners between which the further nodes of second-order elements lie: edges, then faces.
+# Second-order elements have further nodes between these corners: edges first, then faces.
 MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -72,7 +72,7 @@ class MeshElements(NamedTuple):
     shape: Shape
     numbers: np.ndarray  # (n, c) of the corners
     corners: np.ndarray
-    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if more than corners
+    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if there are more than corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
     bulge: float = 0.0  # distance of `nodes` from the straight element / its size
 
@@ -89,8 +89,9 @@ def elements_of(
 ) -> list[MeshElements]:
     """Return elements of `dimension` in a mesh or its `group`, one item per type.
 
-    `lower` accepts groups of lower dimension, such as a boundary. Raises ScriptError if there are
-    no elements, for unsupported types, and off z = 0 in 2D or the x axis in 1D.
+    With `lower`, groups of lower dimension, such as a boundary, are accepted. Raises ScriptError if
+    there are no elements, if a type is not supported, and if nodes are off z = 0 in 2D or off the x
+    axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -144,7 +145,7 @@ def in_order(cells: CellBlock) -> CellBlock:
 
 
 def _reference(cells: CellBlock) -> tuple[tuple[float, ...], ...]:
-    """Return natural coordinates of the nodes, or only of the corners if others are unknown."""
+    """Return natural coordinates of all nodes, or only of the corners if others are unknown."""
     shape, count = SHAPES[cells.family], cells.nodes.shape[1]
     if cells.reference is not None:
         coordinates = tuple(map(tuple, cells.reference.tolist()))
@@ -196,7 +197,10 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements: older formats repeat elements that are in two physical groups."""
+    """Drop repeated elements.
+
+    Older formats repeat elements that are in two physical groups.
+    """
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 
@@ -220,7 +224,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     """Return elements with positive orientation, volumes (n,) and centroids (n, d).
 
     Integrals of det J and x det J are exact, also with curved edges and warped faces. Raises
-    ScriptError for a flat or twisted element; a few curved elements may be folded at an edge.
+    ScriptError for a flat or twisted element. A few curved elements may be folded at an edge.
     """
     shape = elements.shape
     nodes = elements.corners if elements.nodes is None else elements.nodes
@@ -230,7 +234,7 @@ def measured(elements: MeshElements) -> tuple[MeshElements, np.ndarray, np.ndarr
     twisted = np.zeros(len(nodes), bool)
     for first in range(0, len(nodes), _CHUNK):
         batch = slice(first, first + _CHUNK)
-        # Positions relative to the first node have more digits far from the origin.
+        # Far from the origin, positions relative to the first node have more digits.
         local = nodes[batch] - nodes[batch, :1]
         weights, x = _integrated(shape, reference, local)
         volume[batch] = weights.sum(axis=1)

@@ -16,7 +16,7 @@ FAMILIES = {
     "WED": "wedge", "PYR": "pyramid", "BAR": "line", "BEA": "line", "TRU": "line", "EDG": "line",
     "SPH": "vertex", "CIR": "vertex",
 }  # fmt: skip
-MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # without results
+MESH = re.compile("coord|connect|(eb|ss|ns)_|(elem|side)_ss|node_ns")  # everything except results
 SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0,), (1,)),
     "SHELL": ((0, 1, 2, 3), (0, 3, 2, 1), (0, 1), (1, 2), (2, 3), (3, 0)),
@@ -30,7 +30,7 @@ SIDES: dict[str, tuple[tuple[int, ...], ...]] = {
     "wedge": ((0, 1, 4, 3), (1, 2, 5, 4), (0, 3, 5, 2), (0, 2, 1), (3, 4, 5)),
     "pyramid": ((0, 1, 4), (1, 2, 4), (2, 3, 4), (0, 4, 3), (0, 3, 2, 1)),
 }
-# Nodes of edges along z come before nodes at the top edges; further nodes are ignored.
+# In Exodus, nodes of edges along z come before nodes of the top edges. Further nodes are ignored.
 ORDER = {
     ("hexahedron", 20): [*range(12), *range(16, 20), *range(12, 16)],
     ("wedge", 15): [*range(9), *range(12, 15), *range(9, 12)],
@@ -38,7 +38,7 @@ ORDER = {
 
 
 def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
-    """Return arrays and element types by name, of netCDF-4 (which is HDF5) or netCDF-3."""
+    """Return arrays and element types by name, from netCDF-4 (which is HDF5) or netCDF-3."""
     with path.open("rb") as file:
         is_hdf5 = file.read(4) == b"\x89HDF"
     if is_hdf5:
@@ -63,7 +63,10 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Read blocks, side sets and node sets; raises KeyError or OSError for other files."""
+    """Read blocks, side sets and node sets.
+
+    Raises KeyError or OSError for files of other formats.
+    """
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 
@@ -83,7 +86,7 @@ def read_exodus(path: Path) -> Mesh:
     points[:, : len(coordinates)] = coordinates.T
     cells: list[CellBlock] = []
     connected = each("connect")
-    of_set = names("eb", len(connected))  # by block of `cells`
+    of_set = names("eb", len(connected))  # for each block of `cells`
     firsts = np.cumsum([1, *map(len, connected)])
     for k, nodes in enumerate(connected):
         word = variables[f"connect{k + 1}"][1].upper().rstrip("\0")

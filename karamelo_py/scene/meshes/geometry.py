@@ -1,4 +1,4 @@
-"""Accept only Gmsh geometries with known commands that describe a shape."""
+"""Check Gmsh geometries: accept only known commands that describe a shape."""
 
 import re
 import tomllib
@@ -15,7 +15,7 @@ _TOKEN = re.compile(
 )
 _LONGEST = 1000  # characters; Gmsh cuts longer strings and reads the rest as commands
 # When Gmsh skips a condition, loop or macro, it searches for the first letters of these words (and
-# of If, For, Macro, Function) and drops the next letter, which may be the beginning of a string.
+# of If, For, Macro, Function) and drops the letter after them, which may begin a string.
 _ENDS = re.compile(r"EndIf|EndFor|Else|Return")
 _LOSES = re.compile(r"(?:^|[^A-Za-z_])[EFIMR]$")
 _MAY = "run a program, or read or write a file"
@@ -24,24 +24,24 @@ _WORDS, _NO_NAMES, _FIELDS = (
     frozenset(_LISTS[name].split()) for name in ("describe", "act", "fields")
 )
 
-# Display options; no other option may name a file or a command.
+# Allowed options: display. Any other option may name a file or a command.
 _GENERAL = re.compile(
     r"ExpertMode|NumThreads|Terminal|Verbosity|SmallAxes|Color|(?:Axes|Light|Trackball)\w*"
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # they write to a file if > follows the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # write to a file if > follows the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
 _NAMES = frozenset(("For", "Macro", "Function"))
-# Gmsh readers without commands, by ending as Gmsh spells it.
+# Gmsh readers of files without commands, by ending as Gmsh spells it.
 _DATA = frozenset(
     ending
     for lower in ("stl", "brep", "iges", "igs", "step", "stp", "unv", "vtk", "mesh", "off", "obj",
                   "med", "bdf", "nas", "ply", "cgns")
     for ending in (f".{lower}", f".{lower.upper()}")
 )  # fmt: skip
-# Files that may be read if they begin as a mesh.
+# Endings of files that may be read if they begin like a mesh.
 _KINDS = frozenset(("", ".geo", ".geo_unrolled", ".pos", ".opt", ".msh", ".msh2", ".msh4"))
 _MESH = (b"$PTS", b"$NO", b"$PARA", b"$ELM", b"$MeshFormat", b"$Comments")
 _PAIRS = {"(": ")", "[": "]", "{": "}"}

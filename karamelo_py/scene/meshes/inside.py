@@ -7,17 +7,17 @@ from karamelo_py.scene.meshes.data import FACES, Mesh
 from karamelo_py.scene.meshes.elements import MeshElements, measured
 from karamelo_py.script.errors import ScriptError
 
-# Distance, relative to the size, within which vertices are equal, as files have few digits.
+# Distance, relative to the size, within which vertices count as equal, since files have few digits.
 _WELD = 1e-6
-_SAMPLES = 4000  # approximate number of positions that test whether one shell lies in another
+_SAMPLES = 4000  # approximate number of positions used to test whether one shell lies in another
 _SETS = 8  # maximum number of sets of shells that do not overlap
 
 
 class Skin:
     """The surface of a shape: sets of faces (m, d, d), each closed.
 
-    A position is inside if a set encloses it or a face is within `tolerance`; with `open`, only in
-    the second case. `odd`: see `Surface`.
+    A position is inside if a set encloses it or a face is within `tolerance`. With `open`, sets
+    enclose nothing. `odd`: see `Surface`.
     """
 
     def __init__(
@@ -25,7 +25,7 @@ class Skin:
     ):
         self.tolerance, self.open = tolerance, open
         self.surfaces: list[Surface] = [surface_of(faces, tolerance, odd=odd) for faces in sets]
-        # Length, area or volume; None if sets may overlap.
+        # Length, area or volume; None if it is unknown, as sets may overlap.
         self.volume = None if open or odd or len(sets) > 1 else float(abs(_volumes(sets[0]).sum()))
 
     @property
@@ -74,7 +74,10 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Return simplices (m, d, d); in 3D, lines and nodes become triangles with repeated corners."""
+    """Return simplices (m, d, d).
+
+    In 3D, lines and nodes become triangles with repeated corners.
+    """
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]
@@ -115,11 +118,11 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
     """Return the closed shells of `points` (n, 3), `triangles` (m, 3).
 
-    Shells inside others are cavities, whatever their orientation; overlapping shells form one body.
+    A shell inside another is a cavity, whatever its orientation; overlapping shells form one body.
     Raises ScriptError for an edge with an odd number of triangles.
     """
     triangles = _closed(points, triangles)
-    for sided in (True, False):  # first with the orientation of the file, then without
+    for sided in (True, False):  # first by the orientation in the file, then ignoring it
         some = _single(triangles, sided=sided)
         some = some if sided else _turned(some)
         edge, way = _edges(some)
@@ -141,7 +144,7 @@ def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin
     depth = within.sum(axis=1)
     shells = [s[:, ::-1] if n % 2 else s for s, n in zip(shells, depth, strict=True)]
     # Nested shells join the set of the outermost shell around them. Outermost shells whose boxes do
-    # not overlap are in the same set, up to `_SETS` sets.
+    # not overlap are in one set; there are at most `_SETS` sets.
     sets: list[list[int]] = []
     for outer in np.flatnonzero(depth == 0):
         members = [outer, *np.flatnonzero(within[:, outer])]
@@ -191,18 +194,20 @@ def _ends(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edge (3 m,) of each triangle side, and the direction (1 or -1) in which it runs.
+    """Return the edge (3 m,) of each triangle side, and the side's direction along it (1 or -1).
 
-    Edges are numbered from 0, and equal ones have the same number.
+    Edges are numbered from 0; coinciding edges have the same number.
     """
     low, high, way = _ends(triangles)
     return np.unique(low * (triangles.max() + 1) + high, return_inverse=True)[1].ravel(), way
 
 
 def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Drop repeated triangles, and all of them where two shells touch.
+    """Drop repeated triangles.
 
-    If none would be left, all are returned.
+    Where two shells touch, all copies of a triangle are dropped.
+
+    If no triangle would be left, all are returned.
     """
     same = np.sort(triangles, axis=1)
     order = np.lexsort(same.T)
@@ -216,7 +221,7 @@ def _single(triangles: np.ndarray, *, sided: bool) -> np.ndarray:
 
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
-    """Orient triangles so that two at an edge run through it in opposite directions."""
+    """Orient triangles such that two of them run along a common edge in opposite directions."""
     edge, way = _edges(triangles)
     m = len(triangles)
     order = np.argsort(edge, kind="stable")
@@ -224,15 +229,15 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     pairs = begin[np.diff(np.r_[begin, len(order)]) == 2]
     one, other = order[pairs], order[pairs + 1]
     flipped = m * (way[one] == way[other])
-    # Node k of this graph is triangle k as in the file, node m + k the reversed one; links connect
-    # nodes with consistent orientation. In each component the lowest triangle is not reversed.
+    # In this graph, node k is triangle k as in the file, and node m + k is the reversed triangle.
+    # Links connect consistent orientations. In each component, the lowest triangle is not reversed.
     one, other = one % m, other % m
     label = _components(np.r_[one, one + m], np.r_[other + flipped, other + m - flipped], 2 * m)
     return np.where((label[:m] > label[m:])[:, None], triangles[:, ::-1], triangles)
 
 
 def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
-    """Return the lowest node of each node's component in a graph with links from `a` to `b`."""
+    """Return, for each node, the lowest node of its component in a graph with links `a` to `b`."""
     lowest = np.arange(count)
     while (apart := lowest[a] != lowest[b]).any():
         ends = np.sort([lowest[a[apart]], lowest[b[apart]]], axis=0)
@@ -243,9 +248,9 @@ def _components(a: np.ndarray, b: np.ndarray, count: int) -> np.ndarray:
 
 
 def _shells(edge: np.ndarray, *, sided: bool) -> np.ndarray:
-    """Return the shell (m,) of each triangle: triangles with a common edge are in the same one.
+    """Return the shell (m,) of each triangle; triangles with a common edge are in one shell.
 
-    If not `sided`, only edges of exactly two triangles connect them.
+    If not `sided`, only edges of exactly two triangles connect triangles.
     """
     m, edges = len(edge) // 3, edge.max() + 1
     triangle = edges + np.tile(np.arange(m), 3)

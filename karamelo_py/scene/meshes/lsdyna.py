@@ -26,7 +26,7 @@ from karamelo_py.scene.meshes.deck import (
 
 ENDINGS = (".k", ".key", ".dyn", ".kwd")
 _SET = re.compile(r"SET_(NODE|SOLID|SHELL|PART|SEGMENT)(_LIST)?(_GENERATE)?(_TITLE)?")
-# Type of a collapsed hexahedron, its pairs of equal nodes, and its distinct nodes.
+# Type that a collapsed hexahedron becomes, its pairs of equal nodes, and its distinct nodes.
 _COLLAPSED = (
     ("tetra", ((3, 4), (4, 5), (5, 6), (6, 7)), [0, 1, 2, 3]),
     ("pyramid", ((4, 5), (5, 6), (6, 7)), [0, 1, 2, 3, 4]),
@@ -62,7 +62,7 @@ def _keywords(path: Path, above: tuple[Path, ...] = ()) -> Iterator[DeckKeyword]
 
 
 def _table(keyword: DeckKeyword, count: int, width: int = 10, ids: int = 1) -> np.ndarray:
-    """Return numbers (n, count): `ids` columns of 8 or 10 characters, the others of `width`.
+    """Return numbers (n, count): `ids` columns of 8 or 10 characters, then columns of `width`.
 
     In long decks all columns have 20 characters.
     """

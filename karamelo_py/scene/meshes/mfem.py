@@ -34,7 +34,7 @@ _SECTIONS = re.compile(
 
 
 def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozenset[int], int]:
-    """Map the corners around each second-order node to its number, counted from `first`.
+    """Map the set of corners around each second-order node to the node's number, from `first` on.
 
     Edge nodes come first, then nodes of quadrilateral faces, then nodes inside elements, each in
     order of appearance.
@@ -56,7 +56,10 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Read a mesh, with attributes as groups; raises ValueError for unsupported content."""
+    """Read a mesh, with attributes as groups.
+
+    Raises ValueError for unsupported content.
+    """
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
         head = text.strip().splitlines()[0]

@@ -25,7 +25,7 @@ from karamelo_py.scene.meshes.deck import (
 )
 
 ENDINGS = (".bdf", ".nas")
-# Numbers of corners and of all nodes. A second-order element may omit mid-edge nodes.
+# Number of corners, and number of all nodes. Second-order elements may omit mid-edge nodes.
 _TYPES = {
     "CTETRA": ("tetra", 4, 10), "CPENTA": ("wedge", 6, 15), "CHEXA": ("hexahedron", 8, 20),
     "CPYRAM": ("pyramid", 5, 13),
@@ -34,7 +34,7 @@ _TYPES = {
     **dict.fromkeys(("CQUAD4", "CQUADR", "CQUADX4", "CPLSTN4", "CPLSTS4"), ("quad", 4, 4)),
     **dict.fromkeys(("CQUAD8", "CQUADX8", "CPLSTN8", "CPLSTS8"), ("quad", 4, 8)),
 }  # fmt: skip
-# In Nastran, vertical edges come after the lower ones.
+# Order of nodes. In Nastran, vertical edges come after lower edges.
 _ORDER = {
     "hexahedron20": [*range(12), *range(16, 20), *range(12, 16)],
     "wedge15": [*range(9), *range(12, 15), *range(9, 12)],
@@ -58,7 +58,7 @@ class _Entry(NamedTuple):
             raise self.wrong(f"has '{self.fields[k]}' instead of a whole number") from None
 
     def wholes(self, count: int) -> list[int]:
-        """Return integers of the first `count` fields; an omitted second one equals the first."""
+        """Return the integers in the first `count` fields; an omitted second equals the first."""
         try:
             numbers = list(map(int, self.fields[:count]))
         except ValueError:
@@ -70,7 +70,7 @@ class _Entry(NamedTuple):
         text = self.fields[k] if k < len(self.fields) else ""
         try:
             return float(text or 0)
-        except ValueError:  # 1.5-3 is 1.5e-3, and D an exponent in double precision
+        except ValueError:  # 1.5-3 means 1.5e-3, and D is an exponent in double precision
             written = re.sub(r"(?<=[\d.])[DdEe]?([+-]\d+)$", r"e\1", text.replace(" ", ""))
         try:
             return float(written)
@@ -128,7 +128,7 @@ def _spherical(x: np.ndarray) -> np.ndarray:
 class _Systems:
     def __init__(self) -> None:
         self.by_number: dict[int, tuple[_Entry, int]] = {}  # entry, and index of its first field
-        self.nodes: dict[int, tuple[_Entry, int, list[float]]] = {}  # system -1: the default
+        self.nodes: dict[int, tuple[_Entry, int, list[float]]] = {}  # system -1: the default system
         self.default = 0
 
     def add(self, entry: _Entry) -> None:
@@ -140,7 +140,7 @@ class _Systems:
     def places(
         self, entry: _Entry, number: int, x: np.ndarray, above: tuple[int, ...] = ()
     ) -> np.ndarray:
-        """Return positions (n, 3) in the basic system for coordinates `x` in another system."""
+        """Return positions (n, 3) in the basic system for coordinates `x` in system `number`."""
         number = self.default if number < 0 else number
         if not number:
             return x

@@ -9,7 +9,10 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Read a file: polygons become triangles, objects and groups become sets."""
+    """Read a file.
+
+    Polygons become triangles; objects and groups become sets.
+    """
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}
@@ -24,7 +27,7 @@ def read_obj(path: Path) -> Mesh:
             elif word in names:
                 names[word] = tuple(rest)
             elif word == "f":
-                # Ignore texture and normal after a slash; negative numbers count from the last
+                # Ignore texture and normal after a slash. Negative numbers count back from the last
                 # vertex.
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
@@ -50,7 +53,7 @@ def read_obj(path: Path) -> Mesh:
 
 
 def _split(points: list[list[float]], corners: list[int]) -> list[list[int]]:
-    """Divide a polygon into a fan of triangles from a corner from which all others are visible."""
+    """Divide a polygon into a fan of triangles, from a corner that sees all other corners."""
     count = len(corners)
     for start in range(count):
         fan = [

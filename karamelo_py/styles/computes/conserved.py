@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
 
 
 class Drift:
-    """Change since the first value, relative to the largest scale so far."""
+    """Change of a value since its first one, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -114,7 +114,7 @@ class Drift:
         self._scale = 0.0
 
     def __call__(self, value: np.ndarray | float, scale: float) -> float:
-        """Return the change up to `value`; `scale` > 0 is an upper bound of its magnitude."""
+        """Return the relative change up to `value`; `scale` > 0 bounds the magnitude of values."""
         value = np.atleast_1d(np.asarray(value, float))
         if self._first is None:
             self._first = value
@@ -140,11 +140,11 @@ class EnergyBalance(Compute):
 
     Notes
     -----
-    Publishes ID, kinetic + stored + dissipated energy - work; ID_total, the same without the work;
-    and ID_drift, the change of ID since the first output divided by the largest of these energies
-    and the work so far. Velocities lag positions by half a step, so ID_drift has an error of order
-    dt (up to 33 % in a body of a few cells). The energy line at the end of a run has no such error.
-    Energy stored within points by affine transfers is not included.
+    Publishes ID, kinetic + stored + dissipated energy - work; ID_total, kinetic + stored +
+    dissipated energy; and ID_drift, the change of ID since the first output, divided by the largest
+    energy or work so far. Velocities lag positions by half a step, so ID_drift has an error of
+    order dt (up to 33 % in a body of a few cells). The energy line at the end of a run has no such
+    error. Energy stored within points by affine transfers is not included.
 
     See Also
     --------
@@ -194,8 +194,8 @@ class LinearMomentum(Momentum):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
-    the largest sum m |v| so far.
+    Publishes ID_x, ID_y, ID_z, and ID_drift: the magnitude of the change since the first output,
+    divided by the largest sum m |v| so far.
 
     See Also
     --------
@@ -222,8 +222,9 @@ class AngularMomentum(Momentum):
 
     Notes
     -----
-    Publishes ID_x, ID_y, ID_z, and ID_drift: the length of the change since the first output over
-    the largest sum m |x - c| |v| so far. The affine velocity of points (APIC) is included.
+    Publishes ID_x, ID_y, ID_z, and ID_drift: the magnitude of the change since the first output,
+    divided by the largest sum m |x - c| |v| so far. The affine velocity of points (APIC) is
+    included.
 
     See Also
     --------
@@ -247,7 +248,7 @@ class AngularMomentum(Momentum):
         if twists:
             v[:, 2] = points.particle("vtheta")
         angular = np.cross(arm, v)
-        if twists:  # other components sum to zero over a revolution
+        if twists:  # the sum of all other components over a revolution is 0
             angular *= (0, 1, 0)
         moment = points.velocity_moment
         if moment is not None and d > 1 and not twists:

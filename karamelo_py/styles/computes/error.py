@@ -94,7 +94,7 @@ class Norm:
         if self.kind == "max":
             self._sums = mean = np.maximum(self._sums, moment)
         else:
-            # The first output has no preceding interval; its norm is used until the second.
+            # The first output has no preceding interval; its norm is used until the second output.
             span = time - self._time if self._time is not None else 0.0
             self._duration += span
             self._sums += span * moment**self.power
@@ -111,7 +111,7 @@ class Norm:
 
 
 class Compared:
-    """Mix-in for computes with `sizes(points)` and a `norm`."""
+    """Mix-in of computes that have `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
         """Return norms (2,) of differences and exact values, and the other sums of `sizes`."""

@@ -104,7 +104,8 @@ class AverageTemperature(Mean):
 class MaxPlasticStrain(Compute):
     """Measure the largest equivalent plastic strain and temperature of a group of points.
 
-    Published as ID_Epmax and ID_Tmax; 0 without a yield strength or a temperature.
+    The values are published as ID_Epmax and ID_Tmax. They are 0 if no material has a yield strength
+    or a temperature.
 
     Example
     -------
@@ -205,7 +206,8 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points that fly ahead.
+    The result is published as ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points that
+    fly ahead.
 
     Parameters
     ----------
@@ -238,7 +240,7 @@ class PositionQuantile(Compute):
                 self.publish_components(np.zeros(d))
                 return
             if shift == 64 - BITS:
-                # Against round-off: 0.1 of ten equal points is one point.
+                # Allow for round-off: 0.1 of ten equal points is one point.
                 wanted = self.fraction * mass.sum(axis=1) * (1 - 1e-12)
             for axis, of_bits in enumerate(mass):
                 occupied = np.flatnonzero(of_bits)
@@ -273,8 +275,8 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
 class Probe(Mean):
     """Measure a column of the points, such as a stress: its mean, or its value at one point.
 
-    Published as ID, or for several columns as ID_column. NaN for an empty group, and for a point
-    that no longer exists.
+    The value is published as ID, or as ID_column if there are several columns. It is NaN for an
+    empty group, and for a point that no longer exists.
 
     Parameters
     ----------
@@ -283,7 +285,7 @@ class Probe(Mean):
     point
         The id of a point, as in dumps, whose values are measured instead of the mean.
     x, y, z
-        A position: at each output, values of the point of the group that is nearest are measured.
+        A position. At each output, the point of the group closest to it is measured.
 
     Example
     -------
@@ -331,7 +333,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Return distance, id and columns of the given or nearest point."""
+        """Return distance, id and columns of the chosen or nearest point."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

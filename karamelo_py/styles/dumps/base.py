@@ -26,7 +26,7 @@ class Dump(Rhythmic):
         Steps between two snapshots, or ``time(T)``. The first and the last state of a run are
         always written.
     file
-        File name. The first ``*`` becomes the step number; without ``*`` one file has all
+        File name. The first ``*`` becomes the step number; without ``*``, one file holds all
         snapshots.
     columns
         Content of the dump, interpreted by the style.
@@ -50,7 +50,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Take part in the exchange; only rank 0 writes."""
+        """Take part in the exchange of data; only rank 0 writes."""
         with discarded():
             self.write()
 
@@ -64,7 +64,7 @@ class Dump(Rhythmic):
 
 
 POSITIONS = ("x", "y", "z")
-# These are in every row anyway; `tag` is another name of the id in Karamelo.
+# Each row has these columns anyway. In Karamelo, `tag` is another name of the id.
 LEADING = ("id", "type", "tag")
 
 
@@ -75,7 +75,7 @@ class TableRows(NamedTuple):
 
 
 class TableDump(Dump):
-    """A dump of ``id type x y z`` and the requested columns, in the format of `write`.
+    """A dump of ``id type x y z`` and the requested columns; `write` determines the format.
 
     `OfPoints` or `OfNodes`, which must come first among the bases, defines the `names` of columns,
     the `absent` ones (always 0), the `extent` (number of rows, largest id), and `tables`, pieces of

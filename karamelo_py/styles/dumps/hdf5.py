@@ -29,7 +29,7 @@ class SnapshotRows(NamedTuple):
 
 
 class Hdf5Dump(TableDump):
-    """A dump as arrays (snapshot, row); rows without a value (deleted points) hold NaN.
+    """A dump as arrays (snapshot, row). Rows without a value (deleted points) hold NaN.
 
     Parameters
     ----------
@@ -97,9 +97,9 @@ class Hdf5Dump(TableDump):
                 file.truncate(size)
 
     def resumed(self) -> None:
-        """Continue the file of an earlier run in a copy, with the bytes of one long run.
+        """Continue a copy of the file that an earlier run wrote, with the bytes of one long run.
 
-        HDF5 allows no writing to a file that was open when a program was killed.
+        HDF5 cannot write to a file that was open when a program was killed.
         """
         path, count = self.path(), self._snapshots
         if count == 0 or self.one_file_per_step:
@@ -256,7 +256,7 @@ class Hdf5(OfPoints, Hdf5Dump):
 class GridHdf5(OfNodes, Hdf5Dump):
     """Write the nodes of the background grids to one compressed binary file.
 
-    Otherwise like dump hdf5.
+    The format is the same as in dump hdf5.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class HeightsDump(Dump):
     Parameters
     ----------
     file
-        File name with a ``*``, which becomes the step number: each snapshot is a file.
+        File name with a ``*``, which becomes the step number; each snapshot is a separate file.
     cell
         Cell size of the raster: at least twice the point spacing, otherwise cells inside the
         deposit are empty.

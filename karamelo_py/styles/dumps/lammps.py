@@ -134,7 +134,7 @@ class Gzipped:
     Parameters
     ----------
     file
-        File name, preferably with the ending ``.gz``; a ``*`` as in dump particle.
+        File name, preferably with the ending ``.gz``; a ``*`` works as in dump particle.
     """
 
     def encoder(self) -> Any:
@@ -150,7 +150,7 @@ class BinaryRows:
     Parameters
     ----------
     file
-        File name, preferably with the ending ``.bin``; a ``*`` as in dump particle.
+        File name, preferably with the ending ``.bin``; a ``*`` works as in dump particle.
     """
 
     def _snapshot(self) -> Iterator[bytes]:
@@ -216,7 +216,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    Files have less than half the size; otherwise the same as dump particle.
+    Files are less than half as large as those of dump particle; everything else is the same.
 
     Example
     -------
@@ -231,7 +231,7 @@ class ParticleGz(Gzipped, Particle):
 class GridGz(Gzipped, GridDump):
     """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
-    Otherwise the same as dump grid.
+    Everything else is the same as in dump grid.
 
     Example
     -------
@@ -246,7 +246,8 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    Full precision, and faster to write than text; otherwise the same as dump particle.
+    Numbers have full precision, and are faster to write than text. Everything else is the same as
+    in dump particle.
 
     Example
     -------
@@ -263,7 +264,8 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    Full precision, and faster to write than text; otherwise the same as dump grid.
+    Numbers have full precision, and are faster to write than text. Everything else is the same as
+    in dump grid.
 
     Example
     -------

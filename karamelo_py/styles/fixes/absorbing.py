@@ -23,7 +23,7 @@ LAYERS = 3.5  # largest extent of the nodes of an edge along its normal, in cell
 
 
 class Support(Field):
-    """Balances the initial force on a node; NaN before the first step."""
+    """Force that balances the initial force on a node; NaN before the first step."""
 
     shape = vector
     start = float("nan")
@@ -69,10 +69,10 @@ class Absorbing(Fix):
     Notes
     -----
     The traction is -rho c v, where c is the P wave speed for the normal velocity and the S wave
-    speed for the tangential velocity. Of the energy of a pulse 20 cells long at normal incidence,
-    0.2 % is reflected. Of plane waves at up to 45 degrees, up to 1.4 % (P) and 4.7 % (S, at 30
-    degrees) is reflected, or 0.2 % with a layer of fix mass_damping. In saturated ground, soil and
-    water move together at the edge.
+    speed for the tangential velocity. A pulse 20 cells long at normal incidence reflects 0.2 % of
+    its energy. Plane waves at up to 45 degrees reflect at most 1.4 % (P) and 4.7 % (S, at 30
+    degrees), or 0.2 % with a layer of fix mass_damping. In saturated ground, soil and water move
+    together at the edge.
 
     A constant force balances the force on each node in the first step, so that ground with an
     initial stress (fix initial_stress) stays at rest. Loads applied later, such as weight, slowly
@@ -137,7 +137,10 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return P and S wave speeds; in saturated soil, rho c / dry density."""
+    """Return P and S wave speeds.
+
+    In saturated soil, they are multiplied by (saturated density) / (dry density).
+    """
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

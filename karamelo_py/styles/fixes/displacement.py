@@ -35,9 +35,9 @@ class Displacement(InitialFix):
 
     Notes
     -----
-    The columns ux, uy, uz of these points then have the new reference. To measure from a later
-    stage, delete the fix (delete_fix) and define it again. Displacements of other points, and of
-    points that enter later, are measured from the initial position.
+    The columns ux, uy, uz of these points are then relative to those positions. To measure from a
+    later stage, delete the fix (delete_fix) and define it again. Displacements of other points, and
+    of points that enter later, are measured from the initial position.
 
     See Also
     --------

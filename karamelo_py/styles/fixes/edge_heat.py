@@ -23,7 +23,10 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the surface; for meshes None: faces of the points' boxes are used."""
+        """Return faces on the surface.
+
+        The result is None for meshes, for which faces of the points' boxes are used.
+        """
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 
@@ -90,7 +93,7 @@ class EdgeConvection(EdgeHeat):
         Heat transfer coefficient, heat per unit area, time and kelvin, a function of x, y, z
         (initial position of the edge), time and published values.
     T_inf
-        Temperature of the surrounding fluid, likewise.
+        Temperature of the surrounding fluid, a function of the same quantities.
 
     Example
     -------

@@ -39,7 +39,7 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
     """Return the outer faces of the points `ids` inside a region.
 
     Points are boxes. A face is an outer one if the centre of the next box is outside the region.
-    For boxes cut by a region see `faces_cut`.
+    For boxes cut by a region, see `faces_cut`.
     """
     d = hub.domain.dimension
     if not len(ids):
@@ -233,7 +233,7 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the surface; None: find them from boxes."""
+        """Return faces on the surface, or None to find them from boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
@@ -307,13 +307,14 @@ class EdgeTraction(EdgeFix):
 
     Notes
     -----
-    Publishes the sum as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
+    Publishes the total force as ID_x, ID_y, ID_z; with twist, ID_z is the torque about the axis.
 
     Points are boxes that fill the region. Each point with an outer face in the direction of `side`
     gets the traction times the initial area of this face, as a dead load (magnitude and direction
-    do not follow the deformation). It acts at the point, half a box inside the edge; on a plane
-    side, the total is exactly traction times area. Faces of a hole are loaded too: for a plate with
-    a hole, use the region without the hole. In axisymmetry, area and force are per radian.
+    do not follow the deformation). The force acts at the point, half a box inside the edge. On a
+    plane side, the total force is exactly traction times area. Faces of a hole are loaded too: for
+    a plate with a hole, use the region without the hole. In axisymmetry, area and force are per
+    radian.
 
     A set of faces in a mesh file loads the nearest points of the group: ``region(top, mesh,
     deck.inp, TOP)`` and ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.
@@ -373,7 +374,7 @@ class EdgePressure(EdgeFix):
 
     Notes
     -----
-    Publishes the sum as ID_x, ID_y, ID_z.
+    Publishes the total force as ID_x, ID_y, ID_z.
 
     The pressure acts inwards on the initial area of each outer face of the points' boxes, with
     constant magnitude and direction. Points approximate a curved edge by steps, but the force along

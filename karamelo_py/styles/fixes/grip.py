@@ -37,10 +37,10 @@ def memory_for(hub: Hub, kind: type) -> type:
 
 class Gripping(Fix):
     remembers = ("has_touched",)
-    has_touched = False  # until then, grips in a restart file are from an earlier fix
+    has_touched = False  # False as long as grips in a restart file can be those of an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
-    memories: tuple[type, ...] = ()  # fields of this fix alone
+    memories: tuple[type, ...] = ()  # fields that only this fix uses
     mu = 0.0
 
     def rubs(self, hub: Hub, mu: float) -> None:

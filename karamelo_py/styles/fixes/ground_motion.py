@@ -68,12 +68,12 @@ class BaseAcceleration:
         return BaseAcceleration(hub, formula)
 
     def take(self, axis: str) -> None:
-        """Choose the column for a direction."""
+        """Choose the column of the record for a direction."""
 
     def motion(self, time: float, step: float, before: tuple[float, float]) -> tuple:
-        """Return velocity, acceleration, and its rate in `step`;
+        """Return velocity, acceleration, and the rate of the acceleration in `step`.
 
-        `before`: an earlier time and its velocity.
+        `before` is an earlier time and the velocity at that time.
         """
         since, speed = before
         at = np.array([since, (since + time) / 2, time, time + step])
@@ -124,7 +124,8 @@ class GroundMotion(VelocityNodes):
     ----------
     acceleration
         ax, ay, az, one per dimension: a formula of time, or a file with the columns time and
-        acceleration (if it has several, the columns named ax, ay, az). NULL: no acceleration.
+        acceleration (if it has several, the columns named ax, ay, az). NULL leaves the direction
+        free.
     through
         ID of a fix absorbing of the same nodes, for a compliant base. By default the base is rigid
         and its nodes have the velocity of the record.
@@ -137,7 +138,7 @@ class GroundMotion(VelocityNodes):
     -----
     Accelerations from a file are interpolated linearly in time and 0 after the last row. They are
     integrated from rest; if the final velocity of the record is not 0, the base remains in motion.
-    A rigid base reflects all waves that reach it; directions with NULL are free.
+    A rigid base reflects all waves that reach it.
 
     With `through`, waves enter and leave through the edge. The record is then the outcrop motion of
     rock, twice the incoming wave (Joyner & Chen 1975): its velocity v is applied as the traction

@@ -59,7 +59,7 @@ MANY = 1_000_000  # points of a solid above which the check is skipped
 
 
 def hold_node(node):
-    """Set T to the value; the published sum is the heating power that this needs."""
+    """Set T to the value; the published sum is the heating power that this takes."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
@@ -216,7 +216,7 @@ class ConvectionParticles(FacesOfPoints):
         Heat transfer coefficient, heat per unit area, time and kelvin, a function of x, y, z, x0,
         y0, z0, time and published values.
     T_inf
-        Temperature of the surrounding fluid, likewise.
+        Temperature of the surrounding fluid, a function of the same quantities.
 
     Example
     -------

@@ -19,7 +19,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.erosion import Erosion
 from karamelo_py.styles.fixes.velocity_nodes import Velocity, VelocityNodes
 
-MOST = 20_000_000  # points that have not entered yet
+MOST = 20_000_000  # limit of points that have not entered yet
 ALIKE = 1e-6  # round-off of positions, in cells
 
 
@@ -53,11 +53,11 @@ class Inflow(VelocityNodes):
 
     Notes
     -----
-    Nodes of the inlet have this velocity. A layer of points enters at the upstream end of the inlet
-    whenever the previous layer has moved by the layer spacing, so that the inflow of mass is exact.
-    The layers of the solid are repeated in order, and ids follow the order of entry. All points up
-    to the time `until` are created before the first run. The energy balance counts the energy of
-    entering points as work.
+    Nodes of the inlet have the prescribed velocity. A layer of points enters at the upstream end of
+    the inlet whenever the previous layer has moved by the layer spacing, so that the inflow of mass
+    is exact. The layers of the solid are repeated in order, and ids follow the order of entry. All
+    points up to the time `until` are created before the first run. The energy balance counts the
+    energy of entering points as work.
 
     Publishes the force on the nodes of the inlet as ID_x, ID_y, ID_z, and the number and mass of
     the points that have entered as ID_points and ID_mass.

@@ -29,11 +29,11 @@ class MassDamping(Fix):
 
     Notes
     -----
-    For waves, put a layer before fix absorbing with a thickness L of one wavelength, and a rate
-    that grows with the square of the depth to 6 c/L at the edge (c: P wave speed). Less than 0.2 %
-    of the energy of P and S waves at up to 45 degrees is then reflected. The damping is
-    mass-proportional Rayleigh damping, so rigid motion is damped, too. In saturated ground it acts
-    on the soil; the water is damped by drag.
+    To absorb waves, put a layer with a thickness L of one wavelength in front of fix absorbing. Let
+    the rate grow with the square of the depth in the layer, to 6 c/L at the edge (c: P wave speed).
+    Less than 0.2 % of the energy of P and S waves at up to 45 degrees is then reflected. The
+    damping is mass-proportional Rayleigh damping, so rigid motion is damped, too. In saturated
+    ground it acts on the soil; the water is damped by drag.
 
     Publishes the sum of the damping forces as ID_x, ID_y, ID_z.
 

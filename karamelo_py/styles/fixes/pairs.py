@@ -100,7 +100,7 @@ class PairContact(Gripping):
         return sum(map(len, self._near(simulation) or ()))
 
     def _near(self, simulation: Any) -> list[np.ndarray] | None:
-        """Return rows of points in the overlap of the solids' extended boxes, or None."""
+        """Return rows of points in the overlap of the two solids' extended boxes, or None."""
         s, d = simulation.setup, simulation.kin.dimension
         extents = np.full((2, 7), -np.inf)
         for block in s.blocks:
@@ -184,7 +184,7 @@ class ContactMinimizePenetration(PairContact):
     with a total Lagrangian material point method"): a point at rest is displaced by at most mu p.
 
     In this formula, dt is the regular step, not one shortened to end a run on time. If the step
-    drops suddenly, dt follows gradually, by 1 % of the elapsed time per step.
+    drops suddenly, this dt decreases gradually, by 1 % of the new step in each step.
 
     Surfaces made of spheres are rough: the force to push a block (two points per cell and
     direction) is 0.19, 0.47, 0.57 and 0.52 of its weight with mu = 0, 0.3, 0.5 and 1. Faces

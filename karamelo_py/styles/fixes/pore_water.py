@@ -15,7 +15,7 @@ from karamelo_py.script.expressions import Expression
 
 
 def give(flux, values, dt):
-    """Return the pressure; publish the rate of mass of water that leaves."""
+    """Return the pressure; publish the mass flow rate of the water that leaves."""
     return (values[0], 0 * values[0]), flux[-1]
 
 
@@ -24,7 +24,7 @@ def give_one_way(flux, values, dt):
 
 
 def supply(given, values, dt):
-    """Return the flux; publish the negative rate of mass of water that enters."""
+    """Return the flux; publish minus the mass flow rate of the water that enters."""
     q, way, rho = values
     ways = range(len(given))
     gave = total([where(way == k, given[k], 0) for k in ways])
@@ -107,8 +107,8 @@ class WaterFlux(Fix):
     Parameters
     ----------
     q
-        Volume of water that enters per unit time and unit area (negative: leaves), a function of
-        x0, y0, z0, time and published values.
+        Volume of water that enters per unit time and unit area (negative if it leaves), a function
+        of x0, y0, z0, time and published values.
     through
         Faces through which the water enters, named by their outward direction, or any ``surface``.
         ``volume``: q is per unit volume of the body instead.

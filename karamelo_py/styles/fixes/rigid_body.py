@@ -67,7 +67,8 @@ class RigidBody(Fix):
     force, torque
         Additional force at the centre and torque about it: functions of time and published values.
     motion, turning
-        Prescribed velocity of the centre, prescribed angular velocity; NULL: free component.
+        Prescribed velocity of the centre, and prescribed angular velocity. NULL leaves a component
+        free.
     fixed
         Directions in which the body cannot move: any of x, y, z, and rx, ry, rz for rotation.
     pivot
@@ -101,8 +102,9 @@ class RigidBody(Fix):
     the body retains its velocity. In axisymmetry, bodies move only along the axis. Rigid bodies
     pass through held nodes, and, without fix contact/bodies, through each other.
 
-    In load steps (scheme quasi-static) with ulmpm/contacts its loads and contact are in equilibrium
-    at the end of each step; motion and turning are displacements per unit of time.
+    In load steps (scheme quasi-static) with ulmpm/contacts, the loads on the body and its contact
+    forces are in equilibrium at the end of each step; motion and turning are displacements per unit
+    of time.
 
     See Also
     --------
@@ -305,7 +307,10 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Return a formula or None per axis; `ways` from 3 on are rotations."""
+        """Return a formula or None for each axis.
+
+        `ways` are the directions of the components; numbers from 3 on are rotations.
+        """
         items: list[Expression | None] = [None] * size
         if components is None:
             return items
@@ -340,7 +345,7 @@ class RigidBody(Fix):
             self.led[WAYS.index(name)] = Expression(0.0)
 
     def _held_at(self, pivot: Components | None, velocity: Components | None) -> list[float]:
-        """Return the pivot (3,) of the body; [] without one."""
+        """Return the pivot (3,) of the body, or [] without one."""
         if pivot is None:
             return []
         if max(self.ways) < 3:
@@ -447,10 +452,11 @@ class ContactRigidBody(Fix):
     the points that are pressed, as ID_area (in 2D per unit thickness, in axisymmetry per radian).
 
     A point is a ball (in 2D a disk) with a radius of half the side of a cube of its volume. The
-    contact impulse acts on the nodes around the point, and on the body at the point. It is that a
-    spring of stiffness 0.1 m/dt^2 gives, implicitly with the velocity of the body at the end of the
-    step; from a penetration of 1/8 of a cell on, the spring hardens. Friction stops the slip, with
-    at most mu times the normal impulse. Nodes held by fix velocity_nodes are not moved.
+    contact impulse acts on the nodes around the point, and on the body at the point. It is the
+    impulse of a spring of stiffness 0.1 m/dt^2, computed implicitly with the velocity of the body
+    at the end of the step; the spring hardens above a penetration of 1/8 of a cell. Friction stops
+    the slip, with at most mu times the normal impulse. Nodes held by fix velocity_nodes are not
+    moved.
 
     The fix is for ulmpm and tlmpm. A wheel rolls on its radius plus half a point, so its
     acceleration on a slope is 3.6 % too large with a radius of 3 cells (2 % in 3D). Use
@@ -508,7 +514,7 @@ class ContactRigidBody(Fix):
                 )
 
     def behind(self, points: PointTable) -> tuple[int, float]:
-        """Return the number of points in the body before the first step, and the largest depth."""
+        """Return the number of points that begin inside the body, and the largest depth."""
         depth = self.region.depth(points.position.astype(float), self.hub.domain.h)
         index = points.numbers - self.touches.first_id
         depth = depth[(index < 0) | (index >= self.touches.count)]

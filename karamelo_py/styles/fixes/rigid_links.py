@@ -172,8 +172,8 @@ class Joint(Fix):
     Publishes the force on the first body as ID_x, ID_y, ID_z.
 
     A joint holds from the first step until delete_fix. Joints are solved together with all contacts
-    of the bodies, so masses may have any ratio. In a rotation, a joint opens by an error of second
-    order in the step, which the next step removes.
+    of the bodies, so masses may have any ratio. While bodies rotate, a joint opens in each step by
+    an error of second order in dt; the next step closes it.
 
     A spring is explicit and dissipates nothing up to a stiffness per unit mass of 1/dt^2; a stiffer
     one is implicit, with numerical damping. Damping is implicit.

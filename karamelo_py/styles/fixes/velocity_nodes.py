@@ -64,7 +64,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """Script argument: a formula, or leq or geq and a formula, for a `bound`."""
+    """Script argument: a formula; leq or geq before it makes it a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
@@ -142,7 +142,8 @@ class VelocityNodes(Fix):
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
-        # A wall that moves in all directions drags material; others are clamps or symmetry planes.
+        # A wall that moves in all directions drags material. Other nodes held in all directions are
+        # clamps or symmetry planes.
         rest = all(v is None or (v.is_constant and v.constant == 0) for v in self.formulas)
         drags = not self.bound and None not in self.formulas and not rest
         drags = drags and hub.domain.dimension > 1
@@ -258,7 +259,8 @@ class Reaction(Compute):
 
     Notes
     -----
-    The reactions of fixes velocity_nodes in the group are summed; 0 before the first step.
+    The reactions of all fixes velocity_nodes in the group are summed. The sum is 0 before the first
+    step.
 
     See Also
     --------

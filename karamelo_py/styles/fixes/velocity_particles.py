@@ -18,7 +18,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.styles.fixes.formulas import AXES, unlike
 
 SAMPLE = 1000
-ALIKE = 1e-6  # relative difference of velocities that is ignored
+ALIKE = 1e-6  # relative difference of velocities below which they count as equal
 DIFFERENT = " how they move, the other how they deform"
 
 
@@ -121,9 +121,11 @@ class InitialVelocityParticles(InitialFix, VelocityOfPoints):
 def gradient(
     evaluate: Callable, x: np.ndarray, x0: np.ndarray, moves: bool, step: float
 ) -> np.ndarray:
-    """Return derivatives (n, d) by x (`moves`) or x0, by central differences over `step`.
+    """Return derivatives (n, d) with respect to x (if `moves`) or x0.
 
-    At points that have not moved, x and x0 vary together.
+    They are central differences over `step`.
+
+    At points that have not moved, x and x0 are varied together.
     """
     out = np.zeros_like(x, float)
     # The tolerance allows for rounding in single precision.
@@ -149,7 +151,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
             yield _said(other, axes, shared)
-    # Setting a common velocity, and then another for some points, is intended.
+    # A common velocity, followed by another one for some of the points, is intended.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and 0 < len(shared) == len(simulation.points.members(other.group)):

@@ -21,9 +21,9 @@ from karamelo_py.script.errors import Mark, ScriptError
 LOADS = ("ContactForce", "ContactTorque")
 CORRECTED = Restrictions(
     "mass=corrected", "mass=lumped",
-    # Not with FLIP, with which a vibrating body gains energy, nor with bases of variable spread.
-    # Not with contact, whose forces come later in a step: the lowest cells of a block at rest would
-    # have 5 % less stress, and 23 % less on a wall with a bound.
+    # Not FLIP, with which a vibrating body gains energy, nor bases of variable spread. Not contact,
+    # whose forces come later in a step: the lowest cells of a block at rest would have 5 % less
+    # stress, and 23 % less on a wall with a bound.
     only={"transfer": ("APIC", "AFLIP", "ASFLIP", "MLS", "TPIC", "TFLIP"),
           "basis": ("quadratic-spline", "cubic-spline"), "method": ("ulmpm", "tlmpm")},
     without=("periodic", "pore_water", "implicit", "yielding walls"),
@@ -40,7 +40,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """Return whether the yield surface uses the averaged pressure (F-bar)."""
+    """Return True if the yield surface uses the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -101,11 +101,11 @@ class Method:
         """Update `contact` from the fixes, before every run."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
-        """Return the state of contact that the next step needs, in node ranges `spans` (k, 2)."""
+        """Return the contact state that the next step needs, for node ranges `spans` (k, 2)."""
         return []
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Copy the state of contact from `before` the scene was lowered again."""
+        """Copy the contact state from `before`, the contact of the previous lowering."""
 
     def welcome(self, hub: Hub, solid: Solid) -> None:
         """Prepare the method for a new solid."""

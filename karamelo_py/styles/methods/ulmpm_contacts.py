@@ -43,8 +43,9 @@ def flows(law: NamedTuple) -> bool:
 def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     """Return the fraction (F, F) of frictional heat that goes into the first of two solids.
 
-    With conduction it follows from the effusivities sqrt(kappa rho cp), as between half-spaces
-    (Carslaw & Jaeger 1959, section 2.15). Otherwise it is 1/2, or 0 without a temperature.
+    With conduction, the fraction follows from the effusivities sqrt(kappa rho cp), as between
+    half-spaces (Carslaw & Jaeger 1959, section 2.15). Otherwise it is 1/2, or 0 without a
+    temperature.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
     root = [conductivity(law, 1.0) * heat_capacity(law, 1.0) / specific_volume(law) for law in laws]
@@ -130,9 +131,10 @@ class ULMPMContacts(Method):
         publish_loads(hub, solid)
 
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
-        """Return `nodes`, and all nodes of points in cells with all corners in `nodes`.
+        """Return `nodes`, and the nodes that points reach from cells with all corners in `nodes`.
 
-        Splines and domains reach more nodes; if these were free, the normal would rotate.
+        Splines and domains reach nodes beyond these corners; if those were free, the normal would
+        rotate.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes
@@ -169,7 +171,7 @@ class ULMPMContacts(Method):
             pair=np.full((count, count), -1, np.int64),
             slot=slots[:, 0].copy(),
             copies=np.array(copies, np.int64).reshape(-1, 2),
-            # Pages of memory cost nothing until they are written.
+            # Memory pages cost nothing until they are written.
             touched=np.zeros((nodes, count), np.int32),
             prescribed=np.zeros((nodes, unknown), np.int32),
             reactions=np.zeros(1 + len(hub.values.array), np.int64),
@@ -221,7 +223,7 @@ class ULMPMContacts(Method):
         return [contact.touched[begin:end] for begin, end in spans]
 
     def resume(self, contact: NamedTuple, before: NamedTuple) -> None:
-        """Continue from the contact `before`; fields of new solids come last."""
+        """Continue from the contact state `before`; fields of new solids come last."""
         if contact.stride == before.stride:
             fields = before.touched.shape[1]
             touched = np.flatnonzero(before.touched.any(axis=1))

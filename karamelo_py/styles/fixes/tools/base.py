@@ -19,7 +19,7 @@ from karamelo_py.styles.fixes.forces import PointForces
 
 
 class ToolFix(PointForces):
-    """Base of fixes that push points, which are small cubes (in 2D squares)."""
+    """Base of fixes that push points; points are small cubes (in 2D squares)."""
 
     follows_points = presses = True
     needs_stiffness = False  # the force is proportional to the shear modulus of the point
@@ -89,7 +89,7 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """Base of planes, which may move; points are on the side of the normal."""
+    """Base of planes, which may move. Points are on the side to which the normal points."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)

@@ -13,7 +13,7 @@ from karamelo_py.styles.fixes.tools.base import PlaneTool
 
 
 class ImpenetrableSurface(PlaneTool):
-    """Push points behind a plane back, with a force proportional to the depth.
+    """Push back points that have passed a plane, with a force proportional to the depth.
 
     Parameters
     ----------

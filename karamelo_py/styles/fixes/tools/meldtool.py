@@ -92,7 +92,7 @@ class MeldTool(ToolFix):
         r = np.linalg.norm(q, axis=1)
         inward = (np.clip(rotated, -w, w) - rotated) @ turn
         outward = q * np.divide(Rmax - r, r, out=np.zeros_like(r), where=r > 0)[:, None]
-        # Ways out (n, 3): into the channel, radially, below; and their lengths.
+        # Ways out (n, 3) into the channel, radially and below; and their lengths.
         ways = np.zeros((3, len(r), 3))
         ways[0][:, self.across] = inward
         ways[1][:, self.across] = outward
