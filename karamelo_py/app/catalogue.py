@@ -41,7 +41,7 @@ def describe_parameter(parameter: Parameter) -> str:
     family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
     if parameter.keyword and parameter.optional and default is None:
         text = text.removesuffix(" or NULL")
-    if text == "anything":  # checked by the command or style
+    if text == "anything":  # the command or style checks the value
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]
     if parameter.variadic and parts[0].startswith("one of "):
@@ -58,9 +58,9 @@ def describe_parameter(parameter: Parameter) -> str:
 
 
 def described(parameters: Iterable[Parameter]) -> Iterator[tuple[list[Parameter], list[str]]]:
-    """Yield parameters with a common description, and lines of types and description.
+    """Yield groups of parameters with a common description, with the lines of types and text.
 
-    A first sentence that only repeats the types is omitted.
+    A first sentence of the description that only repeats the types is omitted.
     """
     for text, same in groupby(parameters, key=lambda p: p.description or describe_parameter(p)):
         group = list(same)
@@ -94,9 +94,9 @@ def print_help(
     commands: Iterable[str] = (),
     manuals: Callable[[], Mapping[str, tuple[str, str]]] = dict,
 ) -> int:
-    """Print help on a command, style, argument or topic; return the exit status.
+    """Print help on a command, style, argument or topic. Return the exit status.
 
-    `manuals` returns summary and help text by subcommand.
+    `manuals` returns, for each subcommand, its summary and its help text.
     """
     if len(words) == 2 and (family := _singular(words[0])) in families():
         try:
@@ -172,7 +172,7 @@ def _family(word: str) -> str:
 
 
 def _singular(word: str) -> str:
-    """Return the name of a family, for fixes, Fix and fix alike."""
+    """Return the name of a family; fixes, Fix and fix give fix."""
     word = word.lower()
     return next((family for family in families() if word in (family, _plural(family))), word)
 
@@ -290,7 +290,7 @@ class _Page(Console):
     def _write(self, text: str) -> None:
         super()._write(text)
         if self._broken:
-            raise BrokenPipeError  # nothing else to finish
+            raise BrokenPipeError  # nothing else is left to do
 
     def heading(self, text: str) -> None:
         self.say()

@@ -31,7 +31,7 @@ from karamelo_py.run.mpi.comm import MpiComm, launched
 from karamelo_py.scene.comm import ENDING, handled_signals
 from karamelo_py.script.errors import ScriptError, meant, nearest, render_message, table
 
-if TYPE_CHECKING:  # these imports are slow
+if TYPE_CHECKING:  # slow imports, only for type checking
     from karamelo_py.scene.hub import Hub
 
 RUN = "The log goes to the terminal and to log.mpm; files are written to the current folder."
@@ -57,7 +57,7 @@ RUN_COMMANDS = "add run(n), run_time(T), run_until(...) or run_while(...)"
 def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     launch.keep_to_oneself()
-    # Batch systems send these signals. With several processes mpiexec handles them.
+    # Batch systems send these signals. If there are several processes, mpiexec handles them.
     unhandled = [number for number in ENDING if signal.getsignal(number) == signal.SIG_DFL]
     with handled_signals(_end, () if launched()[0] > 1 else unhandled):
         status, text = launch.outcome_of(
@@ -78,7 +78,8 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands with DESCRIPTION, add_options(parser) and run(options), imported on demand.
+# Subcommands that are imported on demand; each has DESCRIPTION, add_options(parser) and
+# run(options).
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),
@@ -168,7 +169,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Replace files that a shell has inserted after -restart by the last of them."""
+    """Replace several files after -restart, which a shell has inserted, by the last of them."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""
@@ -186,7 +187,7 @@ def _one_file(arguments: list[str]) -> list[str]:
 
 
 def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
-    """Put a blank before values such as -1e6, which argparse would take as options."""
+    """Put a blank before values such as -1e6, which argparse would read as options."""
 
     def is_value(k: int) -> bool:
         if re.match(r"-\.?\d", arguments[k]):

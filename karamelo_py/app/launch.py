@@ -1,4 +1,4 @@
-"""karamelo-py --ranks N: processes of mpiexec that report and end as one.
+"""karamelo-py --ranks N: start processes by mpiexec; they report and end together.
 
 Each process reports over a socket to the `Launcher` in the user's process. Rank 0 gets the terminal
 and the signals. Output of mpiexec is shown only if no process has started.
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 Message = dict[str, Any]
 ERROR = 1
-# Errors of disks and permissions, not of the program.
+# Errors due to disks and permissions, not to the program.
 OF_THE_SYSTEM = tuple(
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EROFS", "EFBIG", "EIO", "EACCES", "EPERM", "EMFILE", "ENFILE",
@@ -41,7 +41,7 @@ OF_THE_SYSTEM = tuple(
     if hasattr(errno, name)
 )  # fmt: skip
 SOCKET = "KARAMELO_PY_LAUNCHER"
-# Allow several threads per process; let waiting processes yield if cores are few; allow root.
+# Allow several threads per process; let waiting processes yield if there are few cores; allow root.
 OPEN_MPI = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "PRTE_MCA_hwloc_default_binding_policy": "none",
@@ -53,11 +53,11 @@ OPEN_MPI = {
 # arrays.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between polls
-GRACE = 2.0  # seconds in which processes must end after mpiexec
-AT_ONCE = 3  # signals after which processes are killed
-LONGEST_FOLDER = 70  # characters: names of sockets must be short
-A_CORE = 16  # processes per core; more is a mistake
-# Seconds until a failed process ends the others, in which rank 0 can report the error.
+GRACE = 2.0  # seconds after the end of mpiexec in which processes must end
+AT_ONCE = 3  # number of signals after which processes are killed
+LONGEST_FOLDER = 70  # characters, since names of sockets must be short
+A_CORE = 16  # processes per core; a larger number is a mistake
+# Seconds until a failed process ends the others. In this time, rank 0 can report the error.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -266,7 +266,7 @@ def _report_to_launcher(rank: int) -> None:
         link.connect(name)
         link.sendall(_line(rank=rank, pid=os.getpid()))
         if rank == 0:
-            # Only Python's streams: libraries still write to mpiexec.
+            # Redirect only Python's streams: libraries still write to mpiexec.
             out, err = (_stream(fd) for fd in socket.recv_fds(link, 1, 2)[1])
             sys.stdout = sys.__stdout__ = out
             sys.stderr = sys.__stderr__ = err
@@ -278,7 +278,7 @@ def _report_to_launcher(rank: int) -> None:
 
 
 def _stream(fd: int) -> TextIO:
-    usual = sys.__stderr__  # its error handler escapes unknown characters
+    usual = sys.__stderr__  # its error handler escapes characters that the encoding lacks
     return open(fd, "w", buffering=1, encoding=usual.encoding, errors=usual.errors)
 
 
@@ -300,7 +300,7 @@ def _report(**message: object) -> None:
 
 
 def has_terminal() -> bool | None:
-    """Return False if output looks like a terminal because of mpiexec; None otherwise."""
+    """Return False if the output only looks like a terminal because of mpiexec; otherwise None."""
     return False if "OMPI_COMM_WORLD_SIZE" in os.environ and _link is None else None
 
 
@@ -325,7 +325,7 @@ def together(
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # The launcher has the status already, on which mpiexec would comment.
+        # The launcher has the exit status already; mpiexec would comment on it.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)
@@ -338,7 +338,7 @@ def together(
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
-        _report(over=True)  # report before waiting for the others
+        _report(over=True)  # reported before it waits for the others
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:

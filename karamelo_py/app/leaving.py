@@ -1,11 +1,11 @@
 """End with a message if the program is interrupted during its imports.
 
-An interrupt during an import may appear as any error.
+An interrupt during an import can raise any exception.
 """
 
 import os
 
-SIGNALLED = 128  # exit status, plus the number of the signal
+SIGNALLED = 128  # exit status: this, plus the number of the signal
 INTERRUPTED = SIGNALLED + 2
 
 
@@ -14,7 +14,7 @@ def _leave(*_):
     os._exit(INTERRUPTED)
 
 
-# Nothing is imported before `leaving_at_once`, as Python would print an interrupt's traceback.
+# Nothing is imported before `leaving_at_once`, as Python would print a traceback if interrupted.
 try:
     import signal
 except KeyboardInterrupt:
@@ -22,7 +22,7 @@ except KeyboardInterrupt:
 
 
 STUDY = "KARAMELO_PY_STUDY"  # environment variable with the pid of a study
-_DEATH_SIGNAL = 1  # argument of prctl: signal when the parent ends
+_DEATH_SIGNAL = 1  # argument of prctl: signal to send when the parent ends
 
 
 def end_with(study: int) -> None:
@@ -43,7 +43,7 @@ def end_with(study: int) -> None:
 
 
 def _watch(study: int) -> None:
-    """End this process after the study, if the system does not."""
+    """End this process when the study ends, if the system does not do so."""
     import time
 
     import psutil

@@ -1,4 +1,4 @@
-"""Options of several subcommands."""
+"""Options that several subcommands have."""
 
 import argparse
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Logs of earlier runs; karamelo-py plot."""
+"""Read logs of earlier runs; karamelo-py plot."""
 
 import argparse
 import csv
@@ -31,13 +31,13 @@ def read_text(path: Path, expected: str | None = None) -> str:
 
 
 def read_rows(path: str | Path) -> list[dict[str, float]]:
-    """Return the rows of a log as dictionaries by column; words become NaN.
+    """Return the rows of a log as dictionaries by column name. Words become NaN.
 
-    A line beginning with # gives new columns; an incomplete line is skipped.
+    A line that begins with # lists new columns; an incomplete line is skipped.
     """
     names: list[str] = []
     path, rows = Path(path), []
-    # A line without a line end may be cut off: 2.4 of 2.4e+10.
+    # A last line without a line end may be cut off: 2.4 instead of 2.4e+10.
     lines = read_text(path).rpartition("\n")[0].splitlines()
     for cells in filter(
         None, csv.reader(lines) if path.suffix == ".csv" else map(str.split, lines)

@@ -58,7 +58,7 @@ class Quiet(Console):
         super().__init__(quiet=True)
 
     def warn(self, text: str) -> None:
-        """Issue a warning at the line outside the package from which the call came."""
+        """Issue a Python warning, at the line outside the package that made the call."""
         level, frame = 1, sys._getframe()
         while frame.f_back and frame.f_globals.get("__name__", "").startswith("karamelo_py."):
             level, frame = level + 1, frame.f_back
@@ -134,10 +134,10 @@ class LivePage:
 
 
 class PointColumns(Columns):
-    """Columns of the points; ``points["vx"] = values`` sets a column between two runs.
+    """Columns of the points. ``points["vx"] = values`` sets a column between two runs.
 
     Positions, velocities, temperatures, stresses (of rate-form materials) and declared fields can
-    be set, to a number or (n,).
+    be set to a number or an array (n,).
     """
 
     def __init__(self, hub: Hub):
@@ -155,7 +155,7 @@ class PointColumns(Columns):
 
 
 class Variables(MutableMapping):
-    """Script variables, numbers or texts of formulas; ``variables["q"] = 0`` is q = 0."""
+    """Script variables: numbers, or formulas as text. ``variables["q"] = 0`` is the line q = 0."""
 
     def __init__(self, sim: Simulation):
         self._sim = sim
@@ -220,14 +220,14 @@ class Simulation:
     trust_geometries
         Allow .geo files to run programs and write files.
     alone
-        Allow several processes of mpiexec, each with a separate scene.
+        Allow several processes of mpiexec, each of which computes a separate scene.
     variables
         Values that override assignments in the script, like ``-var``.
 
     Raises
     ------
     SimulationError
-        For an error in the script, a wrong number of threads or folder, or a missing GPU.
+        If the script has an error, `threads` or `out` is wrong, or there is no GPU.
 
     Notes
     -----
@@ -449,7 +449,10 @@ class Simulation:
 
     @property
     def log(self) -> Columns:
-        """Columns of the log, as arrays; if columns have changed, only of lines since then."""
+        """Columns of the log, as arrays.
+
+        If the columns have changed, only the rows since then are included.
+        """
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
@@ -512,8 +515,8 @@ class Simulation:
     def live(self) -> LivePage:
         """Open a browser page that follows later runs.
 
-        The page has buttons to pause, step and stop. It is closed by its ``.close()``, or with the
-        simulation. The package plotly is needed.
+        The page has buttons to pause, step and stop. Its ``.close()`` closes it, as does closing
+        the simulation. The package plotly is needed.
         """
         from karamelo_py.app.live.run import RunPage
 

@@ -1,4 +1,4 @@
-"""karamelo-py view: pictures or a movie from dumps."""
+"""karamelo-py view: draw pictures or a movie from dumps."""
 
 import argparse
 import glob
@@ -137,7 +137,7 @@ def run(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _telling_of_names(options: argparse.Namespace) -> Iterator[None]:
-    """Add hints to errors: names missing in dumps come from logs or the script."""
+    """Add hints to errors about names: names missing in dumps come from logs or the script."""
     try:
         yield
     except ScriptError as error:
@@ -270,11 +270,11 @@ class Drawing:
         self.picture = self._picture(first)
 
     def chosen(self, snapshot: Snapshot) -> Snapshot:
-        """Points to draw, with the column of a colouring formula."""
+        """Return the points to draw, with the column of the colouring formula."""
         columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
         values, row = self.scene.values, self.log.get(snapshot.step, {})
         for name in values.names():
-            values.set(name, row.get(name, np.nan))  # known to runs only
+            values.set(name, row.get(name, np.nan))  # only runs know the value
         values.set("time", snapshot.time)
         values.set("timestep", snapshot.step)
         formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]
@@ -316,7 +316,7 @@ class Drawing:
                         f"the script has {plural(of_script, noun)}, the dump {of_dump:.0f}",
                         expected="the script of the run that wrote the dump, and its -var",
                     )
-            dimension = scene.domain.dimension  # points in 3D may all have z = 0
+            dimension = scene.domain.dimension  # the points of a 3D scene may all have z = 0
         first, field = self.chosen(first), look["field"]
         column = field.text if isinstance(field, ColumnFormula) else field
         if column is not None and column not in first.columns:

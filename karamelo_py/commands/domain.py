@@ -131,8 +131,9 @@ def boundary(
 
     Notes
     -----
-    ``delete`` and ``reflect`` are for splashes; for a body against a wall use fix velocity_nodes. A
-    warning names the first such point; the end of the run reports how many there were.
+    ``delete`` and ``reflect`` are for splashes; for a body against a wall, use fix velocity_nodes.
+    A warning names the first point that is deleted or reflected; the end of the run reports their
+    number.
 
     A point is deleted before the step in which it would leave: the run returns to its last stored
     state, at most a hundred steps earlier, and repeats these steps, with their Python hooks. If
@@ -266,7 +267,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         raise
     domain.mark = hub.mark
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
-    # A domain of a single cell is intended: an element test.
+    # A domain of a single cell is allowed: it is an element test.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
@@ -286,8 +287,8 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
         Where the points come from.
     arguments
         For ``region``: ``regionID, ppc, material, h[, T0]``: the region, the points per cell in
-        each direction, the material, the cell size, the initial temperature (default: the
-        material's). For ``mesh``: ``file, material, h[, T0]``. See the pages of other styles.
+        each direction, the material, the cell size, and the initial temperature (default: the
+        material's). For ``mesh``: ``file, material, h[, T0]``. For other styles, see their pages.
 
     Example
     -------
@@ -311,7 +312,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
     hub.solids.refuse(ID)
     refuse_late(hub)
     if not registry.knows("solid", kind):
-        # Forms of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
+        # Scripts of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
         if kind in hub.regions:
             arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
             kind = "region"
@@ -427,7 +428,7 @@ def group(
     if count or region.unknown:
         return
     if kind == "nodes" and not solids and own_grids(hub):
-        members.awaits_solids = True  # the run warns if it is still empty
+        members.awaits_solids = True  # the run warns if the group is still empty
     else:
         none_yet = "no solid is made yet: groups of particles come after the solids"
         hub.warn(

@@ -164,7 +164,7 @@ Direction = Literal["x", "y", "z"]
 
 
 def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the centre of mass of a group, re-evaluated whenever it is used.
+    """Return the centre of mass of a group, evaluated again whenever it is used.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def xcm(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
 
 
 def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the internal force of a group, re-evaluated whenever it is used.
+    """Return the internal force of a group, evaluated again whenever it is used.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes it is the sum of the forces due to the stress of points and to fixes on points
+    For nodes, it is the sum of the forces due to the stress of points and to fixes on points
     (contact, tools, tractions). At held nodes it is the negative reaction, if accelerations are
     small. For points it is the rate of change of their momentum in the last step, sum m a. It is 0
     before the first step.
@@ -227,7 +227,7 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
 
 def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expression:
-    """Give the force that fixes apply to a group, re-evaluated whenever it is used.
+    """Return the force that fixes apply to a group, evaluated again whenever it is used.
 
     Parameters
     ----------
@@ -243,10 +243,10 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes it is the force of fixes on nodes, such as body_force and force_nodes; for points, of
-    fixes on points (contact, tools, tractions). Reactions of prescribed velocities are not
-    included; their fixes publish them. It is 0 before the first step. (Karamelo returns internal
-    forces.)
+    For nodes it is the force of fixes on nodes, such as body_force and force_nodes; for points, it
+    is the force of fixes on points (contact, tools, tractions). Reactions of prescribed velocities
+    are not included; their fixes publish them. It is 0 before the first step. (Karamelo returns
+    internal forces.)
 
     See Also
     --------

@@ -49,7 +49,7 @@ registry.may_differ(print_)
 
 
 def value(hub: Hub, expression: Expression) -> float:
-    """Give the present value of a formula, as a constant number.
+    """Return the present value of a formula, as a constant number.
 
     ``value`` and ``evaluate`` are names of the same command.
 
@@ -70,7 +70,7 @@ def value(hub: Hub, expression: Expression) -> float:
         return expression.constant
     if not expression.names.intersection(POINT_SEEDS):
         if hub.rehearsing:
-            return math.nan  # earlier runs determine the value
+            return math.nan  # the value depends on earlier runs
         if hub.interpreter.replay is not None:
             number = hub.interpreter.replay.value()
         else:

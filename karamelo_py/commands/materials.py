@@ -43,7 +43,7 @@ def material(
     solid
     """
     if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
-        # Form of 2020 without a style: material(ID, eosID, strengthID).
+        # Scripts of 2020 have no style: material(ID, eosID, strengthID).
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
@@ -155,12 +155,13 @@ def load_path(
     sxx, syy, szz, sxy, sxz, syz
         Prescribed Cauchy stress, tension positive; the strain is found by iteration.
     volumetric
-        Volumetric strain exx + eyy + ezz. Normal strains that are not specified get equal parts of
-        what the specified ones leave.
+        Volumetric strain exx + eyy + ezz. Normal strains that are not specified are equal to each
+        other.
     turn
         Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        Duration, for rate-dependent laws; default 1. Without strains or stresses: a hold time.
+        Duration, for rate-dependent laws; default 1. Without strains or stresses, the state is held
+        for this time.
 
     Example
     -------
@@ -222,8 +223,8 @@ def element(
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
 
-    Writes the table element_ID.txt and the plot element_ID.png; needs no domain and no compilation.
-    The point begins stress-free; cam-clay begins at its pressure p0.
+    The command writes the table element_ID.txt and the plot element_ID.png. It needs no domain and
+    no compilation. The point begins stress-free; cam-clay begins at its pressure p0.
 
     Parameters
     ----------

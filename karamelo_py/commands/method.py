@@ -38,7 +38,7 @@ def method(
         The basis functions of the nodes; ``linear`` for the cpdi methods.
     options
         First the numbers of the transfer (the FLIP coefficient, the order of XPIC), of the basis
-        and the method; then words in any order. ``thermo-mechanical``: heat flows between points
+        and of the method; then words in any order. ``thermo-mechanical``: heat flows between points
         (default ``mechanical``: it does not). ``gradient-enhanced``: FLIP also maps the velocity
         gradient. ``det``, ``diagonal``, ``stretch`` or ``corners``: the variant of cpgimp. ``R4``,
         ``Q4``, ``R8``, ``H8``, ``T3`` or ``Tet4``: the domains of the cpdi methods.
@@ -161,7 +161,8 @@ def scheme(
         Arguments of the style; explicit schemes have none.
     start
         With ``half``, forces act for half of the first explicit step, so that velocities and
-        kinetic energies belong to the logged time; with ``full`` (default), for the whole step.
+        kinetic energies belong to the logged time; with ``full`` (default), they act for the whole
+        step.
 
     Example
     -------
@@ -189,7 +190,7 @@ def scheme(
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
             error.expected = "start=full or start=half" if error.hint else error.expected
-        for name in PUBLISHED:  # avoid follow-up errors about these names
+        for name in PUBLISHED:  # avoids follow-up errors about these names
             hub.values.publish(name)
         raise
     if start == "half" and chosen.traits.implicit:
@@ -231,9 +232,9 @@ def precision(hub: Hub, kind: Literal["double", "single"]) -> None:
 
 
 def anti_volumetric_locking(hub: Hub, active: bool) -> None:
-    """Average volume changes over neighbouring points (F-bar), against volumetric locking.
+    """Average volume changes over neighbouring points (F-bar), to avoid volumetric locking.
 
-    With low-order basis functions, constant volume at each point is a constraint too many, so
+    With low-order basis functions, a constant volume at each point is too strong a constraint:
     nearly incompressible and plastic bodies are too stiff. Averaging the volume increment with the
     basis weights removes the excess constraints (Coombs et al. 2018). The mean stress is averaged
     with the same weights, so that nodal forces are work-conjugate to the averaged strain.
@@ -362,7 +363,7 @@ class _Call:
             )
 
     def _choose(self, family: str, options: list[Argument]) -> list[Argument]:
-        """Choose the variant that a word selects; return the other options."""
+        """Choose the variant that a word selects; return the remaining options."""
         variants = self.variants[family]
         words = [argument for argument in options if _word(argument, variants)]
         if len(words) > 1:

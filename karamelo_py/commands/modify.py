@@ -57,7 +57,7 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     changed = {entry: _changed(hub, entry, entry.arguments, numbers)}
     for material in hub.materials.values():
         _now(hub, material, changed)
-    # Skip materials before a viscosity was added: they have the same name.
+    # Skip entries from before a viscosity was added; their material has the same name.
     changed = {old: new for old, new in changed.items() if _catalogue(hub, old)[old.id] is old}
     for before, after in changed.items():
         if isinstance(after, Material):

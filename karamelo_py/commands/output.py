@@ -39,7 +39,8 @@ def dump(
     Notes
     -----
     File names are relative to the folder where the program was started; ``~`` is the home folder.
-    Folders must exist. Files are overwritten; later snapshots of an earlier, longer run remain.
+    Folders must exist. Existing files are overwritten, but later snapshots of an earlier, longer
+    run remain.
 
     Example
     -------
@@ -93,14 +94,14 @@ def delete_dump(hub: Hub, ID: str) -> None:
     old = hub.dumps[ID]
     hub.dumps.remove(ID)
     if old.one_file_per_step:
-        # A file with several snapshots stays reserved: another dump would overwrite it.
+        # A file with several snapshots stays reserved, since another dump would overwrite it.
         hub.output.files.pop(old.file, None)
 
 
 def set_output(
     hub: Hub, every: Annotated[int | ByTime, Every], form: Literal["mpm", "csv"] = "mpm"
 ) -> None:
-    """Set how often a line is logged, and in which format.
+    """Set how often a line is written to the log, and in which format.
 
     Lines appear on the terminal and in log.mpm in the current folder. By default every step is
     logged; the first and last state of each run always are.
@@ -132,9 +133,9 @@ def set_output(
 
 
 def log(hub: Hub, every: Every) -> None:
-    """Set how often a line is logged (older form; see set_output).
+    """Set how often a line is written to the log (older form; see set_output).
 
-    In an expression, log(x) is the natural logarithm instead.
+    In an expression, log(x) is the natural logarithm.
 
     Parameters
     ----------
@@ -239,7 +240,7 @@ def plot(
 
 
 def save_plot(hub: Hub, file: Annotated[Path, OutputFile]) -> None:
-    """Draw the curves of all plot commands to a file at the end of each run, also of a failed one.
+    """Draw the curves of all plot commands to a file at the end of each run, even if it failed.
 
     After a run, the command draws the file at once.
 

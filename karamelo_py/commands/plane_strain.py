@@ -32,7 +32,7 @@ class StretchAcross(Fix):
 
     def initial_integrate(self, points: PointsView) -> None:
         update = self.hub.update
-        # Load steps set the time of their end.
+        # In load steps, time is the end of the step.
         end = update.time + (0.0 if update.scheme.traits.implicit else update.dt)
         ezz = self.strain_at(end)
         if not 0 < 1 + ezz < float("inf"):
@@ -50,8 +50,8 @@ def plane_strain(hub: Hub, *, ezz: Expression) -> None:
     Parameters
     ----------
     ezz
-        Strain of lengths across the plane, equal at all points: a formula of time that is 0 at the
-        start. The stretch is F_zz = 1 + ezz.
+        Change of length / initial length across the plane, equal at all points: a formula of time
+        that is 0 at the start. The stretch is F_zz = 1 + ezz.
 
     Example
     -------

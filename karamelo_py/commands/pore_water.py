@@ -11,7 +11,7 @@ from karamelo_py.scene.material import Material
 from karamelo_py.script.errors import ScriptError
 
 LEAST, MOST = 0.01, 0.9
-HEAVIEST = 3.2  # relative density of grains; in soils it is 2.6 to 2.8
+HEAVIEST = 3.2  # density of grains / density of water; in soils it is 2.6 to 2.8
 SLOWEST, FASTEST = 1e-13, 10.0  # conductivities in m/s
 
 
@@ -37,8 +37,8 @@ def pore_water(
     n
         Porosity before deformation, from 0.01 to 0.9.
     permeability
-        Hydraulic conductivity k in m/s (Darcy): the porosity times the relative velocity of the
-        water is k times the hydraulic gradient.
+        Hydraulic conductivity k in m/s (Darcy): porosity times relative velocity of the water = k
+        times hydraulic gradient.
     intrinsic
         Permeability in m^2, instead of the conductivity.
     viscosity

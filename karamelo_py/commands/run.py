@@ -30,8 +30,8 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 def carry_out(hub: Hub, **length: Any) -> None:
     """Run for `length` (see `RunLoop`), unless the script is only read or resumed.
 
-    A rehearsal records the run, `Pause` stops before it, and ``check`` prints its report instead. A
-    resumed script skips runs that were complete.
+    In a rehearsal, the run is only recorded; ``check`` prints its report instead; a Python program
+    stops before it (`Pause`). A resumed script skips runs that were complete.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
@@ -74,8 +74,9 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     dt
-        The time step. A run warns above the stable step, the cell size divided by wave speed plus
-        velocity (less with usl), and stops at once above four times the limit of heat conduction.
+        The time step. A run warns if it is above the stable step, which is the cell size divided by
+        (wave speed + velocity), less with usl. A run stops at once if the step is above four times
+        the limit of heat conduction.
 
     Example
     -------
@@ -274,11 +275,12 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     the last two steps of the shorter run, which end exactly at T.
 
     A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
-    plots, and values that the script has read. If a run is killed while writing, the previous file
-    remains. The last state of each run is always written. A failed run writes last_good.<step>.h5
-    instead: the initial state if its time step was above the stable limit from the start, or, if
-    its energy has grown, a state at most ten steps before the growth. This file is not written with
-    boundary(delete), or if the run was resumed from a file at that step.
+    plots, and the values that commands such as ``value`` have returned. If a run is killed while
+    writing, the previous file remains. The last state of each run is always written. A failed run
+    writes last_good.<step>.h5 instead: the initial state if its time step was above the stable
+    limit from the start, or, if its energy has grown, a state at most ten steps before the growth.
+    This file is not written with boundary(delete), or if the run was resumed from a file at that
+    step.
 
     Dumps include the state at an interruption or failure. A resumed run removes this snapshot from
     files with several snapshots.

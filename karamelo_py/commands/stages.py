@@ -68,7 +68,7 @@ def activate(hub: Hub, group: ParticleGroup) -> None:
     -----
     The points enter at their initial positions, at rest, without stress, with their initial mass,
     temperature and state. To give them a stress, define a fix initial_stress or geostatic_stress of
-    the group afterwards. A warning reports other points at these positions.
+    the group afterwards. If other points are at these positions, a warning is given.
 
     See Also
     --------
@@ -114,7 +114,10 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """Return whether to do nothing: in a rehearsal or replay, the state of points differs."""
+    """Return True if a command must do nothing.
+
+    In a rehearsal and when a script is resumed, points have another state.
+    """
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

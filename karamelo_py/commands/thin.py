@@ -138,7 +138,7 @@ def refuse_late(hub: Hub) -> None:
 
 
 def _name_of(law: object) -> str:
-    """Return the family and style of a law or its part, such as 'eos ideal-gas'."""
+    """Return the family and style of a law or of its part, such as 'eos ideal-gas'."""
     kind, families = type(law), ("eos", "strength", "material")
     named = ((family, registry.name_of(family, kind)) for family in families)
     return next((f"{a} {name}" for a, name in named if registry.knows(a, name)), kind.__name__)

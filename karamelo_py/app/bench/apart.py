@@ -1,7 +1,7 @@
-"""Workloads in separate processes, whose memory does not affect each other.
+"""Measure workloads in separate processes, so that the memory of one does not affect another.
 
-``python -m karamelo_py.app.bench.apart`` reads a `Measurement` in JSON from its input, and ends
-when the input is closed.
+``python -m karamelo_py.app.bench.apart`` reads a `Measurement` in JSON from standard input, and
+ends when the input is closed.
 """
 
 import json
@@ -84,8 +84,8 @@ class Scaled(NamedTuple):
     weak: bool
     points: int
     best: float  # particle-steps per second
-    exchange: float  # fraction of time that the busiest process waits
-    imbalance: float  # mean fraction of time that processes wait beyond that
+    exchange: float  # fraction of the time that the busiest process waits
+    imbalance: float  # mean fraction of the time that processes wait beyond that
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:

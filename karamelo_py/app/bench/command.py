@@ -1,6 +1,6 @@
 """karamelo-py bench: speed of this machine.
 
-Only speeds of the same bench are comparable, since clock rates change.
+Compare only speeds measured in the same run of bench, since clock rates change.
 """
 
 import json

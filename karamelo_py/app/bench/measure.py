@@ -31,8 +31,8 @@ from karamelo_py.script.errors import ScriptError
 MOST_STEPS = 2500  # number of steps after which points may leave the domain
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
-ALONE = 0.5  # a component above this fraction of a step limits it
-APART = 1.5  # up to this ratio to a compiled step, times of separate sweeps are trusted
+ALONE = 0.5  # fraction of a step above which a component limits it
+APART = 1.5  # times of separate sweeps are trusted up to this ratio to a compiled step
 
 
 class Workload(NamedTuple):
@@ -64,7 +64,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """Row of a step that is timed, alternately with points and without."""
+    """A row of a step that is timed, alternately with points and without."""
 
     mode: Any
     of_points: dict[str, list[float]]
@@ -77,7 +77,7 @@ class Measured(NamedTuple):
     bytes_per_particle: int
     bytes_per_particle_step: float  # memory traffic without caches
     roofline: float  # fraction of the memory bandwidth at the best speed
-    roofline_in_place: float  # fraction of the bandwidth for arrays of the size of the scene
+    roofline_in_place: float  # fraction of the bandwidth measured on arrays as large as the scene
     sweeps_of_points: dict[str, float]
     sweeps_of_nodes: dict[str, float]
     waits: float  # seconds per step to start and join threads
@@ -102,7 +102,7 @@ class Measured(NamedTuple):
 
     @property
     def rest(self) -> float:
-        """Fraction of the step in control flow and waiting threads."""
+        """Fraction of the step spent in control flow and waiting for threads."""
         return min(1.0, max(0.0, 1 - self.swept))
 
     @property
@@ -113,9 +113,10 @@ class Measured(NamedTuple):
 
     @property
     def limit(self) -> str:
-        """The component that takes half of a step or more: ``overhead``, ``nodes`` or ``memory``.
+        """The component that takes at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
-        Otherwise ``arithmetic`` (instructions or latency), or ``unknown`` if not `told_apart`.
+        Otherwise it is ``arithmetic`` (instructions or latency), or ``unknown`` if not
+        `told_apart`.
         """
         if not self.told_apart:
             return "unknown"
@@ -233,8 +234,8 @@ def repeated(
 ) -> tuple[int, list[tuple[float, np.ndarray]]]:
     """Repeat steps from the state after `lead` steps, for `seconds` in total.
 
-    Returns the number of steps per repetition, and for each repetition its seconds and the seconds
-    that each process waited.
+    Returns the number of steps per repetition and, for each repetition, its duration and the time
+    that each process waited, in seconds.
     """
     timed_steps(simulation, lead)
     start = simulation.snapshot()
@@ -245,7 +246,7 @@ def repeated(
         simulation.restore(start)
         before, begun = _waits(simulation), time.perf_counter()
         timed_steps(simulation, count)
-        after = _waits(simulation)  # synchronises processes
+        after = _waits(simulation)  # synchronises the processes
         times.append((time.perf_counter() - begun, after - before))
     simulation.restore(start)
     return count, times
@@ -331,10 +332,10 @@ def _sum_buffers_recorder(mode, quantities, s, due):
 
 
 def traffic(simulation: Simulation) -> tuple[float, float, int]:
-    """Return bytes per particle-step without caches, bytes of the scene, parallel regions.
+    """Return bytes per particle-step without caches, bytes of the scene, and parallel regions.
 
-    Point fields are counted in each sweep that reads or writes them, node fields in node loops, and
-    buffers when they are written and summed.
+    Point fields count in each sweep that reads or writes them, node fields in node loops, and
+    buffers when they are written and when they are summed.
     """
     s, scheme = simulation.setup, simulation.hub.update.scheme
     recorder = _Recorder([], [], [], [])
@@ -375,7 +376,7 @@ def _fastest(calls: int, act: Callable, *arguments: Any) -> float:
 
 
 def bandwidth(threads: int, size: float = ARRAYS) -> float:
-    """Return the bytes/s of a[i] = b[i] + factor c[i] on arrays of `size` bytes."""
+    """Return the bandwidth in bytes/s of a[i] = b[i] + factor c[i], on arrays of `size` bytes."""
     n = max(1000, int(size / 24))
     a, b, c = np.zeros(n), np.ones(n), np.ones(n)
     team = new_team(threads)

@@ -17,8 +17,8 @@ from karamelo_py.app.bench.measure import (
 from karamelo_py.kernels.gpu import OTHERS, STAGES
 
 USUAL = ("disks-320", "disks-320-mls-single", "block-3d-mls-single", "block-3d-mls", "bar-3d-ul")
-MOST = 200  # steps per repetition, so few that no point leaves in five
-SIZES = (1e6, 4e6, 16e6)  # points, unless variables are set
+MOST = 200  # steps per repetition, few enough that no point leaves in five repetitions
+SIZES = (1e6, 4e6, 16e6)  # numbers of points, unless variables are set
 
 
 class OnCard(NamedTuple):

@@ -18,8 +18,8 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
 PAUSE = 0.5  # seconds between polls
-FILES = 8  # read per poll, so that the first ones appear early
-WHOLE = (".h5", ".hdf5", ".pvd")  # files with many states
+FILES = 8  # files read per poll, so that the first ones appear early
+WHOLE = (".h5", ".hdf5", ".pvd")  # files that contain many states
 
 
 class FolderPage:

@@ -15,7 +15,7 @@ PAGE = Path(__file__).with_name("run.html")
 POINTS = 1_000_000  # approximate number of points in a frame
 BYTES = 1 << 29  # maximum size of all frames
 COUNT = 400
-SEEN = 1.0  # seconds in which a page requests a frame
+SEEN = 1.0  # seconds for which a request of a page counts
 
 
 class Frame(NamedTuple):
@@ -38,7 +38,10 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """Return a mask of about `POINTS` points, equal in all states; small solids are complete."""
+    """Return a mask of about `POINTS` points, the same in all states.
+
+    Small solids are complete.
+    """
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)
@@ -49,7 +52,7 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
 
 
 class KeptFrames:
-    """States by number; if they are too many, every second one is dropped."""
+    """States by number. If there are too many, every second one is dropped."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}

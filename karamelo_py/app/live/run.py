@@ -24,7 +24,7 @@ from karamelo_py.run.listening import Listener
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import FAILURES
 
-WINDOW = 2000  # rows of the log that a new page gets
+WINDOW = 2000  # rows of the log that a page gets when it is opened
 GRACE = 10.0  # seconds in which a page may be reloaded
 
 
@@ -64,11 +64,11 @@ class RunPage(Rhythmic, Listener):
     def write(self) -> None:
         """Send the state to pages, and wait while they pause the run."""
         hub, simulation = self.hub, self.hub.simulation
-        self.every = hub.output.log.every  # every run starts with an output
+        self.every = hub.output.log.every  # every run starts with output
         names, numbers = hub.output.log.rows[-1] if hub.output.log.rows else ([], [])
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         watch = simulation.control.energy[0]
-        has_gain = watch.watch_energy and watch.looks >= FEW  # the mean is over `FEW` looks
+        has_gain = watch.watch_energy and watch.looks >= FEW  # the mean is over `FEW` checks
         gain = -100 * simulation.energy_watch.share_lost() if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
@@ -79,14 +79,17 @@ class RunPage(Rhythmic, Listener):
         self._wait()
 
     def end(self, *, waits: bool = False, stopped: bool = False) -> None:
-        """Send the last state, and wait until pages close; with `waits`, also for a first page."""
+        """Send the last state, and wait until all pages close.
+
+        With `waits`, also wait for a first page.
+        """
         server = self.server
         error = sys.exception()
         ended = "stopped" if stopped or error is not None else "finished"
         if isinstance(error, FAILURES):
             ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._ended = ended  # set last: until then a page shows a running run
+        self._ended = ended  # set last, since pages show a running run until then
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened
@@ -159,7 +162,7 @@ class RunPage(Rhythmic, Listener):
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():
             self._column = words["name"]
-            if self._rows and not self.hub.in_run:  # no output would follow
+            if self._rows and not self.hub.in_run:  # no further output would follow
                 self._take_again()
 
     def _pause(self, _: Mapping[str, str]) -> None:
@@ -174,6 +177,6 @@ class RunPage(Rhythmic, Listener):
         self._once = True
 
     def _stop(self, _: Mapping[str, str]) -> None:
-        """Stop as Ctrl-C does, so that the last state is written."""
+        """Stop the run as Ctrl-C does, so that the last state is written."""
         if self.hub.in_run:
             os.kill(os.getpid(), signal.SIGINT)

@@ -16,14 +16,14 @@ from urllib.parse import parse_qsl, urlsplit
 
 from karamelo_py.script.errors import ScriptError
 
-PATIENCE = 1.0  # seconds to send the last news at the end
+PATIENCE = 1.0  # seconds to send the last state at the end
 BEAT = 2.0  # seconds between messages, to notice closed pages
 STUCK = 30.0  # seconds without receipt after which a page counts as closed
-AWAY = 180.0  # the same after the end of a run; open pages send a sign every 20 seconds
+AWAY = 180.0  # seconds after the end of a run; open pages send a sign every 20 seconds
 UNKNOWN = 5.0  # seconds in which a client must send the secret word
 MOST = 64  # connections, so that file descriptors remain for the run
 LARGEST = 1 << 16  # bytes of a request's body, which is ignored
-# Other host names are refused: a malicious site could resolve its name to this machine.
+# Refuse other host names: a malicious site could resolve its name to this machine.
 HERE = ("127.0.0.1", "localhost", "::1")
 POLICY = (
     "default-src 'none'; script-src 'self' 'unsafe-inline' 'unsafe-eval'; "
@@ -44,9 +44,9 @@ Answer = Callable[[Mapping[str, str]], "bytes | dict | None"]
 class Server:
     """Serves a page on this machine, at the URL `address`.
 
-    ``news(seen)``, which is called in threads of the server, returns the news since the state
-    `seen` (0 at first) and the new state. `answers` (to bytes, JSON or None) and `actions` (POST)
-    are functions of the query, by name.
+    ``news(seen)`` returns the changes since the state number `seen` (0 at first), and the new state
+    number; threads of the server call it. `answers` and `actions` (for POST) are functions of the
+    query, by name; an answer is bytes, JSON or None.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class Server:
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
-        # With a short poll interval, closing does not wait.
+        # With a short poll interval, the server closes at once.
         threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True).start()
 
     def changed(self) -> None:
@@ -124,7 +124,7 @@ def require_plotly() -> None:
 
 
 class _Quiet(ThreadingHTTPServer):
-    """Server that limits connections, and ignores pages that close while loading."""
+    """Server that limits the number of connections, and ignores pages that close while loading."""
 
     daemon_threads = True
 
@@ -192,7 +192,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
             name, words = self._asked()
             length = self.headers.get("Content-Length", "0")
             if length.isdecimal() and len(length) < 9 and int(length) <= LARGEST:
-                self.rfile.read(int(length))  # the body would be read as the next request
+                self.rfile.read(int(length))  # otherwise the body would be read as the next request
             else:
                 self.close_connection = True
             if not self._is_from_here():

@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """The page of a study; `stopped` is set when a viewer ends the study.
+    """The page of a study. `stopped` is set when a viewer ends the study.
 
     `recorded` are names of recorded values, `axes` the initial axes of the chart; folders are
     relative to `base`.
@@ -56,7 +56,11 @@ class StudyPage:
         self.server.close()
 
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
-        """Colour runs by class: ``judged(row)`` adds class and reason, `colours` are by class."""
+        """Colour runs by class.
+
+        ``judged(row)`` returns the row with its class and the reason; `colours` gives the colour of
+        each class.
+        """
         self._judged, self._about["classes"] = judged, {**colours}
 
     def follow(

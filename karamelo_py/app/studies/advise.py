@@ -60,7 +60,7 @@ checked against the target. With method(auto, accuracy=0.01) the script states t
 choice of the program is compared with other set-ups (-var auto=rules,linear: only with linear)."""
 
 
-# Bases whose gradients jump between cells, and methods whose points cross them.
+# Bases whose gradients jump between cells, and methods whose points cross cells.
 JUMPING, CROSSED = ("linear", "Bernstein-quadratic"), ("ulmpm", "ulmpm/contacts")
 ALONE = "no finer run is known"
 UNFOLLOWED = f"{ALONE}, whose points may cross cells"
@@ -81,11 +81,12 @@ def forecast(
 ) -> Forecast | None:  # fmt: skip
     """Predict error and cost at `x` from runs at `xs`, coarse ones first.
 
-    None with fewer than two errors, or if the last error is larger than the one before. The error
-    is extrapolated with the last order. Its bounds follow from the smallest and the largest order,
-    and are at least 33 % above and half below it; an order that fell may fall as much again, one
-    below 2 may reach 2. Errors small by chance count as `credible`. The time is steps times
-    (a + b points), fitted; other costs follow the last two runs.
+    The result is None if there are fewer than two errors, or if the last error is larger than the
+    one before. The error is extrapolated with the last order. Its bounds follow from the smallest
+    and the largest order; they are at least 33 % above and 50 % below the error. An order that fell
+    may fall as much again; an order below 2 may reach 2. Errors that are small by chance are
+    replaced by `credible` ones. The time is fitted by steps times (a + b points); other costs are
+    extrapolated from the last two runs.
     """
     xs, signed = np.asarray(xs, float), errors(rows, accuracy)
     error = credible(xs, signed, highest)
@@ -94,7 +95,7 @@ def forecast(
         return None
     xs, error, signed_size = xs[good], error[good], np.abs(signed[good])
     rows = [row for row, is_good in zip(rows, good, strict=True) if is_good]
-    # An error counted too large would make the next one fall too steeply.
+    # If an error is overestimated, the next one would seem to fall too steeply.
     way, ways = abs(np.log(x / xs[-1])), np.abs(np.diff(np.log(xs)))
     fall = np.fmax(np.diff(np.log(error)), np.fmin(np.diff(np.log(signed_size)), 0.0)) / ways
     if fall[-1] >= 0:
@@ -112,7 +113,7 @@ def _cost(x: float, xs: np.ndarray, rows: Sequence[Row], cost: str) -> float:
     values = column(rows, cost)
     if cost == "seconds" and all(usable(a) for a in values):
         steps, points = (np.array(column(rows, name), float) for name in ("steps", "points"))
-        # Relative errors have equal weights; both terms of the time are at least 0.
+        # Use equal weights for relative errors; both terms of the time are at least 0.
         matrix = np.stack([steps, steps * points], axis=1) / values[:, None]
         parts = np.linalg.lstsq(matrix, np.ones(len(values)), rcond=None)[0]
         if (parts < 0).any():
@@ -172,8 +173,8 @@ class Candidate:
 class Adviser:
     """Finds the cheapest variant whose error is at most `target`.
 
-    `along` refines a scene, coarse values first; `accuracy` and `cost` are columns of the table.
-    `width` runs may go at once.
+    `along` is the variable that refines a scene, coarse values first; `accuracy` and `cost` are
+    columns of the table. `width` is the number of simultaneous runs.
     """
 
     def __init__(
@@ -212,7 +213,7 @@ class Adviser:
         elif 0 < len(chances) < len(self.values):
             if self._crosses(choice, len(chances)):
                 chances[-1] = chances[-1] or UNFOLLOWED
-        else:  # No finer run misses the target.
+        else:  # no finer run misses the target
             meets = np.logical_and.accumulate(np.abs(signed[::-1]) <= self.target)[::-1]
             chances[:-1] = ["" if ok else w for w, ok in zip(chances, meets[:-1], strict=False)]
         return [
@@ -229,9 +230,10 @@ class Adviser:
     def candidate(
         self, choice: ChoiceRuns, hope: bool = False, lucky: bool = False
     ) -> Candidate | None:
-        """Cheapest variant of a choice that meets the target, known or expected.
+        """Return the cheapest variant of a choice that is known or expected to meet the target.
 
-        With `hope`, use the lower bound of the error; with `lucky`, accept errors small by chance.
+        With `hope`, the lower bound of the error is used; with `lucky`, errors that are small by
+        chance are accepted.
         """
         met = [run for run in self._met(choice) if lucky or not run.chance]
         if met or lucky:
@@ -256,9 +258,9 @@ class Adviser:
         return sorted(chosen, key=lambda c: c.cost)
 
     def best(self) -> Candidate | None:
-        """Best candidate, after runs that may change it.
+        """Return the best candidate, after all runs that may change it.
 
-        Choices that could become the cheapest are followed until their candidate is the next finer
+        Choices that could become the cheapest are refined until their candidate is the next finer
         variant.
         """
         while True:

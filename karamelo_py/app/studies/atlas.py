@@ -149,7 +149,7 @@ def run(options: Namespace) -> int:
 
 
 def ended(folder: Path) -> tuple[list[str], int]:
-    """Runs that did not end well, and the count of all."""
+    """Return the names of runs that did not end well, and the number of all runs."""
     tables = [records.read(path) for path in sorted(folder.glob("*.csv"))]
     runs = [row for table in tables for row in table if "status" in row and "folder" in row]
     return [Path(row["folder"]).name for row in runs if row["status"] != "done"], len(runs)

@@ -32,8 +32,8 @@ Record = Mapping[str, Any]
 KEPT = "case.json"
 WAIT4 = hasattr(os, "wait4")
 PROGRAM = [sys.executable, "-m", "karamelo_py.app.cli"]
-# Errors before the first step that are not the script's, and errors of the program or of another
-# run in the folder.
+# Codes of errors before the first step that are not due to the script. Errors of the program, and
+# of another run in the folder, have none.
 _NOT_OF_SCRIPT = ("memory", "step-above-limit")
 _NOT_OF_RUN = ("internal", "busy")
 
@@ -43,10 +43,10 @@ class CaseOutcome:
     """Status: ``done``, ``failed``, ``refused`` (before any step), ``too long`` or ``killed``."""
 
     status: str
-    reason: str = ""  # unless done
+    reason: str = ""  # why it is not done
     facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
-    code: str = ""  # the cause in the error that ended it
+    code: str = ""  # cause given by the error that ended it
     machine: str = ""
 
     @property
@@ -54,7 +54,7 @@ class CaseOutcome:
         return said_in(self.folder / "err.txt")
 
 
-# Measured for every run; with titles of axes.
+# Columns measured for every run, with titles of axes.
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # sum over all threads
@@ -96,7 +96,7 @@ class Refused(ScriptError):
 
 
 class Stop(Exception):
-    """Ends the study and its runs."""
+    """Raised to end the study and its runs."""
 
 
 @dataclass
@@ -116,7 +116,7 @@ class Launch:
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
     def kept(self, case: Mapping[str, str], folder: Path) -> CaseOutcome | None:
-        """Stored outcome; None starts the case again."""
+        """Return the stored outcome, or None if the case must run again."""
         stored = read_json(folder / KEPT)
         if stored.get("key") != self.key(case):
             return None
@@ -213,7 +213,7 @@ class Launch:
 
 
 def await_end(pid: int) -> None:
-    """Wait until a process ends, at most 0.1 s."""
+    """Wait until a process ends, but at most 0.1 s."""
     try:
         handle = os.pidfd_open(pid)
     except (AttributeError, OSError):  # not Linux
@@ -239,7 +239,7 @@ OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # variables i
 
 
 def environment() -> dict[str, str]:
-    """Environment in which runs import this very program."""
+    """Return environment variables with which runs import this very program."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     inherited = {name: text for name, text in os.environ.items() if not name.startswith(OF_MPI)}

@@ -120,7 +120,7 @@ def run(options: Namespace) -> int:
         raise ScriptError(f"no run has a value of '{options.cost}' above 0")
     first = family.along if options.x else table.label(family.cost)
     labels = along(options, *(axes or (first, family.error_label)))
-    # The picture first: a reader of the table may close the pipe.
+    # Draw the picture first, since a reader of the table may close the pipe.
     if out is not None:
         sheet = pictures.Sheet(out, *labels, title)
         if out.suffix.lower() != ".html":

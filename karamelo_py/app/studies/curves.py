@@ -1,4 +1,4 @@
-"""Lines of increasing refinement, their orders, and the Pareto front."""
+"""Lines of runs with increasing refinement, their orders, and the Pareto front."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ NONE = "mechanical"  # label of other methods
 
 
 class Order(NamedTuple):
-    """Exponent of y = c x^exponent, by least squares of logarithms."""
+    """Exponent in y = c x^exponent, by a least-squares fit of the logarithms."""
 
     exponent: float  # NaN with fewer than two points
-    lowest: float  # between neighbouring points
+    lowest: float  # smallest between neighbouring points
     highest: float
 
     @property
@@ -51,7 +51,7 @@ def order(x: Sequence[float], y: Sequence[float]) -> Order:
     return Order(float(slope), float(local.min()), float(local.max()))
 
 
-# Orders of smooth solutions (p + 1 for polynomials of order p).
+# Orders that smooth solutions reach (p + 1 for polynomials of order p).
 REACHED = {
     "linear": 2, "ugimp": 2, "cpgimp": 2, "quadratic-spline": 3, "Bernstein-quadratic": 3,
     "cubic-spline": 4,
@@ -62,8 +62,8 @@ CHANCES = {
     "coarser": "a coarser run is better",
     "finer": "a finer run is worse",
 }
-BEYOND = 0.5  # margin of an order
-WORSE = 1.1  # ratio of a worse error
+BEYOND = 0.5  # tolerance of an order
+WORSE = 1.1  # ratio of errors above which one counts as worse
 
 
 def reached(words: Iterable[str]) -> float:
@@ -71,10 +71,10 @@ def reached(words: Iterable[str]) -> float:
 
 
 def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> list[str]:
-    """Explain errors that are small by chance, from coarse to fine; else "".
+    """Return, for each run from coarse to fine, why its error is small by chance, or "".
 
-    A finer run is worse; or, if no finer run is as good, the sign changes, the error falls faster
-    than by `highest`, the order of the basis, or it grows.
+    Possible reasons: a finer run is worse; or no finer run is as good, and the sign changes, the
+    error falls faster than the order of the basis (`highest`), or it grows.
     """
     reasons, size = [], np.abs(np.asarray(values, float))
     for k, error in enumerate(size):
@@ -94,10 +94,10 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Sizes of errors without reductions by chance.
+    """Return magnitudes of errors without reductions by chance.
 
-    They are at least the change since the last run, divided by the reduction by the order
-    `highest`, and at least the error of each finer run.
+    Each is at least the error of every finer run, and at least (change from the previous run) /
+    (r^p - 1), with the refinement r and the order p = `highest` + 0.5.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -159,16 +159,20 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Label a choice, with names of values that mean nothing alone."""
+    """Return the label of a choice.
+
+    Values that mean nothing alone get the name of their variable.
+    """
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
 
 
 class Family:
-    """Lines distinguished by the variables `by` and others that differ.
+    """Lines of runs, distinguished by the variables `by` and by all others that differ.
 
-    `along` differs along a line, by default the number with the most values.
+    `along` is the variable that changes along a line; by default, it is the number with the most
+    values.
     """
 
     def __init__(

@@ -1,9 +1,9 @@
 """Cases of a study on other machines: Dask, its job queues, or MPI.
 
-A case travels as data: its variables, and names and hashes of the script and its files. A machine
-without these files at the same paths asks once for their contents, and for kernels that others have
-compiled. The log, the record and files named by `-keep` are returned, or moved to the folder of the
-study if the machine has the same disk.
+A case is sent as data: its variables, and names and hashes of the script and its files. A machine
+that does not have these files at the same paths asks once for their contents, and for kernels that
+other machines have compiled. The log, the record and files named by `-keep` are returned, or moved
+to the folder of the study if the machine has the same disk.
 """
 
 import asyncio
@@ -41,7 +41,8 @@ from karamelo_py.script.syntax import CommandCall
 PATIENCE = 10  # seconds for a scheduler to answer
 TO_CLOSE = 3  # seconds for connections to close
 TRIES = 3
-# Of a Dask cluster on this machine: its three processes take 2 % of a core, by default 10 %.
+# Options of a Dask cluster on this machine: its three processes then take 2 % of a core instead of
+# 10 %.
 FRUGAL = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
@@ -54,30 +55,30 @@ RETURNED = (KEPT, NAME, "log.mpm", "out.txt", "err.txt")
 
 
 class Parcel(NamedTuple):
-    """The data of a study that go with each case."""
+    """Data of the study that are sent with each case."""
 
     study: str  # folder of the runs, if the machine has the same disk
-    mark: str  # file in this folder, by which a machine checks this
+    mark: str  # file in this folder that shows whether the disk is the same
     root: str  # folder of all files
-    script: str  # path below it
-    files: tuple[tuple[str, str], ...]  # paths below it, and hashes of contents
+    script: str  # path of the script below it
+    files: tuple[tuple[str, str], ...]  # paths below it, and hashes of their contents
     launch: tuple[int, int, float | None]  # threads, repetitions, limit (s)
     texts: tuple[str, ...]
     keep: tuple[str, ...]  # patterns of further files to return
     versions: tuple[tuple[str, str], ...]
-    kernels: tuple[str, ...] = ()  # names of those that machines have compiled
+    kernels: tuple[str, ...] = ()  # names of kernels that machines have compiled
 
 
 class Returned(NamedTuple):
     outcome: CaseOutcome
-    files: dict[str, bytes]  # empty if the machine has put them into their folder
+    files: dict[str, bytes]  # contents by path; empty if the machine has put them into their folder
     kernels: dict[str, bytes]
-    refused_by: str | None = None  # worker with other versions; "" without an address
-    asks: bool = False  # True if the site asks for contents of files
+    refused_by: str | None = None  # worker that has other versions; "" without an address
+    asks: bool = False  # whether the machine asks for contents of files
 
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:
-    """Versions of the program and what it needs; hashes of the sources of plug-ins."""
+    """Return versions of the program and of what it needs, and hashes of plug-ins' sources."""
     found = dict(surroundings()["versions"])
     found["python"] = ".".join(found["python"].split(".")[:2])
     for module in plugins:
@@ -98,7 +99,7 @@ def packed(
     script: ScriptFiles, launch: Launch, values: Mapping[str, Sequence[str]], keep: Sequence[str],
     study: Path,
 ) -> Parcel:  # fmt: skip
-    """List the script, its includes, and the files that arguments or variables name."""
+    """List the script, its includes, and the files that its arguments or variables name."""
     paths = {Path(abspath(path)) for path in script.statements}
     words = {(script.path, word) for words in values.values() for word in words}
     plugins = set(registry.plugins())
@@ -128,7 +129,7 @@ def packed(
 
 
 def _modules(folder: Path, name: str, found: frozenset[Path] = frozenset()) -> set[Path]:
-    """List the sources next to a script of a module and all that it imports."""
+    """Return the source files, next to a script, of a module and of all modules that it imports."""
     path = Path(abspath(folder / f"{name}.py"))
     if path in found or not path.is_file():
         return set()
@@ -177,14 +178,14 @@ class Site:
                     path.parent.mkdir(parents=True, exist_ok=True)
                     path.write_bytes(contents[name])
                 self.launch = self._launch(Path(self.folder.name))
-            with suppress(OSError):  # a read-only cache
+            with suppress(OSError):  # the cache may be read-only
                 for name in kernels:
                     if not (cache.folder() / name).is_file():
                         cache.write(cache.folder() / name, contents[name])
             self.has_kernels = kernels
 
     def compiled(self, since: float) -> dict[str, bytes]:
-        """Kernels that runs have compiled or read since a time."""
+        """Return kernels that runs have compiled or read since a time."""
         with suppress(OSError):
             listed = cache.folder().stat().st_mtime_ns
             if listed != self.listed:
@@ -200,7 +201,7 @@ class Site:
         return {}
 
 
-SITES: dict[str, Site] = {}  # sites of this process, by mark
+SITES: dict[str, Site] = {}  # sites of this process, by `Parcel.mark`
 
 
 def _site(parcel: Parcel) -> Site:
@@ -224,20 +225,20 @@ def _worker() -> Any:
     if "distributed" in sys.modules:
         from distributed import get_worker
 
-        with suppress(ValueError):  # no worker of Dask
+        with suppress(ValueError):  # raised outside a Dask worker
             return get_worker()
     return None
 
 
 def _scratch() -> str | None:
-    """Folder that Dask removes after the end of a worker."""
+    """Return a folder that Dask removes after a worker has ended, or None."""
     return worker.local_directory if (worker := _worker()) else None
 
 
 def run_sent(
     parcel: Parcel, case: Mapping[str, str], name: str, contents: Mapping[str, bytes] | None = None
 ) -> Returned:
-    """Run a case on this machine; `name` is the name of its folder."""
+    """Run a case on this machine, in a folder called `name`."""
     machine, worker, site = socket.gethostname(), _worker(), _site(parcel)
     if site.differ:
         outcome = CaseOutcome("failed", f"{machine} has {site.differ}", code="busy")
@@ -276,20 +277,23 @@ class Elsewhere:
         self, parcel: Parcel, send: Callable[[Mapping[str, bytes]], Any], executor: Executor,
         size: int, ends: ExitStack, workers: Callable[[], Mapping[str, int]] = dict,
     ):  # fmt: skip
-        """`send` makes contents known to the machines; its result goes to one that asks for them.
+        """Store how to reach the machines.
 
-        `workers` returns the threads of each worker by address, or nothing if workers cannot be
-        chosen.
+        `send` makes contents known to the machines; its result is passed to a machine that asks for
+        them.
+
+        `workers` returns the number of threads of each worker by address, or nothing if workers
+        cannot be chosen.
         """
         self.parcel, self.send, self.executor, self.size = parcel, send, executor, size
         self.ends, self.workers = ends, workers
-        self.refusing: set[str] = set()  # addresses
+        self.refusing: set[str] = set()  # addresses of workers
         self.kernels: dict[str, bytes] = {}
         self.sent: Any = None
-        self.places: dict[str, str] = {}  # machines by names of folders
+        self.places: dict[str, str] = {}  # machines by name of the folder
         self.gone = False  # Dask then accepts cases, but never finishes them
         self.loop = asyncio.new_event_loop()
-        self.loop.set_exception_handler(lambda *_: None)  # cases that are left at the end
+        self.loop.set_exception_handler(lambda *_: None)  # ignores cases that are left at the end
         Thread(target=self.loop.run_forever, daemon=True).start()
         self.mark = Path(parcel.study) / parcel.mark
         with reported(self.mark):
@@ -308,18 +312,18 @@ class Elsewhere:
         tries, contents = 1, ()
         while not self.gone:
             chosen: dict[str, Any] = {}
-            if self.refusing:  # preferred only: a worker may have ended
+            if self.refusing:  # a preference only, since a worker may have ended
                 chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
             try:
                 sent = self.executor.submit(
                     run_sent, self.parcel, case, folder.name, *contents, **chosen
                 )
-            except Exception as error:  # the executor has gone
+            except Exception as error:  # the executor no longer exists
                 return killed(f"not started: {error}")
             result, reason, contents = None, "", ()
             try:
                 result = await asyncio.wrap_future(sent)
-            except (Exception, asyncio.CancelledError) as error:  # the machine or its disk
+            except (Exception, asyncio.CancelledError) as error:  # the machine or its disk failed
                 reason = f"{type(error).__name__}: {error}".splitlines()[0]
             if result and not result.asks and result.refused_by is None:
                 return self._received(result, folder)
@@ -331,7 +335,7 @@ class Elsewhere:
                     self.refusing.add(result.refused_by)
                     if willing := self._willing():
                         self.size = min(self.size, sum(willing.values()))
-                        await asyncio.sleep(0.2)  # Dask may move the case to a worker that refuses
+                        await asyncio.sleep(0.2)  # Dask may move it to a worker that refuses
                         continue
                     tries = TRIES
                 tries += 1
@@ -339,9 +343,9 @@ class Elsewhere:
                     return self._received(result, folder)
                 if tries > TRIES:
                     return killed(f"lost {TRIES} times: {reason}")
-                self.sent = None  # the sent files may be lost, too
-                self.workers()  # an error if the scheduler has gone
-            except Exception as error:  # the scheduler does not answer, or a full disk here
+                self.sent = None  # the contents that were sent may be lost, too
+                self.workers()  # raises an error if the scheduler has ended
+            except Exception as error:  # the scheduler does not answer, or the disk here is full
                 self.gone = True
                 error_words = f"{type(error).__name__}: {error}".splitlines()[0]
                 return killed(f"{reason}; not sent again: {error_words}")
@@ -369,7 +373,7 @@ class Elsewhere:
         return result.outcome
 
     def close(self) -> None:
-        """Leave without waiting for cases that run."""
+        """Stop without waiting for cases that are still running."""
         self.ends.close()
         self.mark.unlink(missing_ok=True)
         for left in self.mark.parent.glob(".case-*"):
@@ -377,7 +381,7 @@ class Elsewhere:
 
 
 def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
-    """Close with `ends`, whatever state the machines are in."""
+    """Close, also when `ends` is left by an error, whatever state the machines are in."""
 
     def closing() -> None:
         with suppress(Exception):
@@ -387,7 +391,7 @@ def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
 
 
 def _in_time(connect: Callable[[], Any], patience: float = 0.0) -> Any:
-    """Return the result of `connect`; TimeoutError if it never ends."""
+    """Return the result of `connect`; raise TimeoutError if it never returns."""
     result: Future = Future()
 
     def connecting() -> None:
@@ -443,7 +447,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
     except ValueError as error:
         ends.close()
         raise ScriptError(f"-on {options.on}: {error}", expected=WHERE) from None
-    except Exception as error:  # anything, if something else than a scheduler answers
+    except Exception as error:  # any error, if something other than a scheduler answers
         ends.close()
         words = (str(error) or type(error).__name__).splitlines()[0]
         raise ScriptError(

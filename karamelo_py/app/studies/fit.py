@@ -1,4 +1,4 @@
-"""karamelo-py fit: values of variables that bring a log nearest to measurements."""
+"""karamelo-py fit: values of variables that bring a log closest to measurements."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping, Sequence
@@ -34,13 +34,13 @@ differences are independent. There is no +- if the three searches disagree, nor 
 end of its range, which has to be wider. A run that fails counts as a bad trial. Runs
 in the table (-o) of the same script, program and options are not repeated; -again repeats them."""
 STARTS = (0.5, 0.2, 0.8)  # fractions of each range
-# Waves and cell crossing make curves rough: with differences of 0.01 of a range, searches end in
-# local minima.
+# Waves and cell crossing make curves rough: with finite differences of 1 % of a range, searches end
+# in local minima.
 STEP = 0.04
 NEAR = 0.01  # fraction of a range within which values count as equal
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search
 AGAIN = 3  # searches from better points near an end
-ALIKE = 0.99  # correlation of indistinguishable variables
+ALIKE = 0.99  # correlation above which variables cannot be distinguished
 
 
 class Observation:
@@ -83,7 +83,7 @@ class NoDerivatives(ScriptError):
 
 @dataclass
 class End:
-    """End of a search: positions in the ranges (0 to 1), differences, slopes."""
+    """End of a search: positions in the ranges (0 to 1), differences from measurements, slopes."""
 
     fraction: np.ndarray
     off: np.ndarray
@@ -128,9 +128,11 @@ class Search:
         return results
 
     def slopes(self, fraction: np.ndarray, both: bool = False) -> np.ndarray:
-        """Derivatives (n, variables) towards the middle, or over `both` sides.
+        """Return derivatives (n, variables), taken towards the middle of the range.
 
-        Raises NoDerivatives if runs on both sides fail.
+        With `both`, they are central differences.
+
+        Raises NoDerivatives if the runs on both sides fail.
         """
         moves = np.diag(np.where(fraction < 0.5, STEP, -STEP))
         first, *ahead = self.differences(fraction, *(fraction + moves))
@@ -148,7 +150,7 @@ class Search:
         return np.column_stack(columns)
 
     def down(self, start: np.ndarray, most: int) -> End | None:
-        """Run least squares from a start; None if runs fail there."""
+        """Run a least-squares search from a start; return None if runs fail there."""
         from scipy.optimize import least_squares
 
         if not np.isfinite(self.differences(start)[0]).all():
@@ -163,7 +165,7 @@ class Search:
         return End(result.x, result.fun, result.jac)
 
     def around(self, end: End) -> End:
-        """Search around `end` along variables and the weakest direction, by both sides."""
+        """Search around `end`, along each variable and the weakest direction, to both sides."""
 
         def nearby(*moves: np.ndarray) -> list[End]:
             near = [np.clip(end.fraction + s * move, 0, 1) for move in moves for s in (1, -1)]
@@ -249,7 +251,7 @@ def settled(search: Search, ends: Sequence[End], most: int) -> tuple[End, list[E
 
 
 def disagree(best: End, other: End, half: np.ndarray) -> bool:
-    """True if ends differ by more than both 95 % ranges."""
+    """Return True if the ends of two searches differ by more than both 95 % ranges."""
     off = abs(best.fraction - other.fraction)
     wide = np.maximum(np.where(np.isnan(half), 0, 2 * half), NEAR)
     return bool((off > wide)[best.slopes.any(axis=0)].any())
@@ -266,11 +268,12 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 
 
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Half-widths of the 95 % intervals, and pairs of variables that cannot be distinguished.
+    """Return half-widths of the 95 % intervals, and pairs of indistinguishable variables.
 
-    NaN without effect or enough measurements, inf if only a combination is determined. Covariance
-    s^2 (J^T J)^-1, s^2 from the n - p differences `off` (Seber & Wild 2003, Nonlinear Regression,
-    section 2.1).
+    A half-width is NaN if the variable has no effect or measurements are too few, and inf if only a
+    combination of variables is determined. The covariance is s^2 (J^T J)^-1, with the variance s^2
+    of the differences `off`, which have n - p degrees of freedom (Seber & Wild 2003, Nonlinear
+    Regression, section 2.1).
     """
     from scipy.stats import t
 

@@ -12,7 +12,7 @@ from karamelo_py.app.studies.curves import Table, missing
 from karamelo_py.kernels.watch import WITHIN, growth
 from karamelo_py.script.errors import codes
 
-ENDS = 0.2  # fraction of the run at each end, whose means are compared
+ENDS = 0.2  # fraction of the run at each end; the two means are compared
 WRONG = ("gains", "breaks")
 OF_PARTS = {"gains": "grows", "damps": "falls"}
 
@@ -20,14 +20,14 @@ OF_PARTS = {"gains": "grows", "damps": "falls"}
 class Kept(NamedTuple):
     """Verdict: ``keeps``, ``damps``, ``gains``, ``breaks`` (stopped), ``refused`` (no step) ...
 
-    ``unknown``: the run was killed or took too long. A component of the energy gets ``falls`` and
-    ``grows`` instead of ``damps`` and ``gains``.
+    ``unknown`` means that the run was killed or took too long. A component of the energy ``falls``
+    or ``grows`` instead of ``damps`` or ``gains``.
     """
 
     word: str
-    number: float  # mean of the last part / mean of the first; ``breaks``: the last x
+    number: float  # mean of the last part / mean of the first part; for ``breaks``, the last x
     said: tuple[str, ...]  # causes or titles of warnings and of the error
-    warned: bool  # or its error names a cause
+    warned: bool  # True also if its error names a cause
 
     @property
     def silent(self) -> bool:
@@ -40,7 +40,7 @@ def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, fl
     if first == 0:
         return "gains", np.nan
     fraction, ratio = growth(first, last, first), last / first
-    if not fraction <= within:  # also NaN
+    if not fraction <= within:  # also for NaN
         return "gains", ratio
     return ("damps" if fraction < -within else "keeps"), ratio
 
@@ -49,7 +49,10 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Classify a run; the computes `parts` are components of the energy, which may fall or grow."""
+    """Classify a run.
+
+    The computes `parts` are components of the energy, which may fall or grow.
+    """
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -77,9 +80,10 @@ def _general(note: Mapping[str, str]) -> str:
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """Make a Markdown table with rows by the variables `by`, and list silent failures.
+    """Return a Markdown table with a row for each value of the variables `by`, and silent failures.
 
-    Numbered messages follow. Variables that the row variables determine get no columns.
+    Numbered messages follow the table. Variables that depend only on the row variables get no
+    columns.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
 
-# Okabe & Ito, for colour-blind readers; each has a marker, for prints in grey.
+# Colours for colour-blind readers (Okabe & Ito). Each has a marker, for prints in grey.
 PALETTE = (
     "#000000", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#8c510a",
     "#7a7a7a",
@@ -28,7 +28,7 @@ PLOTLY_MARKERS = (
     "circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x",
     "triangle-left", "triangle-right",
 )  # fmt: skip
-NEAR = 0.02  # fraction of the axes within which line ends coincide
+NEAR = 0.02  # fraction of the axes within which ends of lines coincide
 PART = 0.105  # fraction of a logarithmic axis that a number of six digits covers
 FAMILIES = (
     ("linear", "quadratic-spline", "cubic-spline", "Bernstein-quadratic", "ugimp", "cpgimp"),
@@ -39,7 +39,7 @@ FAMILIES = (
 
 
 def number(word: str, others: Sequence[str] = ()) -> int:
-    """Style number of a word: fixed for methods, else by order."""
+    """Return the style number of a word: fixed for methods, otherwise by order."""
     for family in FAMILIES:
         if word in family:
             return family.index(word) % len(PALETTE)
@@ -49,10 +49,10 @@ def number(word: str, others: Sequence[str] = ()) -> int:
 
 
 def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
-    """Choose colour, marker and dashes (by number).
+    """Choose a colour, and the numbers of a marker and of a dash pattern, for each choice.
 
-    The first variable sets colour and marker, the others the dashes: fixed for known words, else
-    the next unused.
+    The first variable sets colour and marker, the others set the dashes. Known words have fixed
+    styles; others get the next unused style.
     """
     names = list(choices[0]) if choices else []
     if not names:
@@ -92,7 +92,7 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Sequence[float] | np.ndarray) -> float:
-    """Contrast with white of an sRGB colour, 0 to 1 (WCAG 2.1)."""
+    """Return the contrast of an sRGB colour with white, from 0 to 1 (WCAG 2.1)."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
@@ -168,11 +168,11 @@ def slope(axes: "Axes", lines: Sequence[tuple[np.ndarray, np.ndarray]], exponent
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Move values at least `gap` apart, in order, within `low` and `high`."""
+    """Move values apart: in order, at least `gap` apart, within `low` and `high`."""
     rank = np.argsort(wanted, kind="stable")
     count = max(len(rank) - 1, 1)
     steps = min(gap, (high - low) / count) * np.arange(len(rank))
-    # Minus the least distances, positions only have to rise.
+    # After the least distances are subtracted, positions only have to increase.
     shifted = np.maximum.accumulate(np.asarray(wanted, float)[rank] - steps)
     shifted = np.maximum(np.minimum(shifted, high - steps[-1]), low)
     result = np.empty(len(shifted))

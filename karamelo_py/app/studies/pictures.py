@@ -48,7 +48,7 @@ class Sheet(NamedTuple):
         savefig(figure, self.path)
 
 
-DECADES = 1e4  # ratio of values above which a curve gets a logarithmic axis
+DECADES = 1e4  # ratio of the values of a curve above which its axis is logarithmic
 
 
 def lines(family: Family, sheet: Sheet) -> None:
@@ -208,7 +208,7 @@ class History(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     label: str
-    stopped: bool = False  # before its end
+    stopped: bool = False  # before the end of the run
 
 
 def histories(
@@ -232,9 +232,10 @@ def histories(
 
 
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
-    """Mask rows (n,) with increasing time.
+    """Return a mask (n,) of rows with increasing time.
 
-    A stopped run ends with an earlier good state; one that went back has discarded rows.
+    A stopped run ends with an earlier good state. A run that went back has rows that were discarded
+    later.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)
@@ -284,7 +285,7 @@ def draw_histories(
 
 @dataclass
 class Pair:
-    """Numbers of a scene for two values of one variable; NaN where missing."""
+    """Numbers of a scene for two values of one variable, NaN where missing."""
 
     label: str
     error: np.ndarray

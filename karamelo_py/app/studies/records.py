@@ -53,7 +53,7 @@ class Reduction:
             raise ScriptError(f"the log has no column '{self.column}'")
         if self.level is None:
             return float(REDUCTIONS[self.reduction](values))
-        # Interpolate between the first row beyond the level and the row before.
+        # Interpolate between the first row beyond the level and the previous row.
         above = values >= self.level if values[0] < self.level else values <= self.level
         if not above.any() or "Time" not in log:
             raise ScriptError(f"{self.column} does not reach {self.level:g}")
@@ -65,8 +65,8 @@ class Reduction:
 class Recorded:
     """A number from a log: ``err`` (the last value), ``max:err``, ...
 
-    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and variables; abs(...) as a
-    whole is also recorded with its sign (`signed`).
+    ``off=abs(max:depth/3.28 - 1)`` is a named formula of such numbers and of variables. If abs(...)
+    encloses the whole formula, the value with its sign is also recorded (`signed`).
     """
 
     signed: "Recorded | None" = None
@@ -85,7 +85,7 @@ class Recorded:
             raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
         self.word = name
         if size := _SIZE.fullmatch(formula):
-            with suppress(ScriptError):  # as in abs(a) + abs(b)
+            with suppress(ScriptError):  # not a single abs, as in abs(a) + abs(b)
                 self.signed = Recorded(f"{name}{SIGNED}={size[1]}")
 
         def named(match: re.Match) -> str:
@@ -145,9 +145,9 @@ def _apart(text: str) -> list[str]:
 def row(
     case: Mapping[str, str], outcome: CaseOutcome, items: Sequence[Recorded], folder: Path
 ) -> Row:
-    """Make a table row; unknown cells are None.
+    """Make a row of the table; unknown cells are None.
 
-    A finished run's reason is why a value is missing.
+    The reason of a finished run says why a value is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)

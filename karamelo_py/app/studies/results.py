@@ -31,7 +31,7 @@ def draw(options: Namespace, table: Table, by: Sequence[str]) -> int:
         raise ScriptError(f"no run has numbers of '{options.x}' and '{options.y}'")
     law = Law(options.law, options.x) if options.law else None
     measured = measured_in(options.data, options.x, results[0]) if options.data else None
-    if out is not None:  # the picture first: a reader of the table may close the pipe
+    if out is not None:  # drawn first, since a reader of the table may close the pipe
         first = table.label(results[0]) if len(results) == 1 else ""
         title = table.title if options.title is None else options.title
         sheet = Sheet(out, *along(options, table.label(options.x), first), title)

@@ -1,4 +1,4 @@
-"""Random variables of a study, and samples of them."""
+"""Random variables of a study, and samples of their values."""
 
 import re
 from argparse import ArgumentParser, Namespace
@@ -31,7 +31,7 @@ CALL = re.compile(r"([^\W\d]\w*)\((.*)\)")
 
 class Random(NamedTuple):
     name: str
-    text: str  # of the distribution, as the user wrote it
+    text: str  # distribution as the user wrote it
     law: Any  # distribution of scipy.stats
 
 
@@ -85,7 +85,9 @@ def _law(name: str, kind: str, text: str) -> Any:
 def samples(
     laws: Sequence[Any], count: int, sequence: str, seed: int, factor: np.ndarray | None = None
 ) -> np.ndarray:
-    """Draw (count, variables) numbers; `factor`: Cholesky factor of the normal scores' correlation.
+    """Draw (count, variables) numbers.
+
+    `factor` is the Cholesky factor of the correlation of the normal scores.
 
     A longer Sobol' or Halton sequence begins with the shorter one.
     """
@@ -101,7 +103,7 @@ def samples(
 
 
 def correlation(path: Path, names: Sequence[str]) -> np.ndarray:
-    """Cholesky factor of the matrix in a file with the variables' names."""
+    """Return the Cholesky factor of a correlation matrix in a file, ordered like `names`."""
     table = read_table(path)
     for name in names:
         if name not in table:
@@ -141,7 +143,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def prepare(options: Namespace) -> dict[str, Any]:
-    """Replace random variables by samples; return facts for the record."""
+    """Replace random variables by samples; return the facts to record."""
     calls = (CALL.fullmatch(word.partition("=")[2].strip()) for word in options.var)
     if not options.sample:
         if any(call and call[1] in KINDS for call in calls):

@@ -38,11 +38,11 @@ change (mu*), and standard deviation of the changes (sigma), which shows curvatu
 (Morris 1991; Campolongo et al. 2007); n (d + 1) runs.
 fit: for expensive runs: sobol indices of a surrogate fitted to n runs, a polynomial or a Gaussian
 process, whichever has the smaller leave-one-out error (printed). Existing runs are reused."""
-DOUBTED = 0.2  # leave-one-out error of a fit / standard deviation of the runs
-LEVELS = 4  # values of each variable in the method morris
-ENDS = 0.01, 0.99  # quantiles
+DOUBTED = 0.2  # leave-one-out error / standard deviation of the runs for a warning
+LEVELS = 4  # values of each variable in method morris
+ENDS = 0.01, 0.99  # quantiles at the ends of a range
 
-Results = Callable[[np.ndarray], np.ndarray]  # (d, n) to (results, n)
+Results = Callable[[np.ndarray], np.ndarray]  # maps (d, n) to (results, n)
 
 
 def _problem(laws: Sequence) -> dict[str, Any]:

@@ -50,8 +50,8 @@ CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")
 UNTOLD = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
-FEWEST = watch.FEW * watch.LOOK + 1  # steps in which the energy is checked often enough
-SURE = 3 * watch.LOOKS * watch.LOOK  # steps above which slow growth is recognised
+FEWEST = watch.FEW * watch.LOOK + 1  # steps after which energy has been checked often enough
+SURE = 3 * watch.LOOKS * watch.LOOK  # steps after which slow growth is recognised
 FIRST = 0.1  # fraction of the log over which energies are averaged
 FEW = 9  # largest number of values of a variable that all get a tick
 COLOURS = {
@@ -147,9 +147,9 @@ def run(options: Namespace) -> int:
 
 
 def growth(energy: np.ndarray) -> float:
-    """Largest running mean (10 % of the rows) / the first; inf for NaN.
+    """Return the largest running mean (over 10 % of the rows) / the first one; inf for NaN.
 
-    If the first is 0, the median replaces it.
+    If the first mean is 0, the median replaces it.
     """
     if not len(energy):
         return 0.0
@@ -179,11 +179,11 @@ def in_short(row: Row, code: str) -> str:
 
 
 class Map:
-    """Stability against one or two `axes`, variables of `values`.
+    """Map of stability against one or two `axes`, which are variables in `values`.
 
-    A run grows if the log column `energy` grows by more than the factor `bound`; without a column,
-    by the energy balance. The column `error` shades stable cells. A variable has the index of its
-    leader in `leaders` (-zip).
+    A run is growing if the log column `energy` grows by more than the factor `bound`; without this
+    column, the energy balance decides. The column `error` shades stable cells. `leaders` maps a
+    variable to the one that it changes with (-zip).
     """
 
     def __init__(
@@ -237,7 +237,7 @@ class Map:
         codes = {note.get("code") for note in record.get("messages", [])}
         verdict = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
         limit = runs[0].get("limited_by") if runs else None
-        if limit not in (None, "set_dt", "end"):  # set by the script
+        if limit not in (None, "set_dt", "end"):  # the script has set it
             verdict["limit"] = limit
         done = row["status"] == "done"
         if self.energy:
@@ -284,7 +284,7 @@ class Map:
         return rows
 
     def line(self, step: str) -> list[float | None]:
-        """Each row's x at which the first step equals the column `step`, or None."""
+        """Return, for each row, x where the first step equals the column `step`, or None."""
         points: list[list[tuple[float, float]]] = [[] for _ in self.y]
         for (i, j), row in sorted(self.results.items()):
             dt, same = row.get("dt"), row.get(step)
@@ -307,7 +307,7 @@ class Map:
             return None
         first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
         (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
-        if isclose(a, b, rel_tol=1e-6):  # both steps scale with the variable
+        if isclose(a, b, rel_tol=1e-6):  # both steps are proportional to the variable
             return None
         at = log(xa) - log(xb / xa) * log(a) / log(b / a)
         low, *_, high = edges(self.x)
@@ -451,12 +451,13 @@ def explore(
     apart: Sequence[bool] = (False, False),
     width: int = 1,
 ) -> tuple[dict[Cell, Hashable], dict[Cell, Hashable]]:
-    """Classes of the cells that were run, and those inferred for the others.
+    """Return classes of the cells that were run, and classes inferred for all other cells.
 
-    A grid of cells about `stride` apart is run first. Between two of one class in a row or column,
-    cells get that class; between two classes the middle cell is run, longest gaps first, and along
-    an edge at least one in three. Islands between runs are missed. Along an axis of words
-    (`apart`), nothing is inferred. At least `width` cells are run at once.
+    A grid of cells about `stride` apart is run first. Cells between two runs of the same class, in
+    a row or column, get that class. Between runs of different classes, the middle cell is run,
+    longest gaps first; along an edge between classes, at least one cell in three is run. Islands
+    between runs are missed. Along an axis of words (`apart`), nothing is inferred. At least `width`
+    cells are run at once.
     """
     classes: list[Hashable] = []
     plane = np.full(shape, UNKNOWN)
@@ -495,7 +496,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill cells between two of one class, unless row and column disagree."""
+    """Fill cells between two cells of one class, unless row and column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -525,7 +526,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle of stretches of an edge without a run."""
+    """Yield length and middle cell of the parts of an edge that have no run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])
@@ -546,7 +547,7 @@ def _stretches(runs: np.ndarray, near: np.ndarray, far: np.ndarray, which: int) 
 
 
 def _spaced(wanted: list[tuple[int, Cell]]) -> list[Cell]:
-    """Choose cells of the longest gaps, at least half a gap apart."""
+    """Choose cells in the longest gaps, at least half a gap apart."""
     chosen: list[tuple[int, Cell]] = []
     for size, (i, j) in sorted(wanted, key=lambda one: (-one[0], one[1])):
         if all(max(abs(i - k), abs(j - m)) > longer // 2 for longer, (k, m) in chosen):

@@ -1,4 +1,4 @@
-"""Cases of a study; known ones do not run again."""
+"""Run the cases of a study; cases with known outcomes do not run again."""
 
 from __future__ import annotations
 
@@ -44,21 +44,21 @@ if TYPE_CHECKING:
 _FACTS = ("seconds", "points", "steps")
 HERE = socket.gethostname()
 OF_MACHINE = ("processor", "cores", "system", "versions")
-_STATUS = 24  # least width of the status while facts are shown
-LISTED = 10  # first and last rows on the terminal
+_STATUS = 24  # smallest width of the status while facts are shown
+LISTED = 10  # first and last rows shown on the terminal
 
 
 class Pool(Protocol):
     size: int  # runs at once
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
-        """Return a future of the outcome; the files of the case come into `folder`."""
+        """Start a case whose files go to `folder`; return a future of its outcome."""
 
     def machine(self, folder: Path) -> str:
-        """Return the machine on which the case of a folder runs, if it is known."""
+        """Return the machine on which the case of a folder runs, if known."""
 
     def close(self) -> None:
-        """End cases that run."""
+        """End all running cases."""
 
 
 class Here:
@@ -86,13 +86,13 @@ class Study:
     again: bool = False
     title: str = ""
     strict: bool = False  # a refused variant ends the study
-    most: int = 0  # 0: `run` gets all cases
+    most: int = 0  # most runs of an adaptive study; 0 if `run` gets all cases
     writes: bool = True  # write the table after each run
-    page: StudyPage | None = None  # with --live
-    facts: dict[str, Any] = field(default_factory=dict)  # for the file next to the table
+    page: StudyPage | None = None  # live page (--live)
+    facts: dict[str, Any] = field(default_factory=dict)  # written to the file next to the table
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
-    order: dict[tuple[str, ...], None] = field(default_factory=dict)  # of the rows in the table
-    machines: dict[str, Any] = field(default_factory=dict)  # processor and versions of each
+    order: dict[tuple[str, ...], None] = field(default_factory=dict)  # order of the table's rows
+    machines: dict[str, Any] = field(default_factory=dict)  # processor and versions of each machine
     claim: Claim | None = None  # lock of the folder
     ran: int = 0
     next_write: float = 0.0  # when the table is due
@@ -128,7 +128,7 @@ class Study:
             self.next_write = time.perf_counter() + 20 * (time.perf_counter() - begun)
 
     def run(self, cases: Sequence[Mapping[str, str]]) -> list[Row]:
-        """Run cases; an interrupt ends runs, and finished ones are stored."""
+        """Run cases. An interrupt ends running cases; finished ones are stored."""
         waiting = []
         self.order.update(dict.fromkeys(tuple(case.values()) for case in cases))
         for case in cases:
@@ -162,13 +162,17 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Next case; the first of a kind goes ahead, because it compiles."""
+            """Return the next case.
+
+            The first case of a kind starts before others of this kind, because it compiles.
+            """
             kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
         try:
             while queue or running:
-                # With several places each has a next case, and need not wait for this process.
+                # Each of several places has a next case ready, so that it need not wait for this
+                # process.
                 size = self.place.size
                 while len(running) < size + size * (size > 1) and (item := ready()):
                     queue.remove(item)
@@ -194,7 +198,7 @@ class Study:
             self.write()
 
     def _show(self, queue: Sequence[tuple], running: Sequence[Mapping], display: _Display) -> None:
-        """Show the state; KeyboardInterrupt if the study was stopped on the page."""
+        """Show the state. Raises KeyboardInterrupt if the study was stopped on its page."""
         of = self.most or display.count + len(self.rows) - display.finished
         left = display.left(queue, running)
         folders = [self.folder / folder_name(case) for case in running]
@@ -276,7 +280,7 @@ def _said(case: Mapping[str, str]) -> str:
 def guessed_time(
     cases: Sequence[Mapping[str, str]], times: Sequence[float]
 ) -> Callable[[Mapping[str, str]], float]:
-    """Predict the time by ridge regression: powers of numbers, factors of words."""
+    """Predict the time of a case by ridge regression: powers of numbers, factors of words."""
 
     def features(case: Mapping[str, str]) -> dict[Any, float]:
         logs: dict[Any, float] = {}
@@ -362,11 +366,11 @@ def open_study(
     options: Namespace, plan: variables.StudyPlan, out: Path, items: Sequence[Recorded], *,
     axes: Sequence[str] = (), facts: Row, **settings: Any,
 ) -> Study:  # fmt: skip
-    """Lock the folder, write `facts` of the study, open its page with `axes`.
+    """Lock the folder, write the `facts` of the study, and open its page with `axes`.
 
     `settings` are further fields of `Study`.
     """
-    gc.enable()  # off for single runs
+    gc.enable()  # single runs have turned it off
     names, again = list(plan.values), options.again
     place: Pool = Here(plan.launch, plan.jobs)
     study = Study(plan.launch, out, names, items, place, again=again, **settings)

@@ -9,12 +9,12 @@ import numpy as np
 from karamelo_py.app.studies.uncertainty import Interval
 from karamelo_py.script.errors import ScriptError
 
-GROUPS = 10  # groups of runs, each omitted once for the intervals of indices
-SAMPLES, FEW = 16384, 1024  # evaluations of the fit for each index, and for its interval
+GROUPS = 10  # groups of runs, each omitted once for the intervals of the indices
+SAMPLES, FEW = 16384, 1024  # evaluations of the fit for an index, and for its interval
 WIDE = 1.96  # standard deviations of an interval of 95 %
 
-Function = Callable[[np.ndarray], np.ndarray]  # (n, d) to (n,)
-Fit = Callable[[np.ndarray, np.ndarray], Function]  # points (n, d) and values (n,)
+Function = Callable[[np.ndarray], np.ndarray]  # maps (n, d) to (n,)
+Fit = Callable[[np.ndarray, np.ndarray], Function]  # fits points (n, d) and values (n,)
 
 
 def powers(x: np.ndarray, degree: int) -> np.ndarray:
@@ -31,7 +31,10 @@ def polynomial(x: np.ndarray, y: np.ndarray, degree: int) -> Function:
 
 
 def likely(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Logarithms of the lengths (one per variable) and of the noise of largest likelihood."""
+    """Return the most likely parameters of a Gaussian process, as logarithms.
+
+    They are the correlation length of each variable, and the noise.
+    """
     from scipy.linalg import LinAlgError, cho_factor, cho_solve
     from scipy.optimize import minimize
 
@@ -64,8 +67,9 @@ def _covariance(x: np.ndarray, logs: np.ndarray) -> np.ndarray:
 
 
 def gaussian_process(x: np.ndarray, y: np.ndarray, logs: np.ndarray) -> Function:
-    """Mean of a Gaussian process with squared exponential correlations (Rasmussen & Williams 2006,
-    section 2.2); `logs` as `likely` returns them."""
+    """Return the mean of a Gaussian process with squared exponential correlations (Rasmussen &
+    Williams 2006, section 2.2). `logs` are as returned by `likely`.
+    """
     weights = np.linalg.solve(_covariance(x, logs), y - y.mean())
     return lambda at: y.mean() + _correlation(at, x, logs) @ weights
 
@@ -74,7 +78,7 @@ POLYNOMIALS = {"a linear function": 1, "a quadratic polynomial": 2, "a cubic pol
 
 
 def left_out(fit: Fit, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Errors of the predictions of each value from all others."""
+    """Return the errors of predicting each value from all other values."""
     others = ~np.eye(len(x), dtype=bool)
     return np.array([fit(x[one], y[one])(x[[k]])[0] - y[k] for k, one in enumerate(others)])
 
@@ -82,8 +86,8 @@ def left_out(fit: Fit, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def best(x: np.ndarray, y: np.ndarray) -> tuple[str, Fit, float]:
     """Return the fit with the smallest leave-one-out error, its name and its error.
 
-    A polynomial needs twice as many runs as coefficients. The Gaussian process has the same lengths
-    for all runs but one (Rasmussen & Williams 2006, eq. 5.12).
+    A polynomial needs twice as many runs as coefficients. In leave-one-out predictions, the lengths
+    of the Gaussian process are those fitted to all runs (Rasmussen & Williams 2006, eq. 5.12).
     """
     fits: dict[str, Fit] = {
         name: partial(polynomial, degree=degree)
@@ -103,10 +107,10 @@ def best(x: np.ndarray, y: np.ndarray) -> tuple[str, Fit, float]:
 def indices(
     laws: Sequence, results: Callable[[np.ndarray], np.ndarray], n: int, seed: int
 ) -> tuple[list[list[tuple[Interval, Interval]]], list[tuple[str, float]]]:
-    """First and total Sobol' indices by result and variable, and the fit of each result.
+    """Return first and total Sobol' indices by result and variable, and the fit of each result.
 
-    Intervals are by a delete-group jackknife (10 % of the runs), and include the error of sums over
-    samples; they contain the error of the fit as far as it changes with the runs.
+    Intervals follow from a delete-group jackknife (10 % of the runs). They include the error of
+    sums over samples, and the error of the fit as far as it changes with the runs.
     """
     from scipy.stats import qmc, sobol_indices
 

@@ -1,4 +1,4 @@
-"""karamelo-py sweep: a script with many values of its variables."""
+"""karamelo-py sweep: run a script with many values of its variables."""
 
 from argparse import ArgumentParser, Namespace
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Distribution of the results of a sample; probability of an event."""
+"""Distribution of the results of a sample, and probability of an event."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ class Interval(NamedTuple):
 
 
 def statistics_of(values: np.ndarray) -> list[Interval]:
-    """Mean, standard deviation and quantiles, with bootstrap intervals (Efron 1979)."""
+    """Return mean, standard deviation and quantiles, with bootstrap intervals (Efron 1979)."""
     from scipy.stats import bootstrap
 
     def of(sample: np.ndarray, axis: int = -1) -> np.ndarray:
@@ -46,7 +46,7 @@ def statistics_of(values: np.ndarray) -> list[Interval]:
 
 
 def probability(count: int, of: int) -> Interval:
-    """Probability of an event seen `count` times, with Wilson's interval (1927)."""
+    """Return the probability of an event seen `count` times, with Wilson's interval (1927)."""
     from scipy.stats import binomtest
 
     interval = binomtest(count, of).proportion_ci(SURE, method="wilson")

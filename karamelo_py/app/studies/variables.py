@@ -1,4 +1,4 @@
-"""Variables of a study, and common options of studies."""
+"""Variables of a study, and options that all studies have."""
 
 import csv
 import os
@@ -33,9 +33,9 @@ _MOST = 100_000
 
 
 def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, list[str]]:
-    """Read values of variables: ``N=10,20``, ``xi=0:1:5`` (5 of them), ``basis=linear``.
+    """Read values of variables: ``N=10,20``, ``xi=0:1:5`` (5 values), ``basis=linear``.
 
-    Variables `in_step` with others may repeat a value.
+    Variables that change together with others (`in_step`) may repeat a value.
     """
     variables: dict[str, list[str]] = {}
     for word in words:
@@ -71,7 +71,7 @@ def _spread(name: str, value: str) -> list[str]:
 def cases(
     values: dict[str, list[str]], zipped: Sequence[Sequence[str]] = (), where: Sequence[str] = ()
 ) -> list[dict[str, str]]:
-    """Combine all values, the first variable changing slowest.
+    """Combine all values; the first variable changes slowest.
 
     Variables in a group of `zipped` change together; `where` are conditions.
     """
@@ -144,7 +144,7 @@ def holds(
 
 
 def title_of(script: Path) -> str:
-    """First sentence of a script's comment, else the name of the file."""
+    """Return the first sentence of a script's comment, or the name of the file."""
     lines = read_script(script).splitlines() if script.is_file() else []
     head = " ".join(line.strip("# ") for line in takewhile(re.compile(r"#+ *\w").match, lines))
     return fill(re.split(r"[.:](?:\s|$)", head)[0], 80) or script.name
@@ -186,7 +186,7 @@ class ScriptFiles:
                 raise error
 
     def logged(self) -> list[str] | None:
-        """The log columns that the script names; None with includes."""
+        """Return the log columns that the script names, or None if it has includes."""
         if self.calls("include", self.path):
             return None
         headings = ["Step", "dt", "Time"]

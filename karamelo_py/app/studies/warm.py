@@ -1,7 +1,7 @@
-"""Start runs as forks of warm processes, which have imported the program.
+"""Start runs as forks of warm processes, which have already imported the program.
 
-A run leaves a fork of itself, with its kernels, for later runs of the same kind, if the study can
-adopt orphans (Linux). Otherwise, or if anything fails, a run starts a new interpreter.
+If the study can adopt orphans (Linux), a run leaves a fork of itself, with its kernels, for later
+runs of the same kind. If it cannot, or if anything fails, each run starts a new interpreter.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ from karamelo_py.app.leaving import STUDY
 
 MOST = 8
 TRIES = 3
-PATIENCE = 20.0  # seconds: a start takes about 0.01, the import 2
+PATIENCE = 20.0  # seconds; a start takes about 0.01, the import 2
 SUBREAPER = 36  # prctl: adopt processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
@@ -33,13 +33,13 @@ NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
 class WarmProcess:
-    """A warm process; without a pid, a run that may leave one."""
+    """A warm process. Without a pid, it is a run that may leave one."""
 
     def __init__(self, link: socket.socket, pid: int | None = None):
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """Return True if it can be copied; ConnectionError if it has gone."""
+        """Return True if it can be forked; raise ConnectionError if it has ended."""
         if self.pid is None:
             with suppress(BlockingIOError):
                 answer = self.link.recv(32, socket.MSG_DONTWAIT)
@@ -70,7 +70,7 @@ class WarmProcesses:
     def start(
         self, kind: tuple[str, ...], words: list[str], folder: Path, files: Sequence[BinaryIO]
     ) -> int | None:
-        """Start a run with output and error to `files`; return the child's pid, or None."""
+        """Start a run that writes output and errors to `files`; return its pid, or None."""
         with self.lock:
             while self.tries:
                 key: tuple[str, ...] = ()
@@ -149,7 +149,7 @@ def keep(link: socket.socket) -> NoReturn:
     gc.collect()
     gc.freeze()
     gc.disable()
-    os.chdir("/")  # so that folders can be removed
+    os.chdir("/")  # so that the folder of the run can be removed
     with open(os.devnull, "r+b") as nothing:
         for at in range(3):
             os.dup2(nothing.fileno(), at)
@@ -167,7 +167,7 @@ def keep(link: socket.socket) -> NoReturn:
             for end in (link, read, write):
                 end.close() if end is link else os.close(end)
             _run(json.loads(request), *files)
-        os.waitpid(between, 0)  # now the run is a child of the study
+        os.waitpid(between, 0)  # makes the run a child of the study
         os.close(write)
         link.send(os.read(read, 32))
         for file in (read, *files):
@@ -183,7 +183,7 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
         if str(os.getppid()) == study:
             break
         time.sleep(0.002)
-    os.setsid()  # Ctrl-C reaches the study only
+    os.setsid()  # so that Ctrl-C reaches the study only
     os.chdir(folder)
     for file, at in ((out, 1), (err, 2)):
         os.dup2(file, at)
