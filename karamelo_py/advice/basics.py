@@ -39,7 +39,7 @@ class BasicFacts:
         self.kept = 0.0 if affine else flip_coefficient(self.transfer)  # FLIP coefficient
         traits = self.basis.traits
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
-        self.hats = self.linear or bool(traits.shape)  # linear, or has domains
+        self.hats = self.linear or bool(traits.shape)  # linear, or a basis with domains
         solids = hub.solids.values()
         # Solids whose laws store all work and sustain tension.
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
@@ -62,7 +62,7 @@ class BasicFacts:
 
     @cached_property
     def weights(self) -> list[np.ndarray]:
-        """Mean accelerations (d,) of the solids due to each fix."""
+        """Return the mean accelerations (d,) of the solids due to each fix."""
         weights = []
         for fix in self.hub.fixes.values():
             if fix.accelerates and self.waves > 0 and self.motions:

@@ -163,7 +163,7 @@ def fixes_at(facts: BasicFacts, body: Body) -> Iterator[tuple[Fix, np.ndarray]]:
 
 
 def pressed_evenly(facts: BasicFacts, body: Body) -> bool:
-    """Return whether fixes hold all sides of a box but one in the normal direction."""
+    """Return True if fixes hold all sides of a box, except one, in the normal direction."""
     h, low, high = lattice_at(facts, body).h, body.motion.low, body.motion.high
     box = sides(body).prod() * facts.hub.domain.thickness
     if facts.hub.domain.kin.hoops or np.sum(body.solid.volume0) < (1 - 1e-6) * box:

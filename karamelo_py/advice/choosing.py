@@ -35,7 +35,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.errors import ScriptError
 
-# Methods to rehearse a scene with: the first one that is supported is used.
+# Methods with which to rehearse a scene: the first supported one is used.
 NEUTRAL = (
     "method(ulmpm, FLIP, linear, 1)",
     "method(ulmpm/contacts, FLIP, linear, 1)",
@@ -44,7 +44,7 @@ NEUTRAL = (
     "method(ulmpm/contacts, FLIP, linear, 1, thermo-mechanical)",
 )
 
-CROSSED = 0.1  # cells through which stressed material may move
+CROSSED = 0.1  # number of cells through which stressed material may move
 FAST = 0.005  # fraction of the wave speed above which impacts cause shocks
 
 
@@ -143,7 +143,7 @@ class Scouted(SceneFacts):
 
     @cached_property
     def apart(self) -> bool:
-        """Return whether a body starts at a distance from one that it will meet."""
+        """Return True if a body starts at a distance from a body that it will meet."""
         boxes = boxes_of([body.motion for body in self.bodies])
         soft = [body for body in self.bodies if not body.solid.rigid]
         times = (meetings(body.motion, boxes, body.solid.h) for body in soft)
@@ -194,7 +194,7 @@ def eos_traits(law: tuple) -> LawTraits:
 
 
 def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
-    """Execute the rest of the script on a copy; return None if it has no run."""
+    """Execute the rest of the script on a copy of the scene; return None if it has no run."""
     other, settings = hub.rehearsal(), copy.copy(hub.settings)
     other.scouting, other.settings = True, settings
     settings.comm, settings.ranks = SerialComm(), 1
@@ -211,7 +211,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
 
 
 def choose(hub: Hub, name: str, accuracy: float | None) -> Chosen:
-    """Choose a row for this scene; mistakes further on in the script raise ScriptError.
+    """Choose a row for this scene; mistakes in later lines of the script raise ScriptError.
 
     `name` is `BY_RULES` or one of `ALTERNATIVES`. With a target `accuracy`, ``check`` also finds
     the alternatives that the scene supports.

@@ -21,7 +21,7 @@ from karamelo_py.run.listening import when
 
 STRESSED = 0.1  # stored fraction of the initial energy below which a body counts as unstressed
 OF_ENERGY = 0.1  # lost fraction of the energy without drift below which there is no warning
-LOADED = 0.5  # fraction of the energy: loads that supply more maintain the stress
+LOADED = 0.5  # fraction of the energy; loads that supply more maintain the stress
 
 
 class Crossing(NamedTuple):
@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Return whether stress is lost; gases and liquids have separate rules."""
+    """Return True if stress is lost; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit
@@ -66,7 +66,7 @@ def _stressed(facts: BasicFacts) -> Iterator[tuple[float, float]]:
 
 
 def _struck(facts: BasicFacts) -> Iterator[tuple[float, float]]:
-    """Yield speed and duration of the longest path of each solid that meets others.
+    """Yield speed and duration of the longest path of each solid that meets another solid.
 
     Stressed material moves at (z1 v1 + z2 v2)/(z1 + z2), with the impedances z = rho c, until waves
     have returned through the thinner solid.

@@ -40,7 +40,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = stable_step.own_step_of_waves(hub, still=False)
-    # Wave speed of undeformed bodies; they may soften later.
+    # Use the wave speed of undeformed bodies; they may have softened since.
     fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.step[0].spacing) / fastest if fastest > 0 else np.inf
     borne = courant * across
@@ -115,7 +115,7 @@ def taken_by(hub: Hub) -> list[str]:
     takers, transfer, scheme = [], hub.update.transfer, hub.update.scheme
     if damping := scheme.traits.damping(scheme):
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
-    # Motion within cells is lost, as nodal velocities do not contain it.
+    # Motion within cells is lost, because nodal velocities do not contain it.
     if flip_coefficient(transfer) < 1:
         coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
         takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{coefficient}")

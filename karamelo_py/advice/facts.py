@@ -32,7 +32,7 @@ class Vibration(NamedTuple):
 
 class SceneFacts(BasicFacts):
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Yield each part of laws, bases and so on once, with its material."""
+        """Yield each part (law, basis, ...) once, with its material."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [

@@ -158,7 +158,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn of a step above the limit, also of later runs; once, unless `again`."""
+    """Warn of a step above the limit, in this and in later runs; once, unless `again`."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -274,7 +274,7 @@ def warn_about_factor(hub: Hub) -> None:
 
 
 def warn_about_steps_of_1(hub: Hub, time: float, steps: float) -> None:
-    """Warn once of static steps without set_dt in which heat or water flows, or a load is full."""
+    """Warn once of load steps without set_dt in which heat or water flows or a load is complete."""
     update = hub.update
     if update.fixed_dt is not None or update.scheme.traits.inertia:
         return
@@ -356,8 +356,9 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 def _warn_about_precision(s: SceneFacts) -> None:
     """Warn if single precision cannot resolve the motion in a step.
 
-    At 50 000 cells from the origin, the path of a falling block has an error of 3.5 %; at 200 000
-    cells it does not move. Raises ScriptError if positions are spaced by 1/500 cell or more.
+    At 50 000 cells from the origin, the path of a falling block has an error of 3.5 %. At 200 000
+    cells, the block does not move. Raises ScriptError if positions are spaced by 1/500 cell or
+    more.
     """
     if s.hub.settings.precision != "single":
         return

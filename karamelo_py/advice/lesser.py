@@ -42,7 +42,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
 
 NO_LAYERS = 0, (0.0, 0.0)
-SAMPLES = 1000  # positions that are tested for whether a solid is a prism
+SAMPLES = 1000  # positions tested to find whether a solid is a prism
 THIN = 0.2  # thickness / smallest width of a plate in plane stress
 
 
@@ -67,7 +67,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
-        # Points of a radial scene cost as much, so one or two layers are no waste.
+        # A point of a radial scene costs as much, so one or two layers are no waste.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
             several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):
@@ -89,7 +89,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 def _domain_of(hub: Hub, rest: list[int], more: str = "") -> str:
-    """Return the line of a domain with the directions `rest` alone."""
+    """Return the line that defines a domain with only the directions `rest`."""
     domain = hub.domain
     ends = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
     line = f"dimension({len(rest)}, {', '.join(ends)}, {domain.h:g}){more}"
@@ -176,7 +176,7 @@ def _leans(hub: Hub, rest: list[int]) -> bool:
         law = solid.material.whole
         place = place_of(law)
         lost = {axis + "0" for axis in AXES[d:]} & (names_in(place.formulas) if place else set())
-        # If other axes became x and y, directions would have other numbers.
+        # If other axes became x and y, the numbers that give directions would change.
         if can(law, is_round) and (lost or rest != [*range(d)] or leans(law, Fewer(hub, d))):
             return True
     return False
@@ -199,7 +199,7 @@ def _longer(hub: Hub, d: int) -> float:
 
 
 def _is_led(hub: Hub, across: list[int], held: dict[int, Roller]) -> bool:
-    """Return whether a fix, except a symmetry plane, prescribes velocities across a thin body."""
+    """Return True if a fix other than a symmetry plane prescribes velocities across a thin body."""
     planes = [roller.fix for roller in held.values()]
     led = [f for f in hub.fixes.values() if f.prescribes_velocity and f not in planes]
     formulas = [fix.formulas for fix in led]

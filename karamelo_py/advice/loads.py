@@ -82,7 +82,7 @@ def depends(formula: Any, axes: str) -> bool:
 
 
 def alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return whether the group of a fix has all or none of the points (nodes) of equal `key`."""
+    """Return True if the group of a fix has all or none of the points (or nodes) of equal `key`."""
     group, within = fix.group, fix.points_within()
     if group is None or (group.all and within is None):
         return group is not None
@@ -109,9 +109,10 @@ def acts_alike(hub: Hub, rest: list[int]) -> bool:
 
 
 def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
-    """Return words for the cost of a scene relative to its cost in `d` dimensions.
+    """Describe the cost of a scene relative to its cost in `d` dimensions.
 
-    The cost of a point is proportional to its number of nodes; a step may be `longer` there.
+    The cost of a point is proportional to its number of nodes; in `d` dimensions, steps are
+    `longer` by this factor.
     """
     basis, kin = hub.update.method.basis, hub.domain.kin
     nodes = support(basis, kin) / support(basis, KINEMATICS[d]())
@@ -119,7 +120,7 @@ def cost(hub: Hub, points: float, d: int, longer: float = 1.0) -> str:
 
 
 def to_change(hub: Hub, restrictions: Restrictions) -> str:
-    """Return words for the choices of a scene that another model does not support."""
+    """Describe the choices of a scene that another model does not support."""
     refused = [feature for feature in features(hub) if restrictions.exclude(feature)]
     return "".join(
         f"; not with {one.words} (instead: {restrictions.instead_of(one)})" for one in refused

@@ -37,7 +37,7 @@ class Narrator(Listener):
         if resumed:
             if run.ruined:
                 self.smaller = "a smaller time step"  # the state in the file may be bad
-            # With halved or load steps, the step is not chosen by the script.
+            # With halved steps or load steps, the step is not the script's choice.
             if not (run.rollback.point.halvings or simulation.implicit):
                 known_failures.warn_about_steps(hub, simulation, halve, again=True)
             self._tell_of_end(run, simulation)

@@ -13,10 +13,10 @@ from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
 SLENDER = 4.0  # length / thickness above which a body bends
-# Limits of c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Of two vibrating blocks
-# (usl, linear basis, 1 to 3 points per cell), 3.2 and 5.9 fail within 3000 steps, 1.9 does not.
+# Limits of c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two vibrating blocks (usl,
+# linear basis, 1 to 3 points per cell) fail within 3000 steps at 3.2 and 5.9, but not at 1.9.
 BREAKS, HOLDS = 2.5, 1.9
-STEPS = 500  # fewer steps give no warning; the earliest failure was after 800
+STEPS = 500  # runs with fewer steps give no warning; the earliest failure was after 800 steps
 
 
 class Uneven(NamedTuple):

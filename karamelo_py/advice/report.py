@@ -153,7 +153,10 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print unknowns and memory of the equations, which couple nodes of the same point."""
+    """Print the number of unknowns, and the memory of the equations.
+
+    The equations couple the nodes of each point.
+    """
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
     size = nodes * (2 * reach + 1) ** d * d * d * 8

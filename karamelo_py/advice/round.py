@@ -28,7 +28,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
 from karamelo_py.script.values import TIME
 
-SAMPLES = 4000  # positions that are tested for whether a shape is round
+SAMPLES = 4000  # positions tested to find whether a shape is round
 SAME = 1e-9  # relative difference of loads that are equal around an axis
 WIDE = 1.5  # radius of a square plate / radius of the body on it
 ROTATING = "velocity_nodes", "initial_velocity_particles"
@@ -88,7 +88,10 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] | None:
-    """Return solids that are square plates under round bodies; None if others are not round."""
+    """Return the solids that are square plates under round bodies.
+
+    The result is None if other solids are not round.
+    """
     reach = [float(middle.apart(solid).max()) for solid in solids]
     round_ = [
         _is_round(solid.region, domain.contains, middle, far)
@@ -138,7 +141,7 @@ def _places_of(hub: Hub, fix: Fix) -> np.ndarray:
 
 
 def _values(hub: Hub, fix: Fix, axes: list[int], x: np.ndarray) -> np.ndarray:
-    """Return the values (n, k) of a fix along `axes`, at time 1, as they may be 0 at the start."""
+    """Return the values (n, k) of a fix along `axes` at time 1; at the start they may be 0."""
     time, hub.values.array[TIME] = hub.values.array[TIME], 1.0
     columns = [given(fix)[axis].evaluate_points(hub.values, x, x) for axis in axes]
     hub.values.array[TIME] = time
@@ -178,7 +181,7 @@ def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
 
 
 def _points_by_radius(solids: list[Solid], middle: Middle) -> float:
-    """Return the number of points of the bodies / number in their section."""
+    """Return (number of points of the bodies) / (number of points in their section)."""
     many = 0.0
     for solid in solids:
         size = solid.h / (solid.ppc or 1)

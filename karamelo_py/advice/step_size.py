@@ -12,7 +12,7 @@ EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (point
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """Return the present default step, at rest (`still`) or as if points had moved."""
+    """Return the present default step: at rest (`still`), or once points have moved."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
     courant, fraction = own_step_of_waves(simulation.hub, still=still)

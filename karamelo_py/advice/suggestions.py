@@ -16,8 +16,8 @@ from karamelo_py.script.errors import plural
 
 Words = Iterator[tuple[str, str]]
 
-# Core seconds (Intel Xeon): point and step (linear), line of a log, picture, first picture, file of
-# points, number in this file.
+# Seconds on one core (Intel Xeon) per: point and step (linear), line of the log, picture, first
+# picture, file of points, number in such a file.
 POINT, LINE, PICTURE, DRAWING, FILE, NUMBER = 1e-7, 5e-4, 0.02, 0.5, 3e-4, 3e-7
 WORTHWHILE = 10.0  # seconds of output above which there is a suggestion
 

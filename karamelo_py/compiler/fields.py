@@ -94,7 +94,7 @@ class Field(NamedTuple):
 
     @staticmethod
     def position(kin: Any) -> int | None:
-        """Return the first component of a stored position, which returns to a periodic cell."""
+        """Return the first component of a stored position, which periodic directions shift."""
         return None
 
     @staticmethod
@@ -157,10 +157,10 @@ def rows_of_points(
 ) -> np.ndarray:
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    Thus no vector load crosses a line, and the dozens of rows that a pass reads in parallel are in
-    different cache sets (contiguous rows would be in the same for n = 512 or 512 000). Rows always
-    have gaps, since an array without them has another type and needs another compilation. `room`
-    (k,) is used if long enough (`length_of_rows`).
+    Thus no vector load crosses a cache line, and the dozens of rows that a pass reads in parallel
+    are in different cache sets (contiguous rows would be in the same set for n = 512 or 512 000).
+    Rows always have gaps: an array without gaps has another type, so kernels would be compiled
+    again. Memory `room` (k,) is used if it is long enough (`length_of_rows`).
     """
     if room is None:
         room = np.empty(length_of_rows(shape, dtype), dtype)
@@ -214,7 +214,7 @@ def _start(kind: type, kin: Any, real: type) -> np.ndarray:
 
 
 def records(count: int, width: int, real: type) -> np.ndarray:
-    """Return zeros (count, width); unused pages take no memory, records cross no cache lines."""
+    """Return zeros (count, width); unused pages take no memory, and rows cross no cache lines."""
     room = np.zeros(count * width + LINE // np.dtype(real).itemsize, real)
     first = _first_of_line(room)
     return room[first : first + count * width].reshape(count, width)
@@ -231,7 +231,7 @@ def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
 
 
 def field(fields: tuple, kind: type) -> Any:
-    """Return the array of the field of this class, or of a derived one, or None."""
+    """Return the array of the field of class `kind`, or of a derived class, or None."""
     for one in fields:
         if kind is not None and isinstance(one, kind):
             return one.array
@@ -278,8 +278,8 @@ def load_vector(kin, array, p):
 def addresses_of_rows(arrays: Iterable[np.ndarray]) -> np.ndarray:
     """Return address and item size in bytes (m, 2), int64, of each row of arrays (..., n).
 
-    Empty arrays have none. Addresses are valid while arrays live and are not resized. Raise
-    ValueError if items are not contiguous, or not of 4 or 8 bytes.
+    Empty arrays have no rows. Addresses are valid while arrays live and are not resized. Raises
+    ValueError if items are not contiguous, or do not have 4 or 8 bytes.
     """
     rows: list[tuple[int, int]] = []
     for array in arrays:

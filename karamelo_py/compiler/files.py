@@ -15,7 +15,7 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-# Follow no links and do not wait for pipes, if the system has these flags.
+# Do not follow links and do not wait for pipes, if the system has these flags.
 _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
@@ -33,10 +33,10 @@ def _refuse_of_others(about: os.stat_result) -> None:
 
 
 def _guard(directory: Path) -> None:
-    """Raise an error for a folder that others can write to; make the user's folders private."""
+    """Raise an error if other users can write to a folder; make the user's folders private."""
     for one in (directory, directory.parent):
         about = one.stat()
-        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
+        if about.st_mode & stat.S_ISVTX:  # other users may not delete files there
             continue
         if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
             one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
@@ -47,7 +47,7 @@ def _guard(directory: Path) -> None:
 def read(path: Path) -> bytes:
     """Read a file that only this user or the administrator can have written.
 
-    Raise OSError if another user can write it, ValueError if it is damaged.
+    Raises OSError if another user can write it, and ValueError if it is damaged.
     """
     with open(os.open(path, os.O_RDONLY | _AS_IT_IS), "rb") as file:
         _guard(path.parent)

@@ -30,7 +30,7 @@ from karamelo_py.compiler.trace.session import session
 from karamelo_py.compiler.trace.values import in_one, intrinsic
 
 THREADS = 128  # per block
-USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # NVIDIA's default
+USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # default path of NVIDIA's library
 TRIPLE = "nvptx64-nvidia-cuda"
 
 
@@ -138,7 +138,7 @@ def _as_threads(module: ir.Module, main: ir.Function, kinds: tuple, result: Any)
     main.attributes.add("alwaysinline")
 
 
-# Functions of the C library that NVIDIA's library has, too.
+# Functions of the C library that NVIDIA's library also has.
 _MATHEMATICS = {
     "exp", "exp2", "log", "log2", "log10", "log1p", "expm1", "pow", "sin", "cos", "tan", "asin",
     "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "erf", "erfc",
@@ -173,7 +173,7 @@ def library() -> bytes:
 def text_of(
     function: Callable, kinds: tuple, on_card: bool, called: dict | None = None
 ) -> tuple[str, str]:
-    """Return name and module text of a thread function; `called` as in `values.in_one`."""
+    """Return name and module text of a thread function; for `called`, see `values.in_one`."""
     with in_one(called or {}):
         entry = _as_threads if on_card else _as_loop
         module, _ = written(function, (types.int64, *kinds), types.none, entry)
@@ -214,7 +214,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 class Code(NamedTuple):
     name: str
-    code: bytes  # empty: read the file
+    code: bytes  # empty if it is to be read from the file
     file: str
     needs: tuple
     modules: frozenset[str]
@@ -236,7 +236,7 @@ class _Coded:
         if key not in self._known:
             code = self._found(function, kinds, called)
             self._load(code)
-            if "<locals>" in function.__qualname__:  # created for each scene
+            if "<locals>" in function.__qualname__:  # local: created for each scene
                 return self._entries[code.name]
             self._known[key] = self._entries[code.name]
         return self._known[key]
@@ -290,7 +290,7 @@ class Emulator(_Coded):
         return ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64)(address)
 
     def launch(self, entry: Callable, arguments: int, count: int) -> None:
-        """Run `count` threads of an entry, or of a Python function if interpreted."""
+        """Run `count` threads of an entry; if interpreted, it is a Python function."""
         if not INTERPRETED:
             entry(arguments, count)
             return

@@ -2,8 +2,8 @@
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
-components). Functions in ``scalarised`` of a class are called lane by lane. Each lane has the bits
-of the scalar operation; only sums at nodes differ by round-off.
+components). Functions listed in ``scalarised`` of a class are called lane by lane. Each lane has
+the bits of the scalar operation; only sums at nodes differ, by round-off.
 
 In the last group of a tile, lanes without a point load the first point and contribute nothing.
 """
@@ -41,7 +41,7 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM splits wider vectors, for which there would not be enough registers.
+# LLVM would split wider vectors, and there would not be enough registers.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays to prefetch ahead
 
@@ -92,7 +92,7 @@ def added(total: float, value: float) -> float:
 def beside(first: int, steps: int) -> int:
     """Return `first` + `steps` as an array index.
 
-    For lanes both parts are stored, so that neighbours are addressed relative to the first nodes.
+    For lanes, both parts are stored, so that neighbours are addressed relative to the first nodes.
     """
     return first + steps
 
@@ -102,7 +102,7 @@ implements(beside)(lambda first, steps: types.uint64(first + steps))
 
 @shared
 def of_present(p: int, value: float) -> float:
-    """Return `value`, 0 in lanes without a point."""
+    """Return `value`, or 0 in lanes without a point."""
     return value
 
 
@@ -128,7 +128,7 @@ class LaneGroup(LaneType):
 
 
 class Beside(LaneType):
-    """Type of nodes in lanes plus a distance."""
+    """Type of nodes in lanes, plus a distance in nodes."""
 
     def __init__(self, nodes: Lanes):
         self.nodes, self.width = nodes, nodes.width
@@ -255,7 +255,7 @@ def _points_at(
     """Return address of an item whose last index is a group, and the group."""
     kinds, values = _indices(builder, at, index)
     first = builder.extract_value(values[-1], 0)
-    # Points in a row are contiguous; rows may have any distance.
+    # Points in a row are contiguous; rows may be any distance apart.
     size = I64(array.dtype.bitwidth // 8)
     indices = [*_as_places(builder, kinds[:-1], values[:-1]), first]
     return llvm.item_pointer(builder, array, value, indices, size), values[-1]
@@ -344,7 +344,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return pointer
-    # Relative to the first node, so that neighbours need a single address.
+    # Use addresses relative to the first node, so that neighbours need a single address.
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
     return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 
@@ -365,7 +365,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # For parameters, as a group mostly has a single material.
+        # For parameters of laws, as most groups have a single material.
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

@@ -1,8 +1,8 @@
 """Logarithm, exponential and power with equal bits for numbers and lanes.
 
-They are series after range reduction (Muller 2016, "Elementary Functions", chapter 11). Relative
-errors are about twice the round-off, for powers times |y ln x| if this is above 1. Interpreted code
-uses Python's functions.
+They are evaluated as series after range reduction (Muller 2016, "Elementary Functions", chapter
+11). Relative errors are about twice the round-off; for powers, multiply by |y ln x| if this is
+above 1. Interpreted code uses Python's functions.
 """
 
 import math
@@ -33,7 +33,7 @@ def exponential(x: float) -> float:
 
 
 def power(x: float, y: float) -> float:
-    """Return x^y for x >= 0, infinite for 0 to a negative power."""
+    """Return x^y for x >= 0; the result is infinite for 0 to a negative power."""
     return x**y if x != 0 or y >= 0 else inf
 
 
@@ -144,11 +144,12 @@ def _logarithm_near_one(x):
 
 @implements(exponential, by_type=True)
 def _exponential(x):
-    # Adding a number with a spacing of 1 rounds; not all targets have an instruction for it.
+    # Adding a number whose spacing is 1 rounds; not all processors have an instruction for
+    # rounding.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):
-        """Compute e^x = 2^n e^r, |r| up to ln 2 / 2; beyond `most` it is 0 or infinite."""
+        """Compute e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most`, e^x is 0 or infinite."""
         x = min(max(x, -most), most)
         n = (x * (1 / _LN_2) + far) - far  # nearest integer
         r = fma(-n, _REST, fma(-n, _LN_2, x))

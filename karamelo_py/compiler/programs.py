@@ -1,4 +1,4 @@
-"""Call of the formula evaluator (`karamelo_py.script.formula`) by address, outside kernels.
+"""Calls of the formula evaluator (`karamelo_py.script.formula`) by address, from kernels.
 
 Whole tables are passed, as slices are slow to compile.
 """

@@ -68,7 +68,7 @@ class Dual(namedtuple("Dual", "value slopes")):
         return self.chain(quotient, -quotient / self.value)
 
     def __pow__(self, other):
-        if type(other) is int and 1 <= other <= 4:  # also for negative numbers
+        if type(other) is int and 1 <= other <= 4:  # also if the base is negative
             square = self * self
             return (self, square, square * self, square * square)[other - 1]
         return _raised(self, other, self.value ** value_of(other))
@@ -168,7 +168,7 @@ def _sqrt(x):
 
 
 def elementary(function: Callable, slope: Callable, *others: Callable) -> Callable:
-    """Define derivatives of a function, and of equal `others`: ``slope(x, f)`` at f(x)."""
+    """Define the derivative of a function, and of equivalent `others`: ``slope(x, f)`` at f(x)."""
 
     def of_dual(x: Dual) -> Dual:
         value = function(x.value)
@@ -279,7 +279,7 @@ def _raised(x, y, made):
     """Add slopes to the power `made`; for base 0 they are 0, except for exponent 1."""
     base, exponent = value_of(x), value_of(y)
     above = base > 0
-    some = base != 0  # negative bases need an integer exponent
+    some = base != 0  # a negative base needs an integer exponent
     over = where(some, base, 1)
     alone = where(exponent == 1, 1, 0) if not is_literal(exponent) else int(exponent == 1)
     return combined(

@@ -1,9 +1,9 @@
 """Parallel loops: one implementation for all kernels, which calls the loop body by address.
 
-The body is a function of the address of the arguments of the loop, and of an index. As waking
-threads takes as long as a small loop, a kernel with many loops is run by a *team* (`by_team`): the
-first thread executes the kernel, and the other threads wait for its loops. Each thread has a fixed
-range of indices, and takes indices from threads that make no progress.
+The body is a function of the address of the loop's arguments, and of an index. As waking threads
+takes as long as a small loop, a kernel with many loops is run by a *team* (`by_team`): the first
+thread executes the kernel, and the other threads wait for its loops. Each thread has a fixed range
+of indices, and takes indices from threads that make no progress.
 """
 
 import ctypes
@@ -47,7 +47,7 @@ class Serial(NamedTuple):
 
 
 class Threaded(NamedTuple):
-    """All threads; `team` is the address of a team's shared memory (`new_team`)."""
+    """Selects several threads; `team` is the address of their shared memory (`new_team`)."""
 
     team: int = 0
 
@@ -95,7 +95,7 @@ def add(address, value):
 
 @intrinsic
 def replaced(address, old, new):
-    """Store `new` if the word is `old`, atomically; return whether it was."""
+    """Store `new` atomically if the word is `old`; return True if it was."""
 
     def codegen(builder, at, *numbers):
         result = builder.cmpxchg(_word(builder, at), *numbers, "acq_rel", "acquire")
@@ -160,7 +160,10 @@ if hasattr(os, "register_at_fork"):
 def _share_out(
     count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Run a task for each index in [0, count) by a function of ranges; 0 `threads`: all."""
+    """Run a task for each index in [0, count), by a function of ranges.
+
+    If `threads` is 0, all threads are used.
+    """
     do, threads = _PART(run_range), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
@@ -203,7 +206,10 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Store items; return addresses of a function of these and an index, and of the items."""
+    """Store items.
+
+    Returns the address of a function of the items and an index, and the address of the items.
+    """
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     stored = held_as(lowering, items, kind)
     task = _address(lowering, function.seen.__qualname__, _Task(function.seen, kind), 2)
@@ -260,7 +266,7 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses before a thread sleeps, about 0.3 ms, as cores may be needed
+_SHORT = 8000  # pauses before a thread sleeps, about 0.3 ms, since other programs may need the core
 _APART, _LOOKS = 10, 64  # pauses between looks at another range; number of looks; together 30 us
 _PATIENCE = 11000  # pauses until a thread stops waiting for a leader
 _LEFT = (1 << 32) - 1  # mask of a ticket for the remaining indices; the upper bits are the loop
@@ -276,8 +282,8 @@ def new_team(threads: int) -> np.ndarray:
 def _take_part(team, k):
     """Process indices of the present loop, first from thread `k`'s range; return their number.
 
-    The data of a thread are in its caches, so other threads take from its range only if the range
-    has not become smaller for a while.
+    Data of a thread are in its own caches, so other threads take indices from its range only if the
+    range has not become smaller for a while.
     """
     size = read(team + _SIZE)
     epoch = read(team + _TICKETS + 64 * k) >> 32
@@ -376,7 +382,7 @@ def by_threads(share: Callable) -> Callable:
     names = ["mode", "count", *inspect.signature(share).parameters][:-1]
     loop = shared_out(share)
 
-    @functools.wraps(share, updated=())  # marks of the function are retained
+    @functools.wraps(share, updated=())  # retains marks of the function
     def all_shares(*arguments):
         loop(*arguments)
 
@@ -386,7 +392,10 @@ def by_threads(share: Callable) -> Callable:
 
 
 def by_team(function: Callable) -> Callable:
-    """Make ``f(mode, ...)``: ``function(mode, ...)``, an integer, run by a team if there is one."""
+    """Make ``f(mode, ...)``, which runs ``function(mode, ...)`` by a team if there is one.
+
+    The result is an integer.
+    """
     inner = noinline(function)
 
     @shared

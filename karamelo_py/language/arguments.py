@@ -1,4 +1,4 @@
-"""Script arguments: text, evaluated on request."""
+"""Script arguments: text that is evaluated on request."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ class Argument:
         return self.text == NULL
 
     def word(self) -> str | None:
-        """The argument as a word (bare, quoted, or the text of a variable); None for arithmetic.
+        """The argument as a word: bare, quoted, or the text of a variable.
+
+        It is None if the argument is arithmetic.
 
         ``neo-hookean`` or ``dump.*.gz`` are words if no part of them is the name of a value.
         """
@@ -97,7 +99,7 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def take(self, numbers: dict[str, Argument]) -> list[str]:
-        """Store `numbers` of the call for the formula; return names that it does not contain."""
+        """Store `numbers` of the call for the formula; return names that the formula lacks."""
         self._numbers = numbers
         return [name for name in numbers if name not in _NAME.findall(self.text)]
 

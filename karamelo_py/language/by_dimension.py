@@ -17,8 +17,9 @@ _HUGE = 1e20  # Karamelo's value of INF
 class Forms:
     """The forms of an argument list, by dimension.
 
-    `pattern` is a call with ``{names}`` and perhaps ``{dimension}``; `names` are by dimension. Some
-    arguments may be `words`. INF and EDGE are words for the `open_ends` (-inf, inf).
+    `pattern` is a call that contains ``{names}`` and perhaps ``{dimension}``. `names` maps a
+    dimension to names of arguments. Some arguments may be `words`. INF and EDGE mean the
+    `open_ends` (-inf, inf).
     """
 
     def __init__(
@@ -118,7 +119,10 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Return a finite constant, or NaN in a rehearsal if it is the result of a run."""
+    """Return a finite constant.
+
+    In a rehearsal, the result of a run is NaN.
+    """
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

@@ -22,7 +22,7 @@ def wrong_count(
     first = arguments[0].word() if arguments else None
     known = any(registry.knows(family, first or "") for family in registry.families())
     if first and expected and expected[0].kind.family and not known:
-        registry.find(expected[0].kind.family, first)  # an error with similar names
+        registry.find(expected[0].kind.family, first)  # raises an error with similar names
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
@@ -133,9 +133,10 @@ def swapped(
 
 
 def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | None:
-    """Suggest 0.5 for 0,5, and how to write 12,500.
+    """Suggest 0.5 for 0,5, and 12500 for 12,500.
 
-    The line has blanks after other commas, or its only surplus arguments are such decimals.
+    A comma counts as a decimal comma if the line has blanks after its other commas, or if the
+    surplus arguments are exactly such decimals.
     """
     adjacent = [
         (one, two) for one, two in pairwise(arguments)

@@ -1,4 +1,4 @@
-"""Exceptions in styles and plug-ins as script errors."""
+"""Convert exceptions in styles and plug-ins to script errors."""
 
 import inspect
 import linecache
@@ -22,7 +22,8 @@ KNOWN = (ScriptError, Quit, OSError, OverflowError, MemoryError, RecursionError)
 def as_script_error(name: str, where: str, code: Any, mark: Mark | None) -> Iterator[None]:
     """Convert an exception in a style of this `name` (``fix drag``) to a ScriptError.
 
-    `where` is what was called, such as a hook. The message has the last line in the file of `code`.
+    `where` is what was called, such as a hook. The message names the last line of the traceback in
+    the file of `code`.
     """
     try:
         yield
@@ -53,7 +54,7 @@ def fault(name: str, message: str, mark: Mark | None, more: str = "") -> ScriptE
 
 
 def cause_of(error: BaseException) -> str:
-    """Describe an error in one line; if code does not compile, with the user's line."""
+    """Describe an error in one line; if code does not compile, include the user's line."""
     if isinstance(error, Undefined):
         return str(error)
     if not isinstance(error, CannotCompile):

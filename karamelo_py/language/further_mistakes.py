@@ -1,6 +1,6 @@
 """Further mistakes of a script, independent of the first.
 
-In statements that depend on a wrong one, only names of commands and styles are checked.
+In statements that depend on a wrong statement, only the names of commands and styles are checked.
 """
 
 import re
@@ -15,7 +15,7 @@ from karamelo_py.script.functions import FUNCTIONS
 from karamelo_py.script.syntax import Assignment, CommandCall, Statement
 
 MOST = 9
-MOST_OF_TEXT = 200  # errors in the text: if it is another program's script, every line is wrong
+MOST_OF_TEXT = 200  # errors in the text: in another program's script, every line is wrong
 _ROUND = {"axisymmetric", "cylindrical", "spherical"}
 _BASIS = frozenset({"method", "dimension", "create_domain", "include", "quit"} | _ROUND)
 # All runs depend on these commands. Other definitions matter only where they are named.
@@ -34,7 +34,8 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 class Dependents:
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Kinds of parts that an unknown name may have, and kinds of which none was deleted.
+        # Kinds of parts to which an unknown name may belong, and kinds of which no part was
+        # deleted.
         self.kinds: set[str] = set()
         self.undeleted: set[str] = set()
         self.lacks_columns = False
@@ -76,7 +77,7 @@ class Dependents:
         return name
 
     def includes(self, statement: Statement) -> bool:
-        """Return whether a statement uses a missing name F, as F, F_x or ContactForce_F_x."""
+        """Return True if a statement uses a missing name F, as F, F_x or ContactForce_F_x."""
         for word in re.findall(r"\w+", statement.raw.code):
             ID = word.rpartition("_")[0]
             if not self.names.isdisjoint((word, ID, ID.partition("_")[2])):
@@ -149,7 +150,7 @@ def misnamed(
     """Return errors about wrong names of commands and styles.
 
     Karamelo's forms without a style, material(ID, eos, strength) and solid(ID, box, region, ...),
-    are valid even if a `wanting` name has no definition.
+    are valid even if one of the names in `wanting` has no definition.
     """
     statements = list(statements)
     variables = {s.name for s in statements if isinstance(s, Assignment)} | {*interpreter.variables}

@@ -152,7 +152,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # At a run, the rest of the script has already been rehearsed.
+            # At a run, the rest of the script has been rehearsed already.
             if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -174,7 +174,7 @@ class Interpreter:
             try:
                 self.execute(frame.statements[frame.next - 1])
             except Pause:
-                # Only the innermost script repeats its line, not the scripts that include it.
+                # The innermost script repeats its line; the scripts that include it do not.
                 if frame is self.frames[-1]:
                     frame.next -= 1
                 raise
@@ -270,7 +270,7 @@ class Interpreter:
         try:
             self.variables[name] = self.evaluate(statement.node, statement.right)
         except ScriptError as error:
-            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # no numbers, as in L/20
+            word, letters = statement.right.code.strip(), r"[^\W\d]\w*"  # not numbers, as in L/20
             if error.code == "unknown-name" and re.fullmatch(
                 rf"{letters}([-/.]\w+)*[-/.]{letters}", word
             ):
@@ -286,11 +286,11 @@ class Interpreter:
             arguments = [signature.Argument(raw, self) for raw in statement.arguments]
             signature.call(registry.find("command", name), self.hub, arguments, name)
         else:
-            # A function alone on a line has no effect, but its mistakes are errors.
+            # A function alone on a line has no effect, but its mistakes are still errors.
             self.evaluate(parse_expression(raw), raw)
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
-        if isinstance(node, syntax.NumberLiteral):  # most arguments
+        if isinstance(node, syntax.NumberLiteral):  # most arguments are numbers
             return node.value
         return evaluation.evaluate(node, raw, self)
 

@@ -19,7 +19,7 @@ from karamelo_py.script.expressions import Expression, Value
 from karamelo_py.script.functions import CONSTANTS, WORDS
 from karamelo_py.script.terms import number_text
 
-_LARGEST_INTEGER = 2**53  # above it, floats skip integers
+_LARGEST_INTEGER = 2**53  # above it, floats cannot represent all integers
 
 
 def _rounding(value: float) -> float:
@@ -29,7 +29,7 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Keyword:
-    """Marks a field that is given as ``name=value``, by default with the name of the field."""
+    """Marks a field that is given as ``name=value``; by default, the name is that of the field."""
 
     name: str = ""
 
@@ -115,7 +115,7 @@ class OutputFile:
             message = f"{name} cannot be the name of a file here, where these are in {encoding}"
             hint = "the environment variable PYTHONUTF8=1, or another name"
             raise ScriptError(message, mark=argument.mark, hint=hint) from None
-        # The folder of -out is made by a run, so it may be missing in `check`.
+        # A run makes the folder of -out, so it may be missing in `check`.
         made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
@@ -145,10 +145,11 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """Description and conversion of an argument.
+    """Description of an argument, and its conversion.
 
-    With `words`, only these fit; `family` is the family of styles that it names. If `with_numbers`,
-    other arguments ``name=value`` of the call are numbers in the formula.
+    If there are `words`, only these are accepted. `family` is set if the argument names a style of
+    this family. If `with_numbers`, other arguments ``name=value`` of the call are numbers in the
+    formula.
     """
 
     text: str

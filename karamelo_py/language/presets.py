@@ -20,9 +20,9 @@ _NAMED = re.compile(rf"({_WORD})\s*=(?!=)\s*(.*)", re.DOTALL)
 
 
 def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None], dict[str, str]]:
-    """Return names that statements use, names that they assign, and hints on argument names.
+    """Return names that statements use, names that they assign, and hints about argument names.
 
-    In a formula, quoted or not, numbers of the call (``mu=4e5``) take precedence over variables.
+    In a formula (quoted or not), numbers of the call (``mu=4e5``) take precedence over variables.
     """
     read: set[str] = set()
     assigned: dict[str, None] = {}
@@ -55,12 +55,12 @@ class Presets(dict[str, str]):
     def __init__(self, script: Any, texts: Mapping[str, str]):
         super().__init__(texts)
         self._script = script
-        # Texts where numbers may be needed, and variables that have caused mistakes.
+        # Texts that are used where a number is needed, and variables that have caused mistakes.
         self._texts: dict[str, str] = {}
         self.blamed: set[str] = set()
-        # Presets on which each variable depends.
+        # The presets on which each variable depends.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
-        if isinstance(texts, Presets):  # the presets of a script that is copied
+        if isinstance(texts, Presets):  # presets of a script that is copied
             vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -90,11 +90,11 @@ class Presets(dict[str, str]):
 
     def stand_for(self, statement: Assignment) -> None:
         name, variables = statement.name, self._script.variables
-        # A text may now be an expression of known variables.
+        # A text may now be an expression of variables that are known.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
-            # If the text should be a number, the command that uses it reports the mistake.
+            # If the text should have been a number, the command that uses it reports the mistake.
             in_script = None
             with suppress(ScriptError):
                 in_script = self._script.evaluate(statement.node, statement.right)

@@ -5,8 +5,8 @@ A package offers a style in its pyproject.toml::
     [project.entry-points."karamelo_py.fix"]
     gravity = "my_package:Gravity"
 
-A script can also name a class as ``module.Class``, of a module next to the script or installed.
-Styles are imported when they are first used.
+A script can also name a class as ``module.Class``, from a module next to the script or an installed
+one. Styles are imported when they are first used.
 """
 
 import re
@@ -94,7 +94,10 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Remove an imported module of another folder; return whether this folder has one."""
+    """Remove an imported module if it is from another folder.
+
+    Returns True if this folder has a module of that name.
+    """
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -147,7 +150,10 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Return a style as `find` does; the error detects a style written before the ID."""
+    """Return a style as `find` does.
+
+    If the style was written before the ID, the error says so.
+    """
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")
@@ -180,7 +186,7 @@ def _entries(family: str, name: str) -> list[EntryPoint]:
 
 
 def may_differ(*commands: Callable, keywords: bool | tuple[str, ...] = True) -> None:
-    """Allow a resumed script to have other statements of `commands`, or other `keywords`."""
+    """Allow a resumed script to change statements of `commands`, or only their `keywords`."""
     _differences.update(dict.fromkeys(commands, keywords))
 
 

@@ -28,7 +28,10 @@ class Record:
 
 
 class Replay:
-    """Compares a script with the record in a restart `file`; `within`: it ends in a run."""
+    """Compares a script with the record in a restart `file`.
+
+    `within`: the file was written during a run.
+    """
 
     def __init__(self, record: Record, within: bool, file: str):
         self.record = record
@@ -46,7 +49,7 @@ class Replay:
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
-        # An unfinished run may change its length.
+        # The length of an unfinished run may change.
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, mark)

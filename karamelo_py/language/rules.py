@@ -12,10 +12,11 @@ of a part, field or law::
     )
 
 `when` gets the part and the facts of the scene (:class:`karamelo_py.advice.facts.SceneFacts`). It
-returns whether the rule applies, or numbers by name for its text, or a list of these, one per
-message. Braces in texts take these numbers and attributes of ``part``, ``scene`` and ``owner`` (the
-material of a law), such as ``{scene.turn:.2g}``. Two of the names have a meaning: ``mark`` is the
-location in the script, and ``share`` is the noise divided by the tolerable amount.
+returns True if the rule applies; or numbers by name for its text; or a list of such numbers, one
+item per message. Texts can contain these numbers and attributes of ``part``, ``scene`` and
+``owner`` (the material of a law) in braces, such as ``{scene.turn:.2g}``. Two of the names have a
+meaning: ``mark`` is the location in the script, and ``share`` is the noise divided by the tolerable
+amount.
 """
 
 import re
@@ -34,7 +35,7 @@ HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
 
 
 class Feature(NamedTuple):
-    """A choice of a scene, such as a basis, by `name`; or an option, whose `name` is empty."""
+    """A feature of a scene, such as its basis, by `name`; for an option, `name` is empty."""
 
     kind: str
     name: str
@@ -44,18 +45,19 @@ class Feature(NamedTuple):
 
 
 class Restrictions(NamedTuple):
-    """Restrictions of a capability; what is not mentioned is supported.
+    """Restrictions of a capability. Features that are not mentioned are supported.
 
     Parameters
     ----------
     option
-        Name of the capability in restrictions of others.
+        Name of the capability in the restrictions of other capabilities.
     instead
         Replacement of the capability, for messages.
     only
         Supported names, by kind of choice (method, basis, transfer, scheme, kinematics).
     without, but
-        Unsupported options; `but` gives for some a replacement that differs from their ``instead``.
+        Unsupported options; for some of them, `but` gives a replacement that differs from their
+        ``instead``.
     """
 
     option: str
@@ -117,9 +119,10 @@ _rules: dict[tuple[str, type], list[tuple[When, str, str, str]]] = {}
 def known_failure(
     part: type, name: str, *, when: When, reason: str, cure: str, cause: str = ""
 ) -> None:
-    """Declare a known failure, which is reported once by its name.
+    """Declare a known failure, which is reported at most once, by its name.
 
-    With a `cause` it is noise, reported if its ``share`` exceeds 1, or as the cause of a gain.
+    A failure with a `cause` is a source of noise: it is reported if its ``share`` exceeds 1, or as
+    the cause of an energy gain.
     """
     _rules.setdefault(("failure", part), []).append((when, name, reason, cure))
     if cause:

@@ -1,4 +1,4 @@
-"""The scene for lower layers."""
+"""The scene, as seen by lower layers."""
 
 from pathlib import Path
 from typing import Any, Protocol

@@ -1,15 +1,16 @@
-"""Convert script arguments to a Python call, and give help.
+"""Convert script arguments to a Python call, and provide help.
 
-The first parameter of a command (function) or style (class) is the hub; annotations of the others
-define the arguments::
+The first parameter of a command (function) or style (class) is the hub; the annotations of the
+other parameters define the arguments::
 
     class Gravity(Fix):
         def __init__(self, hub, group: NodeGroup, g: Annotated[float, Positive] = 9.81):
 
 Annotations: float, int, bool, str, Literal words, Expression, InputFile, TableFile, OutputFile,
 Argument (left to the callee), classes with a classmethod ``from_script(cls, hub, argument)``, and
-unions of these, with None for the word NULL. Annotated adds constraints. ``*args`` take any number,
-``**numbers`` are names for formulas; others may, keyword-only ones must, be named: ``name=value``.
+unions of these, with None for the word NULL. Annotated adds constraints. ``*args`` take any number
+of arguments; ``**numbers`` are numbers for formulas, by name. Other arguments may be given as
+``name=value``; keyword-only ones must be.
 """
 
 import inspect
@@ -55,7 +56,10 @@ EMPTY, KEYWORD = inspect.Parameter.empty, inspect.Parameter.KEYWORD_ONLY
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Parameters of a command or style, without the hub; raises TypeError."""
+    """Return the parameters of a command or style, without the hub.
+
+    Raises TypeError for an annotation that is not supported.
+    """
     record = is_record(target)
     try:
         if record and not hasattr(target, "given"):
@@ -72,10 +76,10 @@ def parameters(target: Any) -> list[Parameter]:
 
 
 def is_record(target: Any) -> bool:
-    """True for a NamedTuple, which needs no hub.
+    """Return True for a NamedTuple, which needs no hub.
 
-    Arguments are the fields, or the parameters of a classmethod ``given``. A method ``checked`` may
-    return a replacement.
+    Its arguments are the fields, or the parameters of a classmethod ``given``. A method ``checked``
+    may return a replacement.
     """
     return inspect.isclass(target) and issubclass(target, tuple)
 
@@ -104,7 +108,8 @@ def call(
 ) -> Any:
     """Call a command or make a style; store the arguments in `converted`.
 
-    `name` is ``run``, or ``fix body_force``. Raises ScriptError, with a mark.
+    `name` is used in messages, such as ``run`` or ``fix body_force``. Raises ScriptError, with a
+    mark.
     """
     if arguments and target in FORMS:
         # The word of a form takes precedence over a variable.
@@ -223,7 +228,7 @@ def in_new_words(family: str, ID: str, style: str, arguments: Sequence[Argument]
 
 
 def make(target: Callable, hub: Scene, name: str, *values: Any, **named: Any) -> Any:
-    """Make a style from values; other errors than ScriptError are faults of the style."""
+    """Make a style from values. Errors other than ScriptError are faults of the style."""
     is_class = inspect.isclass(target)
     try:
         if not is_record(target):
@@ -355,11 +360,11 @@ def default_variant(style: Any) -> str | None:
 
 
 def documented(target: Callable) -> list[Parameter]:
-    """Parameters for help, with the word that selects a variant."""
+    """Return the parameters for help, with the word that selects a variant."""
     variants = variants_of(target)
     if not variants:
         return parameters(target)
-    # In a method, the word selects the shape of domains, which is required.
+    # In a method, the word selects the shape of the domains, and is required.
     needed = not is_record(target)
     kind = kind_of(Literal[tuple(variants)])
     variant = Parameter("variant", kind, optional=not needed, default=default_variant(target))

@@ -169,7 +169,7 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 
 
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
-    """Yield (statement, command or "" for an assignment, ID or name, line) of later statements.
+    """Yield (statement, command or "" for an assignment, ID or name, line) for later statements.
 
     The innermost script comes first, beginning `back` statements before its next statement.
     """
@@ -245,7 +245,7 @@ def listed(names: Iterable[str]) -> str:
     return text if len(text) < 200 else text[:200].rsplit(",", 1)[0] + ", ..."
 
 
-# Names of shapes in scripts of 2020, which now have the solid style ``region``.
+# Names of shapes in scripts of 2020; the solid style is now ``region``.
 SHAPES = dict.fromkeys(("block", "box", "rectangle"), "block") | {
     "cylinder": "cylinder",
     "sphere": "sphere",
@@ -283,7 +283,7 @@ def in_own_words(script: Any, name: str) -> str | None:
 
 
 def filled(statement: Any) -> str | None:
-    """Write ``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
+    """Rewrite ``solid(ID, block, xlo, ..., ppc, material, h)`` as a region and a solid."""
     ID, shape, *numbers = words_of(statement)
     if len(numbers) < 6 or shape not in SHAPES:
         return None

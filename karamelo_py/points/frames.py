@@ -65,5 +65,5 @@ def scaled_increment(frame, kin, dl, f, ratio):
 
 
 def inverse_stretch_squared(frame, kin, f, template):
-    """Return a bound of (h / size of the deformed cell)^2."""
+    """Return an upper bound of (h / size of the deformed cell)^2."""
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

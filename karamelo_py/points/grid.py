@@ -81,7 +81,7 @@ class ReflectingGrid(Grid):
 
 @point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
-    """Return position, velocity and moment after reflection, and 1 per reflecting direction."""
+    """Return position, velocity, moment after reflection, and 1 per direction that reflects."""
     return y, v, moment, ()
 
 
@@ -113,7 +113,7 @@ def mirror(grid, direction, y):
 
 
 def turned(signs, moment):
-    """Return R L R with R = diag(signs), or ()."""
+    """Return R L R with R = diag(signs), or () without a moment."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

@@ -11,7 +11,7 @@ from karamelo_py.language.rules import known_failure
 
 
 class DriftLimits(NamedTuple):
-    """Limits of (cells crossed) x c dt/h that conserve energy, for 2 and 1 points per cell."""
+    """Largest (cells crossed) x c dt/h that conserves energy, for 2 and 1 points per cell."""
 
     drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
     line: float  # 1D

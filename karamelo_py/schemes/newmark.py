@@ -24,7 +24,7 @@ def _damping(scheme: "Newmark") -> str:
 
 
 class Newmark(NamedTuple):
-    """Implicit time steps with inertia, longer than waves allow (Newmark 1959).
+    """Implicit steps with inertia, longer than those of explicit schemes (Newmark 1959).
 
     The step must be set by `set_dt`. Vibrations faster than the step are damped only if `gamma` is
     above 1/2, `rho` below 1, or the rule euler. The acceleration at the beginning of a step is
@@ -77,7 +77,7 @@ class Newmark(NamedTuple):
     @property
     def alphas(self) -> tuple[float, float]:
         """Return the weights of accelerations and forces at the beginning of a step."""
-        # For rho = 1 both would be 1/2, and balance at the start gives balance at the end.
+        # For rho = 1 both weights would be 1/2; balance at the start then gives balance at the end.
         return _alphas(self.rho) if self.rho < 1 else (0.0, 0.0)
 
     @property

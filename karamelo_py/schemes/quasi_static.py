@@ -22,7 +22,7 @@ CLOSE = (
     table.Gather(StrainOfLoadStep()),
     table.AtPoints(arrays.FINAL_INTEGRATE, 1),
 )
-# Of the last step: number of corrections, residual / forces, number of substeps.
+# Values of the last step: number of corrections, residual / forces, number of substeps.
 PUBLISHED = "iterations", "residual", "parts"
 
 
@@ -48,7 +48,7 @@ class QuasiStatic(NamedTuple):
         ``auto``: amg from 2000 unknowns in 3D, and from 5000 in 2D if the matrix is symmetric.
     stabilisation
         Ghost stabilisation (Coombs 2023) for nodes that overlap only a sliver of the body: jumps of
-        gradients at the border are penalised with this fraction of Young's modulus. 0: none.
+        gradients at the border are penalised with this fraction of Young's modulus. 0 turns it off.
     limit
         Action if no equilibrium is found even with 1/1024 of a step: ``error``, or ``stop``, which
         ends the run. After ``stop``, the script continues with the `time` of the last equilibrium,

@@ -15,7 +15,7 @@ IMPLICIT = Restrictions(
 
 
 class SchemeTraits(NamedTuple):
-    """Traits of a scheme; a plug-in sets those that differ from the defaults."""
+    """Traits of a scheme. A plug-in sets the traits that differ from the defaults."""
 
     # each step is solved by Newton's method
     implicit: bool = False

@@ -20,8 +20,8 @@ class USL(NamedTuple):
     This is the fastest scheme, with one pass over the points per step. It is slightly dissipative.
 
     The stable step is 0.65 h/c, or 0.4 h/c with one point per cell; with bernstein-quadratic it is
-    30 % shorter. Points do not retain the velocity of some nodal modes, whose strain is multiplied
-    by 1 - (w dt)^2 in each step: stable for w dt < sqrt(2) instead of 2.
+    30 % shorter. Points do not retain the velocity of some nodal modes; the strain of these modes
+    is multiplied by 1 - (w dt)^2 in each step, so they are stable for w dt < sqrt(2) instead of 2.
 
     A node with almost no mass may get a large velocity. If its mass is below a limit, the mean mass
     of the points around it times d (c dt / h)^2 (at most 1), its velocity change is multiplied by

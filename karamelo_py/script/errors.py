@@ -66,18 +66,19 @@ class ScriptError(Exception):
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
-    # A command, and marks of included files, that precede the message.
+    # A command, and marks of included files, which precede the message.
     command: str | None = None
     included: list[Mark] = field(default_factory=list)
     others: "list[ScriptError]" = field(default_factory=list)
     # The correct statements, for syntax errors.
     statements: list = field(default_factory=list)
-    # Kind of message (codes.toml); wrong word, kind of part it names, similar known name.
+    # Kind of message (codes.toml); wrong word; kind of part that it should name; similar known
+    # name.
     code: str = ""
     name: str | None = None
     kind: str = ""
     alike: str | None = None
-    surplus: int = 0  # number of arguments too many
+    surplus: int = 0  # number of surplus arguments
     # Likely cause and the command that resumes, for failed runs.
     cause: str = ""
     resume: str = ""
@@ -103,7 +104,7 @@ class ScriptError(Exception):
 
 @contextmanager
 def blaming(mark: Mark | None = None, argument: str | None = None) -> Iterator[None]:
-    """Give errors a mark, if they have none, and an argument."""
+    """Add a mark and an argument to errors that have none."""
     try:
         yield
     except ScriptError as error:
@@ -171,7 +172,7 @@ def meant(name: str, names: Iterable[str], form: str = "{}") -> str | None:
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """Return ``one of a, b, c``; if they are many, the nearest one and where all are listed."""
+    """Return ``one of a, b, c``; if they are many, the closest one and where all are listed."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):
@@ -214,13 +215,13 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
     for candidate in names:
         if candidate.lower() == lowered and candidate != name:
             return candidate
-    # A short name is not suggested for a longer one: Ek_s does not mean Es.
+    # Do not suggest a short name for a longer one: Ek_s does not mean Es.
     candidates = names if len(name) > 3 else [n for n in names if len(n) - len(name) < 2]
     by_lower = {candidate.lower(): candidate for candidate in candidates}
     for word, among in (name, {n: n for n in candidates}), (lowered, by_lower):
         if close := difflib.get_close_matches(word, among, n=1, cutoff=0.6):
             return among[close[0]]
-    # Suggest a name by a part of it: cubic-spline for cubic.
+    # Suggest a name that contains the word: cubic-spline for cubic.
     by_lower = {candidate.lower(): candidate for candidate in names}
     parts = (c for c in by_lower if len(lowered) > 2 and lowered in re.split("[-_/ ]", c))
     return by_lower.get(next(parts, ""))

@@ -1,7 +1,7 @@
 """Numbers, texts, and formulas.
 
-Operations with a position, time or published value give formulas; operations on constants are
-carried out at once.
+An operation that involves a position, time or published value gives a formula; operations on
+constants are carried out at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CHUNK = 1 << 18  # points that are evaluated at a time
 class Expression:
     """A number, or a formula of positions, time and published values.
 
-    `names`: some of x y z x0 y0 z0, time timestep dt, published names.
+    `names` are some of x y z x0 y0 z0, time timestep dt, and published names.
     """
 
     __slots__ = ("names", "operands", "operation", "size", "value")
@@ -43,7 +43,7 @@ class Expression:
         self.value: Any = float(value) if operation == "number" else value
         seeds = {value} if operation == "name" else ()
         self.names: frozenset[str] = frozenset(seeds).union(*(one.names for one in operands))
-        # Common operands are counted each time.
+        # Operands that occur several times are counted each time.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:
             self.size = len(terms.in_order(self))
@@ -115,7 +115,7 @@ class Expression:
         out = np.empty(len(x))
         scratch = np.empty((6 + ROWS, BLOCK))
         program = self.program(values)
-        # In chunks, since three-column copies of millions of points take much memory.
+        # Evaluate in chunks, since three-column copies of millions of points take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])

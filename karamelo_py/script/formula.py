@@ -44,7 +44,8 @@ def _select(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# Functions with a loop each; one loop for all others selects the function per number.
+# Functions that have a separate loop each. One loop for all others selects the function for each
+# number.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")
@@ -96,7 +97,7 @@ def _powers(n, a, b):
 def evaluate(program, globals_, points, count, out, stack):
     """Evaluate at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
 
-    `out` (BLOCK,): results; `stack` (ROWS, BLOCK): scratch.
+    `out` (BLOCK,) gets the results; `stack` (ROWS, BLOCK) is scratch.
     """
     code, constants = program
     top = -1

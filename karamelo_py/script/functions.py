@@ -11,7 +11,7 @@ CONSTANTS = {"PI": math.pi, "PHI": (1 + math.sqrt(5)) / 2, "EGAMMA": 0.577215664
 WORDS = frozenset({"NULL", "INF", "EDGE"})
 # Functions whose names cannot be variables; Karamelo allows all other names.
 RESERVED = frozenset({"exp", "sqrt", "cos", "sin", "tan", "atan2", "log", "if"})
-# Probability of each tail of the normal distribution beyond which inv_norm does not go.
+# Probability of each tail of the normal distribution that inv_norm excludes.
 TAIL = 1e-10
 
 

@@ -1,6 +1,7 @@
 """Explain syntax errors.
 
-Lark's parser gets the tokens one by one, so that the stop and the parser's stack are known.
+Tokens are passed to Lark's parser one by one, so that the token at which it stops and its stack are
+known.
 """
 
 import re
@@ -17,7 +18,7 @@ _PUNCTUATION = re.compile(
 )
 # A C++ comment at the end of the text.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
-# Beginning of a file of Abaqus: empty lines, comments, a keyword.
+# Beginning of an Abaqus file: empty lines, comments, a keyword.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
@@ -96,9 +97,9 @@ def _type(symbol: Any) -> str:
 
 
 class _Stop(NamedTuple):
-    """Tokens before and at the parser's stop.
+    """Tokens before and at the point where the parser stops.
 
-    `here` is the character or token at the stop, or None at the end of the text.
+    `here` is the character or token at this point, or None at the end of the text.
     """
 
     code: str
@@ -312,7 +313,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         style = other.removeprefix("the style ")
         if other and (style == other or " " in style):
             return other
-        if words[1] == "all" or other:  # LAMMPS has the group before the style
+        if words[1] == "all" or other:  # LAMMPS writes the group before the style
             words[1:3] = style or words[2], words[1]
     if name == "dump" and len(words) > 2:
         words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")

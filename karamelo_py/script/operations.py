@@ -10,7 +10,7 @@ from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 @noinline
 def _whole(a, down, up):
-    """Round by sums, as not every processor has an instruction for it."""
+    """Round by additions, as not every processor has an instruction for it."""
     if not abs(a) < 2.0**52:
         return a  # already an integer, or NaN
     far = math.copysign(2.0**52, a)
@@ -19,7 +19,7 @@ def _whole(a, down, up):
         near -= 1.0
     elif near < a and up:
         near += 1.0
-    return math.copysign(near, a)  # conserves -0.0
+    return math.copysign(near, a)  # preserves -0.0
 
 
 def _not(a):
@@ -116,7 +116,7 @@ _POLES = {
 
 
 def quietly(name: str, *numbers: float) -> float:
-    """Apply an operation as hardware does, with results inf or NaN instead of exceptions."""
+    """Apply an operation as hardware does: results are inf or NaN instead of exceptions."""
     a, *rest = numbers = tuple(map(float, numbers))
     try:
         return float((UNARY.get(name) or BINARY[name])(*numbers))

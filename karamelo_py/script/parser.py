@@ -16,7 +16,7 @@ from karamelo_py.script import mistakes, syntax
 from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.syntax import Mistake
 
-# Trees are traversed recursively. The limit is far below Python's.
+# Largest depth of a tree. Trees are traversed recursively; this limit is far below Python's.
 MAX_DEPTH = 150
 
 SPELLINGS = {"**": "^", "and": "&&", "or": "||", "not": "!"}
@@ -27,7 +27,8 @@ _SINGLE_QUOTED = re.compile(r"'([^'\"\n]*)'?")
 def parse(text: str, file: str = "<text>") -> list[syntax.Statement]:
     """Parse statements, without the arguments of calls.
 
-    A syntax error has all further ones in `others`, and the correct statements in `statements`.
+    Raises ScriptError for a syntax error, with further errors in `others` and the correct
+    statements in `statements`.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     source = syntax.Source(text, file)
@@ -101,7 +102,10 @@ def _statement(source: syntax.Source, span: tuple[str, str, int, int, Any]) -> s
 
 
 def _arguments(source: syntax.Source, name: str, parts: list) -> list[syntax.Raw]:
-    """Return raw arguments of a call; `parts` are alternately spans (None: empty) and commas."""
+    """Return the raw arguments of a call.
+
+    `parts` are alternately spans (None if empty) and commas.
+    """
     if parts == [None]:
         return []
     raws = []
@@ -139,7 +143,7 @@ def refused() -> type[Exception]:
 def parser_of(start: str) -> Any:
     """Return the parser of statements or of expressions.
 
-    Lark makes a parser in 0.06 s, or in 0.01 s from tables that are cached on disk.
+    Making a parser takes 0.06 s, or 0.01 s from tables that are cached on disk.
     """
     import lark
     from lark.grammar import Rule
@@ -197,7 +201,7 @@ def _above(start: int, end: int, *below: syntax.Node) -> tuple[int, int, int]:
 
 
 class _TreeBuilder:
-    """Builds spans and trees by grammar rule, while Lark parses."""
+    """Builds spans and trees while Lark parses, with a method for each grammar rule."""
 
     def script(self, parts: list) -> list:
         return [item for item in parts if isinstance(item, tuple)]

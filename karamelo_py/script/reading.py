@@ -13,7 +13,7 @@ _CODES = (
     (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
-# Substitutions <(command) of a shell, and pipes.
+# Paths of pipes, and of substitutions <(command) in a shell.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
 # Endings of files that runs write next to scripts.
 _WRITTEN = (
@@ -25,7 +25,7 @@ _WRITTEN = (
 def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
     """Read at most `largest` bytes; raises OSError."""
     piped = _PIPED.fullmatch(str(path)) is not None
-    # Opening a pipe without a writer would block; Windows has no such flag.
+    # Opening a pipe that has no writer would block; Windows lacks this flag.
     more = 0 if piped else vars(os).get("O_NONBLOCK", 0)
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | more)) as file:
         mode = os.fstat(file.fileno()).st_mode
@@ -40,7 +40,10 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Read a text; raises OSError, or ValueError for data that are no text."""
+    """Read a text.
+
+    Raises OSError, or ValueError if the file is not a text.
+    """
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):
@@ -50,7 +53,7 @@ def read_text(path: Path, largest: int | None = LARGEST) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        # Latin-1 is from old editors; all bytes are valid in it.
+        # Old editors use Latin-1, in which all bytes are valid.
         return data.decode("latin-1")
 
 

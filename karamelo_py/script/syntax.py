@@ -89,7 +89,7 @@ class UnaryOperation(Node):
 
 @dataclass(frozen=True, slots=True)
 class BinaryOperation(Node):
-    """`left` `operator` `right`; ``^ && ||`` are the spellings of operators with several."""
+    """`left` `operator` `right`. Operators with several spellings are stored as ``^ && ||``."""
 
     operator: str
     left: Node
@@ -125,7 +125,10 @@ class Statement:
     raw: Raw
 
     def spelled(self, without: Iterable[str] = ()) -> str:
-        """Return the statement without blanks, comments, line ends and the keywords `without`."""
+        """Return the statement without blanks, comments and line ends.
+
+        The keywords in `without` are omitted.
+        """
         text = _BLANKS.sub(lambda m: m[0] if m[0][0] == '"' else "", self.raw.code)
         for word in without:
             text = re.sub(rf",{word}=[^,()]*", "", text)

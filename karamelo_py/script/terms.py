@@ -95,7 +95,7 @@ def number_of(text: str) -> float | None:
 
 
 def is_short(root: Term) -> bool:
-    """Return whether a term is short enough to be written with common terms repeated."""
+    """Return True if a term is short enough for its text to repeat common terms."""
     levels: dict[int, int] = {}
     sizes: dict[int, int] = {}
     for term in in_order(root):

@@ -25,16 +25,16 @@ class Values:
     def __init__(self) -> None:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
-        self._of: dict[str, dict[str, int]] = {}  # slots of names, by ID
-        self._first: dict[str, int] = {}  # slot of ID_x, even if this name is not published
+        self._of: dict[str, dict[str, int]] = {}  # slots by name, for each ID
+        self._first: dict[str, int] = {}  # slot of ID_x, also if this name is not published
         self._used = 0
-        # By slot x of a force: slot of its torque, or 0.
+        # Slot of the torque that belongs to a force, by the force's slot x; 0 if there is none.
         self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
 
     def publish(self, name: str, value: float = 0.0) -> int:
-        """Publish a number and return its slot; a known name retains its slot."""
+        """Publish a number and return its slot. A known name retains its slot."""
         if name not in self._slots:
             self._slots[name] = self._reserve(1)
         slot = self._slots[name]
@@ -44,8 +44,8 @@ class Values:
     def publish_vector(self, ID: str, suffixes: Sequence[str] = SUFFIXES, *others: str) -> None:
         """Publish ``ID_x`` for the suffix "x" and so on, ``ID`` for "".
 
-        Slots of x, y, z, s are consecutive, even if not all are published; slots of other suffixes
-        are, too. Earlier names that are not in `suffixes` or `others` are removed.
+        Slots of x, y, z, s are consecutive, even if not all are published; so are slots of other
+        suffixes. Names published earlier that are not in `suffixes` or `others` are removed.
         """
         if ID not in self._first:
             self._first[ID] = self._reserve(len(SUFFIXES))

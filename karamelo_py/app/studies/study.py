@@ -49,7 +49,7 @@ LISTED = 10  # first and last rows shown on the terminal
 
 
 class Pool(Protocol):
-    size: int  # runs at once
+    size: int  # number of simultaneous cases
 
     def submit(self, case: Mapping[str, str], folder: Path) -> Future:
         """Start a case whose files go to `folder`; return a future of its outcome."""

@@ -1,4 +1,4 @@
-"""Arguments of kernels: words in memory, of which the address is passed."""
+"""Arguments of kernels: words in memory, whose address is passed."""
 
 import ctypes
 import functools
@@ -18,7 +18,7 @@ from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
-    """An array that is in use; NumPy does not resize arrays with references."""
+    """An array that is in use. NumPy does not resize arrays to which there are references."""
 
     alive: weakref.ref  # detects a reused id
     shape: tuple[int, ...]
@@ -115,13 +115,16 @@ class ArgumentBuffer:
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
                 words.append(signed.item())  # same bits, but signed as words are
-            else:  # nothing to write: None, classes
+            else:  # nothing to write for None and classes
                 kinds.append(item)
                 words.append(0)
         return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments to memory that will be at `at`; return it and the tuple's address."""
+        """Write the arguments for memory that begins at `at`.
+
+        Returns the bytes, and the address of the tuple.
+        """
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
             at = ctypes.addressof(ctypes.c_char.from_buffer(memory))

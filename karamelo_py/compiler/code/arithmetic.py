@@ -63,7 +63,7 @@ def _wider_lanes(a: types.Type, b: types.Type) -> Lanes:
             return a if a.scalar.bitwidth >= b.scalar.bitwidth else b
         raise TypeError("lanes of several types")
     lanes, other = (a, b) if isinstance(a, Lanes) else (b, a)
-    # Integer lanes would truncate a real operand; convert them by `real(i, x)`.
+    # Integer lanes would truncate a real operand; convert the lanes by `real(i, x)`.
     if isinstance(other, types.Float) and _is_whole(lanes):
         raise TypeError("whole lanes and a real number")
     return lanes
@@ -396,7 +396,7 @@ machine.publish_python("karamelo_told_gamma", _TOLD, exceptions.noting(_gamma_of
 
 
 def _gamma(builder: ir.IRBuilder, kind: types.Type, x: ir.Value) -> ir.Value:
-    """Call Python's gamma, as bits differ between C libraries."""
+    """Call Python's gamma, as results differ in their last bits between C libraries."""
     double = llvm.cast(builder, x, kind, types.float64)
     failure = exceptions.passed_to(builder, builder.function)
     name = "karamelo_told_gamma" if failure else "karamelo_gamma"  # Ctrl-C may interrupt gamma
@@ -413,7 +413,7 @@ _IN_C = (
 
 for _name, (_real, _ending) in product(
     _IN_C, ((ctypes.c_double, ""), (ctypes.c_float, "f"))
-):  # functions that this C library does not have
+):  # functions that this C library lacks
     if not machine.is_known(_name + _ending):
         _kind, _plain = ctypes.CFUNCTYPE(_real, _real), getattr(math, _name)
         machine.publish_python(_name + _ending, _kind, exceptions.never_raising(_plain))
@@ -473,7 +473,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names of these, and functions that convert to reals
+# NumPy's names of these functions, and its functions that convert to reals.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,

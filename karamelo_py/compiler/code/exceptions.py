@@ -18,7 +18,7 @@ from karamelo_py.compiler.code import machine
 
 
 class Failure(ctypes.Structure):
-    """First exception in a kernel call, of which kernels read only the first word."""
+    """The first exception in a kernel call. Kernels read only the first word."""
 
     _fields_ = (("failed", ctypes.c_int64), ("first", ctypes.py_object))
 
@@ -61,7 +61,7 @@ def noting(function: Callable) -> Callable:
 
 
 def never_raising(function: Callable) -> Callable:
-    """Return NaN instead of raising, as C functions do."""
+    """Make a function return NaN instead of raising, as C functions do."""
 
     @functools.wraps(function)
     def call(*arguments: Any) -> Any:

@@ -1,6 +1,6 @@
 """LLVM: target processor, optimisation, loading of code.
 
-Fast math is off: as contraction depends on inlining, results would depend on threads and restarts.
+Fast math is off. Contraction depends on inlining, so results would depend on threads and restarts.
 """
 
 import contextlib
@@ -13,9 +13,10 @@ from collections.abc import Callable
 from llvmlite import binding as llvm
 
 # Loops over up to 27 stencil nodes must be unrolled to have weights in registers: quadratic splines
-# in 3D run 1.7 times as fast. In long loops, a counter per array costs registers.
+# in 3D run 1.7 times as fast. In long loops, a separate counter for each array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
-# With 0, compilation takes half the time and steps up to four times as long; bits are equal.
+# With level 0, compilation takes half the time, and steps take up to four times as long; results
+# have the same bits.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 
@@ -28,7 +29,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Describe what determines the code besides its text."""
+    """Describe everything besides its text that determines the code."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 

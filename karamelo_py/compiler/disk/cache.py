@@ -1,11 +1,12 @@
 """Compiled kernels on disk, in two levels.
 
 A file ``.kernel`` contains the name, result and callees of a kernel. Its key is a hash of the
-function, the argument types and the sources of all that writes kernels. If it is missing, the
-kernel is traced, and its machine code looked up in a file ``.code`` by the hash of the LLVM text.
+function, the argument types and the sources of the code that writes kernels. If this file is
+missing, the kernel is traced, and its machine code is looked up in a file ``.code`` by the hash of
+the LLVM text.
 
-As files become code, only files with a correct checksum that no other user can write are read.
-Otherwise the kernel is compiled, with a warning.
+Since files become code, a file is read only if its checksum is correct and no other user can write
+it. Otherwise the kernel is compiled, with a warning.
 """
 
 import contextlib
@@ -71,7 +72,7 @@ def _sources() -> str:
 
 
 def _stamp(name: str) -> str:
-    """Hash a module from elsewhere, and the uninstalled modules it uses."""
+    """Hash a module that is not part of the program, and the uninstalled modules it uses."""
     words: dict[str, str] = {}
     ahead = {name}
     while ahead:
@@ -86,7 +87,7 @@ def _stamp(name: str) -> str:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
-        if not one.startswith(__package__.partition(".")[0]):  # a plug-in: imports are not known
+        if not one.startswith(__package__.partition(".")[0]):  # a plug-in with unknown imports
             named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))
@@ -134,7 +135,7 @@ def _words(thing: Any) -> str:
 def _class(one: type, by_name: bool = False) -> str:
     """Describe a class by name, fields and plain attributes.
 
-    A class that its module does not contain raises `Unknown` if `by_name`, or in a plug-in.
+    Raises `Unknown` for a class that its module does not contain, if `by_name` or in a plug-in.
     """
     first, *rest = one.__qualname__.split(".")
     named = _names_in(one.__module__).get(first)
@@ -147,8 +148,8 @@ def _class(one: type, by_name: bool = False) -> str:
 
 
 def describe(numba_type: Any) -> str:
-    """Describe a type, equally in every process."""
-    how = type(numba_type).__name__  # held or a value
+    """Describe a type, with the same words in every process."""
+    how = type(numba_type).__name__  # whether it is held, or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
         one = choices.tag_class(numba_type)
@@ -160,14 +161,14 @@ def describe(numba_type: Any) -> str:
 
 @functools.cache
 def _registered(count: int, changes: int) -> tuple[str, set[str]]:
-    """Describe the implementations in all keys; return a hash and their modules."""
+    """Describe the implementations that are in all keys; return a hash, and their modules."""
     return short_hash(*map(_words, session.registered)), choices.modules_of(*session.registered)
 
 
 class KernelFiles:
     """Cached kernels of one function for a `processor`, loaded by `load`.
 
-    `called` are functions inlined in them.
+    `called` are the functions that are inlined in them.
     """
 
     def __init__(

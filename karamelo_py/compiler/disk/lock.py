@@ -1,7 +1,7 @@
-"""Lock by which one process compiles a kernel while others wait for its file.
+"""A lock: one process compiles a kernel while other processes wait for its file.
 
-The lock only saves work: without locks (read-only folders, some file systems) and after a timeout,
-each process compiles. The system releases a lock when its process ends.
+The lock only saves work. Without locks (in read-only folders and on some file systems), and after a
+timeout, each process compiles. The system releases a lock when its process ends.
 """
 
 import contextlib
@@ -44,8 +44,8 @@ def _take(path: Path, stack: contextlib.ExitStack) -> None:
             session.waits = _locked(file, PATIENCE)
         if not session.waits:
             return
-    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also unlock for a process forked meanwhile
-    # Waiting processes have this file open, and find the kernel when they get the lock.
+    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also unlocks if forked meanwhile
+    # Waiting processes have this file open. They find the kernel when they get the lock.
     stack.callback(_take_away, path)
 
 

@@ -1,1 +1,1 @@
-"""Front end: what a function writes while it is traced."""
+"""Front end: translates functions to code while they are traced."""

@@ -1,6 +1,6 @@
 """Implementations that are selected by type, and the modules that define them.
 
-Keys of kernels on disk include the sources of these modules (`cache`).
+The keys of kernels on disk include the sources of these modules (see `cache`).
 """
 
 import contextvars
@@ -20,7 +20,7 @@ INTERPRETED = bool(config.DISABLE_JIT)  # nothing is compiled
 
 LIBRARIES = {"builtins", "numba", "llvmlite", "numpy", *sys.stdlib_module_names} - {"__main__"}
 _PACKAGE = __package__.partition(".")[0]
-# Folders whose sources are part of all keys.
+# Folders whose sources are included in all keys.
 ROOMS = "compiler", "script", "points", "kernels", "schemes", "styles"
 
 # modules outside `ROOMS` of functions being compiled, innermost last
@@ -43,7 +43,7 @@ def modules_of(*things: Any) -> set[str]:
 
 
 def register(made: Callable) -> None:
-    """Make an implementation part of all keys, unless it is in the sources of `ROOMS`."""
+    """Include an implementation in all keys, unless it is in the sources of `ROOMS`."""
     is_function = isinstance(made, python.FunctionType)
     has_values = is_function and (made.__closure__ or made.__defaults__ or made.__kwdefaults__)
     if has_values or modules_of(made):

@@ -26,7 +26,7 @@ IN_A_LOOP = " between iterations of a loop"
 
 
 class Edge(NamedTuple):
-    """End of a branch: its last block, its variables, the items read from `HeldTuple`s."""
+    """End of a branch: its last block, its variables, and the items read from `HeldTuple`s."""
 
     block: Any
     names: dict[str, Any]
@@ -58,7 +58,7 @@ class LoopHeader(NamedTuple):
     block: Any
     phis: list[Phi]
     names: dict[str, Any]
-    paths: list[tuple]  # values that phis join: a name, and indices in tuples
+    paths: list[tuple]  # each value that phis join: a name, and indices in tuples
 
 
 def is_value(thing: Any) -> bool:
@@ -74,7 +74,7 @@ def _is_same(a: Any, b: Any) -> bool:
 
 
 class Grows(Untraceable):
-    """Numbers change type in a loop; `grown` maps the path of each to the type it becomes."""
+    """Numbers change type in a loop; `grown` maps the path of each number to its new type."""
 
     def __init__(self, grown: dict[tuple, Any]):
         super().__init__(f"a number becomes one of another type{IN_A_LOOP}")
@@ -182,7 +182,10 @@ class Flow:
     def loop(
         self, names: dict[str, Any], changed: frozenset[str], grown: dict[tuple, Any]
     ) -> tuple[LoopHeader, dict[str, Any]]:
-        """Start a loop; return the variables, with a phi for each in `changed` (types: `grown`)."""
+        """Start a loop; return its variables.
+
+        Variables in `changed` become phis, with the types in `grown` if given.
+        """
         phis: list[Phi] = []
         paths: list[tuple] = []
 

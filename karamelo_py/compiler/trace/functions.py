@@ -160,7 +160,7 @@ def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
 
 
 class Selected(NamedTuple):
-    """The function selected for argument types; a call compiles its text."""
+    """The function selected for argument types; calling it compiles its text."""
 
     key: tuple
     function: Callable
@@ -219,7 +219,8 @@ def outdate_kernels() -> None:
 class PointFunction:
     """Function of one point, implemented for classes of its first `tags` arguments.
 
-    Plain Python selects by the arguments' classes, kernels by their types.
+    Plain Python selects the implementation by the arguments' classes, kernels select it by their
+    types.
     """
 
     def __init__(self, stub: Callable, tags: int, otherwise: bool):
@@ -252,7 +253,7 @@ class PointFunction:
     __call__ = _plain if INTERPRETED else _watched
 
     def on(self, *classes: type) -> Callable[[Callable], Callable]:
-        """Decorate the implementation for classes and derived ones."""
+        """Decorate the implementation for these classes and derived classes."""
 
         def register(implementation: Callable) -> Callable:
             self._table[classes] = implementation
@@ -299,7 +300,7 @@ def _call(function: Callable, arguments: tuple) -> Any:
         return NotImplemented
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
-    if function in not_inlined:  # the same function is for all numbers
+    if function in not_inlined:  # the same function applies to all numbers
         return call_own(lowering, function, tuple(map(types.unliteral, kinds)), arguments)
     run = chosen(function, kinds)
     return NotImplemented if run is None else run(*arguments)

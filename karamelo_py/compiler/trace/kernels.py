@@ -42,10 +42,10 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 class Unit(NamedTuple):
     name: str  # the entry for Python has ENTRY added
     result: types.Type
-    code: bytes  # object file; empty if to be read from disk
+    code: bytes  # object file; empty if it is to be read from disk
     needs: tuple  # units that it calls
-    modules: frozenset[str]  # modules outside of `ROOMS` in it and its needs
-    raises: bool  # whether a part of it raises exceptions
+    modules: frozenset[str]  # modules outside `ROOMS` that it and its `needs` contain
+    raises: bool  # whether it can raise exceptions
 
 
 def load(unit: Unit) -> list[int]:
@@ -62,7 +62,7 @@ def load(unit: Unit) -> list[int]:
 
 
 class Compilation:
-    """Reports compilation in this Python thread, and times of waiting for another process."""
+    """Reports when this Python thread compiles, or waits for another process that compiles."""
 
     def __init__(self) -> None:
         self._listeners = contextvars.ContextVar[tuple]("listeners", default=())
@@ -94,7 +94,7 @@ lock.waiting = compilation
 
 @contextmanager
 def _no_collections() -> Iterator[None]:
-    """Disable garbage collection, which would traverse a trace in vain."""
+    """Disable garbage collection, which would traverse a trace without freeing anything."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -113,7 +113,7 @@ def written(
     """Compile a function for argument types; return module and result type.
 
     The module has `needs` and `raises`, as in `Unit`. ``entry(module, main, kinds, result)`` writes
-    another entry than Python's.
+    an entry that replaces the one for Python.
     """
     with one_at_a_time:
         run = chosen(function, kinds)
@@ -246,7 +246,8 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain the function, so they need not be compiled again for another function.
+    Callers do not contain the function, so a different function does not require compiling them
+    again.
     """
     key = function, signature, session.changes
     addresses = session.addresses
@@ -261,8 +262,8 @@ def address_of(function: Callable, signature: types.Type) -> int:
 def address_of_python(function: Callable, signature: types.Type) -> Address:
     """Return the address by which kernels call a Python function of integers.
 
-    Its exceptions are raised after the kernel. Store the `Address` while kernels may call it, not
-    an int made from it.
+    Exceptions of the function are raised after the kernel. Keep the `Address` itself, not an int
+    made from it, while kernels may call the function.
     """
     if choices.INTERPRETED:
         callback: Any = functools.partial(function)  # as a bound method would be freed at once

@@ -34,7 +34,7 @@ _TRACED = traced.Value, traced.HeldValue
 
 @functools.cache
 def _is_of_values(one: type) -> bool:
-    """Return whether a class is of values, without Numba's abstract classes, which are slow."""
+    """Return True for classes of values; Numba's abstract classes are slow."""
     others = types.Literal, types.NoneType, types.BaseTuple, types.NamedTupleClass, FunctionType
     return not issubclass(one, others)
 
@@ -72,7 +72,7 @@ class Lowering:
         return self.seen(kind.function)
 
     def kind_of(self, thing: Any) -> types.Type:
-        """Return the type of a wrapped thing; integers are literal types."""
+        """Return the type of a wrapped object; integers have literal types."""
         if isinstance(thing, _TRACED):
             return thing._kind
         if isinstance(thing, int):
@@ -196,7 +196,7 @@ class Lowering:
         return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
-        """Write a function and return its result type; the code determines it for `result` None."""
+        """Write a function, and return its result type (by the code, if `result` is None)."""
         passed = iter(values)
         with traced.writing(self):
             value = run(

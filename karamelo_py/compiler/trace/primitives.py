@@ -69,8 +69,9 @@ def point_function(
     They run as plain Python (``NUMBA_DISABLE_JIT=1``, tests) and in kernels, which select them at
     compile time. With ``otherwise`` the decorated function is the default.
 
-    They process one point or several in lanes (:mod:`karamelo_py.compiler.lanes`). Functions in
-    ``scalarised`` of a class, which branch, are called point by point.
+    Implementations process one point, or several in lanes (:mod:`karamelo_py.compiler.lanes`).
+    Functions that branch must be listed in ``scalarised`` of a class, and are called point by
+    point.
     """
 
     def declare(stub: Callable) -> PointFunction:
@@ -144,7 +145,10 @@ def _round_off(template):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index, without a test per access (10 % of a sweep)."""
+    """Return `i` as a non-negative array index.
+
+    This saves a test per access, 10 % of a sweep.
+    """
     return i
 
 
@@ -181,7 +185,7 @@ def select(condition, a, b):
 
 @shared
 def where(condition: bool, a: float, b: float) -> float:
-    """Select `a` if `condition`, else `b`; evaluate both."""
+    """Return `a` if `condition`, else `b`; both are evaluated."""
     return a if condition else b
 
 

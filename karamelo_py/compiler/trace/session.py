@@ -24,11 +24,11 @@ class Session:
         self.functions: dict[tuple, Any] = {}  # selected by argument types
         self.operations: dict[tuple, Any] = {}
         self.outdated = False  # functions have to be selected again
-        self.changes = 0  # number of changed implementations that kernels may contain
+        self.changes = 0  # number of implementations that have changed and that kernels may contain
         self.loaded: dict[str, list[int]] = {}  # addresses by kernel name
         self.addresses: dict[tuple, int] = {}
         self.interpreted: WeakValueDictionary[int, Callable] = WeakValueDictionary()
-        self.arrays: dict[int, Any] = {}  # passed to kernels, by id
+        self.arrays: dict[int, Any] = {}  # arrays that were passed to kernels, by id
         self.array_types: dict[tuple, int] = {}
         self.numbers = itertools.count()  # safe in threads
         self.waits = True  # wait for other processes that compile; False after a timeout

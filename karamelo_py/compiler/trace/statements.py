@@ -2,7 +2,7 @@
 
 Python values are computed at once. If a condition is known only at run time, both branches are
 written, and variables are merged as phis of SSA form. A loop over a known range is unrolled if it
-is short or must be; other loops remain loops.
+is short or cannot remain a loop; other loops remain loops.
 """
 
 import ast
@@ -59,7 +59,7 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """List functions by name and first line, with decorators."""
+    """List functions by name and first line, which is that of the first decorator."""
     functions: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
@@ -110,7 +110,7 @@ class AstFunction:
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
-        )  # the signature of the code object
+        )  # the same signature as the code object
         plain.__kwdefaults__ = function.__kwdefaults__
         self.signature = inspect.signature(plain)
         others = code.co_kwonlyargcount or code.co_flags & (
@@ -185,7 +185,7 @@ _WORDS = {
 class AstCompiler:
     def __init__(self, walked: AstFunction, names: dict[str, Any], free: dict[str, Any]):
         self.walked, self.names, self.free = walked, names, free
-        self.depth = 0  # depth of branches and loops in the kernel
+        self.depth = 0  # depth of nested branches and loops in the kernel
         self.yielded: list = []
         self.goes = True  # False after a return or raise
         self.returns: list[Edge] = []
@@ -427,7 +427,7 @@ class AstCompiler:
     def closing(
         self, call: Any, node: ast.Lambda | ast.FunctionDef, signature: inspect.Signature
     ) -> Callable:
-        """Note in a function its source and its variables, which determine the machine code."""
+        """Store in a function its source and its variables, which determine the machine code."""
         read = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         variables = lambda: {n: x for n, x in (self.free | self.names).items() if n in read}  # noqa: E731
         defaults = [p.default for p in signature.parameters.values()]
@@ -607,7 +607,7 @@ class AstCompiler:
         return True
 
     def state(self) -> Callable[[], None]:
-        """Return a function that goes back to this state and removes what is written meanwhile."""
+        """Return a function that goes back to this state and removes the code written since."""
         names, depth = dict(self.names), self.depth
         breaks, continues, returns = self.breaks, self.continues, [*self.returns]
         lowering = self.flow.lowering

@@ -58,7 +58,7 @@ def now() -> Any:
 
 @contextmanager
 def writing(lowering: Any) -> Iterator[None]:
-    """Let operations become code of `lowering` within this context."""
+    """Within this context, operations become code of `lowering`."""
     before = _lowerings.set((*_lowerings.get(), lowering))
     try:
         yield
@@ -100,13 +100,13 @@ def _in_type_of(model: Any, kind: Any, thing: Any) -> Any:
     return thing
 
 
-# Replacements of functions called by address, in modules that contain all they call.
+# Replacements of functions called by address, for modules that contain all functions they call.
 _replacements: contextvars.ContextVar[tuple | None] = contextvars.ContextVar("called", default=None)
 
 
 @contextmanager
 def in_one(called: dict[Any, Callable]) -> Iterator[None]:
-    """Write GPU modules, which contain all they call, in this context.
+    """Within this context, write modules for GPUs, which contain all functions they call.
 
     `called` maps each signature called by address to the inlined function.
     """
@@ -150,7 +150,7 @@ class Intrinsic:
     """A function of values, defined by its signature for types and its code.
 
     ``definition(*types)`` returns ``result(*arguments)`` and ``codegen(builder, *values)``, or None
-    if not defined; integer types with known values are tried last.
+    if it is not defined for these types. Integer types with known values are tried last.
     """
 
     def __init__(self, definition: Callable):
@@ -328,4 +328,4 @@ OF_WHOLE = {min, max, abs, int, bool}
 # Functions whose literals take the type of other operands; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONG = 8  # iterations up to which a known range is unrolled even if it could be a loop
+LONG = 8  # number of iterations up to which a known range is unrolled even if it could be a loop

@@ -23,19 +23,20 @@ class BasisTraits(NamedTuple):
     nodes_per_cell: int = 1  # 2 with mid-nodes
     # gradients jump at cell faces; points that cross add energy, less with smaller steps
     gradient_jumps: bool = False
-    # Stable step / (h/c) at low speed: updated frame, with usf, total frame
+    # Stable step / (h/c) at low speed: in the updated frame, there with usf, and in the total
+    # frame.
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
-    # For the stiffness of an isolated point: h^2 / D and max h^2 sum_I |grad N_I|^2 / N_I per
-    # direction, away from walls; then a number from the eigenvalues of a usl step with D.
+    # For the stiffness of an isolated point, away from walls: h^2 / D, max h^2 sum_I |grad N_I|^2 /
+    # N_I per direction, and a number from the eigenvalues of a usl step with D.
     lone: tuple[float, float, float] | None = None
     # D / h^2 if constant: mapping to the nodes and back damps waves in proportion to it.
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations (updated frame)
     corrected_share: float = 0.8
     bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
-    drift_limits: DriftLimits | None = None  # None: as for similar bases
+    drift_limits: DriftLimits | None = None  # None: those of similar bases
     # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     # ``deformation`` (F in 2D or 3D), ``corners`` (of the `element`)
     shape: tuple[str, ...] = ()
@@ -92,7 +93,7 @@ def without_moment(basis, grid, moment):
 
 @point_function(otherwise=True)
 def first_node(basis, template):
-    """Return the offset in cells: the first node is the integer part of position plus offset."""
+    """Return an offset: the index of the first node is the integer part of position + offset."""
     return 0
 
 
@@ -115,7 +116,7 @@ def deformed(basis, kin, location, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, location):
-    """Return the cells that the domain's corners, or their nodes, may reach."""
+    """Return how many cells away the domain's corners, or their nodes, may be."""
     return grid.h - grid.h
 
 

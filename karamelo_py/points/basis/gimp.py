@@ -43,7 +43,7 @@ class _Following(_Box):
 
 
 class CPGIMPDet(_Following):
-    """Boxes of constant shape: l <- l (det(I + dl))^(1/d), d the directions that can stretch.
+    """Boxes of constant shape: l <- l (det(I + dl))^(1/d), with d directions that can stretch.
 
     Rotation does not change the boxes. Stretch in one direction is distributed to all directions.
 
@@ -207,7 +207,7 @@ def _end(at, first, top):
     return i, b - i
 
 
-# As for the linear basis, the limit for small boxes.
+# Small boxes approach the linear basis.
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 

@@ -43,7 +43,7 @@ def along(basis, kin, grid, location, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """Return N D^-1 (X_I - x) of the nodes of a line, for bases whose `along` does not give it."""
+    """Return N D^-1 (X_I - x) of the nodes of a line, for bases whose `along` does not."""
     return line.affine
 
 

@@ -33,7 +33,7 @@ class TwistedStress(SymmetricTensor):
     __slots__ = ()
 
     def nominal(self, F):
-        """Return P = s F^-T, but with s_33 / F_33 in 33, which acts on the radius.
+        """Return P = s F^-T, except for component 33, s_33 / F_33, which acts on the radius.
 
         A radial displacement also changes 31 and 32 of F, in proportion to r.
         """

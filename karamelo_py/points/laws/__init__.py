@@ -90,9 +90,10 @@ def _elastic_law_within(law):
 
 
 def answers(law: type, values: dict[Callable, Any]) -> None:
-    """Define point functions of a law by a field of the state, their last argument, or a constant.
+    """Define point functions of a law that return a field of the state, or a constant.
 
-    A string names the field: ``answers(CamClay, {elastic_strain: "e", by_rates: False})``.
+    A string names the field of the state, the last argument of the functions: ``answers(CamClay,
+    {elastic_strain: "e", by_rates: False})``.
     """
     for function, value in values.items():
         function.on(law)(_by_field(value) if isinstance(value, str) else _by_constant(value))
@@ -125,7 +126,8 @@ def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
 def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
     """Define `functions` of `outer` by the law in field `component`, with the state in `kept`.
 
-    These take (law), (law, template), or law, kinematics (replaced by `kin`), state and more.
+    The functions take (law), (law, template), or (law, kinematics, state, ...), where `kin`
+    replaces the kinematics.
     """
 
     def register(function: Callable, changes: bool) -> None:
@@ -146,7 +148,7 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Do as `hand_on`, and show the columns of the inner law."""
+    """Call `hand_on`, and show the columns of the inner law."""
     hand_on(outer, component, kept, functions, kin)
 
     @within.on(outer)
@@ -195,7 +197,7 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
 
 @point_function(otherwise=True)
 def law_here(law, within, state):
-    """Return the inner law with the numbers of the point."""
+    """Return the inner law with the numbers stored at the point."""
     return within
 
 
@@ -290,7 +292,7 @@ def wave_speed_squared(law, kin, state):
 
 @point_function(otherwise=True)
 def wave_speed_bound(law, kin, state):
-    """Return an upper bound of `wave_speed_squared`, if cheaper."""
+    """Return an upper bound of `wave_speed_squared` that is cheaper to compute."""
     return wave_speed_squared(law, kin, state)
 
 
@@ -307,7 +309,7 @@ def is_round(law):
 
 @point_function(otherwise=True)
 def shear_part(law, kin, state):
-    """Return the part 2 G / rho of `wave_speed_squared`, or more, for waves in thin bodies."""
+    """Return the part 2 G / rho of `wave_speed_squared`, or an upper bound, for thin bodies."""
     return wave_speed_squared(law, kin, state)
 
 
@@ -365,13 +367,13 @@ def heat_capacity(law, template):
 
 @point_function(otherwise=True)
 def lit(law, kin, state, since):
-    """Return an explosive's state a time `since` after lighting."""
+    """Return an explosive's state a time `since` after ignition."""
     return state
 
 
 @point_function(otherwise=True)
 def warmed(law, kin, state, heat):
-    """Return the state with `heat` added to its internal energy per reference volume, if any."""
+    """Return the state with `heat` added to the internal energy per reference volume, if any."""
     return state
 
 

@@ -192,7 +192,7 @@ def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float
 
 
 def directional_stiffness(law: NamedTuple, stretches: Sequence[float], a: int) -> float:
-    """Return l_a^2 d2W/dl_a^2 at principal stretches, rho c^2 of a wave along direction `a`."""
+    """Return l_a^2 d2W/dl_a^2 at principal stretches: rho c^2 of a wave along direction `a`."""
     if isinstance(law, OfStretches):
         return stretches[a] ** 2 * evaluated(law.second[(0, 3, 5)[a]], law, stretches)
     at, x = invariants_of(stretches), stretches[a] ** 2
@@ -247,7 +247,7 @@ def stiffness_along_fibre(
     """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
 
     `cosine2` replaces the squared cosine between the families. At constant volume it is the
-    curvature in ln l. NaN where the energy has no value.
+    curvature in ln l. The result is NaN where the energy has no value.
     """
     along = aligned(law) if cosine2 is None else cosine2
     W = []
@@ -277,7 +277,7 @@ def least_stiffness(law: NamedTuple, path: str, x: float) -> float:
 
 @lru_cache(typed=True)
 def first_instability(law: NamedTuple, turning: bool = False) -> tuple[str, float] | None:
-    """Return path and stretch nearest to rest where a direction or path loses its stiffness.
+    """Return the path, and the stretch closest to rest, at which stiffness is lost.
 
     A path ends where the energy is not defined, as at the limit of chains. Fibres whose directions
     differ from point to point (`turning`) may enclose any angle.

@@ -38,7 +38,7 @@ class CamClayConstants(NamedTuple):
     lam
         Slope of -ln(volume) against ln(p) in virgin consolidation: about lambda/(1 + e).
     kappa
-        The same slope in swelling, below lam.
+        Slope in swelling and reloading; it must be below lam.
     p0
         Initial effective pressure.
     pc

@@ -32,7 +32,7 @@ STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; likewise
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
-    """Yield each implausibility of a law, and the likely intention."""
+    """Yield each implausible constant of a law, and what was probably intended."""
     if can(law, constrained_velocity):
         return
     if parameter(parameter(law, "strength"), "cell_size", None) is not None:

@@ -35,7 +35,7 @@ class Fibres(NamedTuple):
 
 
 class OfFibres(OfInvariants):
-    """A law that also depends on I4 = a0.C a0 and I6 = b0.C b0; has a field `directions`."""
+    """A law that also depends on I4 = a0.C a0 and I6 = b0.C b0; it has a field `directions`."""
 
     __slots__ = ()
     twice_along: ClassVar[tuple[Code, ...]]  # derivatives with respect to I4 I4, I6 I6, I4 I6

@@ -114,7 +114,10 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """Extend a law for cells of size `h` to store its plastic strain rate last."""
+    """Return a law that also stores its plastic strain rate, for cells of size `h`.
+
+    The rate is the last number of the state.
+    """
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

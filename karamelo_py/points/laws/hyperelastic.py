@@ -67,7 +67,8 @@ class HyperelasticFormula(OfInvariants, Fields):
         Heat capacity per unit mass, conductivity and coefficient of linear expansion of a material
         with a temperature, as for neo-hookean.
     T
-        Temperature at which the formula is checked; initial one unless the solid sets it.
+        Temperature at which the formula is checked; also the initial temperature, unless the solid
+        sets one.
 
     Example
     -------

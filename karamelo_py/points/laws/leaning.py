@@ -1,4 +1,4 @@
-"""Warning about directions of a law that lean out of the plane or line of a scene."""
+"""Warning about directions of a law that are inclined to the plane or line of a scene."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,10 @@ LEANING: dict[type, Callable[[Any, Any], bool]] = {}  # by kind of law
 def warn_of_leaning(
     kind: type, of: str, when: Callable[[Any, Any], bool], cure: str, title: str = "directions"
 ) -> None:
-    """Warn of scenes, `when(law, scene)`, in which a law of `kind` would shear out of the plane."""
+    """Warn if a law of `kind` would shear out of the plane of a scene.
+
+    ``when(law, scene)`` returns True in this case.
+    """
     LEANING[kind] = when
     known_failure(
         kind,

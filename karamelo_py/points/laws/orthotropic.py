@@ -124,7 +124,7 @@ def of_stiffness(specific_volume: float, C: np.ndarray) -> Directional:
 
 
 class Transverse(NamedTuple):
-    """Elastic solid with one direction, such as bedding or fibres, for small strains.
+    """Elastic solid with one distinct direction, such as bedding or fibres, for small strains.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Artificial viscosity, which spreads shocks over a few cells.
 
-It is a part of `eos_strength` that an equation of state adds; its history variable q is a pressure.
+An equation of state adds it to `eos_strength` as a part, with a pressure q as history variable.
 """
 
 from math import sqrt

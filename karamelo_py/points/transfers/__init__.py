@@ -54,9 +54,9 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, template):
-    """Return the lost fractions (2,) of the energy that mapping to the nodes and back removes.
+    """Return fractions (2,) of the energy that mapping to the nodes and back removes for good.
 
-    Stored moments return the rest. If this is not defined, the loss is not recorded.
+    Stored moments return the rest. If the function is not defined, the loss is not recorded.
     """
 
 

@@ -34,7 +34,7 @@ class Element(NamedTuple):
 
 
 class ConvectedDomain(NamedTuple):
-    """Base of these bases, with 2^d corners; subclasses add `dimension` and `shape`.
+    """Base of CPDI bases with 2^d corners; subclasses add `dimension` and `shape`.
 
     Affine transfers use distances of nodes from the centre sum_I N_I X_I. It differs from the point
     if corners are beyond the grid, or if the domain is no parallelogram or parallelepiped. Angular
@@ -110,7 +110,7 @@ class CornerStencil(NamedTuple):
 
 
 class AtCorners(NamedTuple):
-    """Basis whose nodes are the corners, for sums in which weight or gradient is a factor once.
+    """Basis whose nodes are the corners, for sums that are linear in weight or gradient.
 
     Node numbers are then `Weighted`.
     """

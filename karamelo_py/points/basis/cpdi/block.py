@@ -1,4 +1,4 @@
-"""The 3 x 3 nodes around a 2D domain, each with the sum over the corners.
+"""The 3 x 3 nodes around a 2D domain, each with a sum over the domain's corners.
 
 In 3D, with 27 nodes and eight corners, this would cost more than it saves.
 """

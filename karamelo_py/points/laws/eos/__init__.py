@@ -47,7 +47,7 @@ def crushed_strain(eos, before, after):
 
 @point_function(otherwise=True)
 def ignited(eos, memory, since):
-    """Return (memory,) of an explosive a time `since` after lighting, else ()."""
+    """Return (memory,) of an explosive a time `since` after ignition, else ()."""
     return ()
 
 

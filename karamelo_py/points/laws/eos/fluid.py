@@ -23,7 +23,7 @@ from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # times to fall by the liquid's size; revolutions. Dam breaks take 4
+LONG = 6.0, 0.5  # run / time to fall by the liquid's size; revolutions. Dam breaks take 4
 FRONT = 1.5  # cells that the front moves while a point burns
 STEP, STRONG = 2.0, 20.0  # pressure ratio above which there is a shock, and a strong shock
 

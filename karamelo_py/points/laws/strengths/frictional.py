@@ -158,7 +158,7 @@ def frictional(strength: type) -> None:
     )
 
 
-ENOUGH = 1 / 3  # sine of dilatancy / sine of friction above which neither occurs
+ENOUGH = 1 / 3  # sine of dilatancy / sine of friction above which soil does not vibrate
 # f (f - G/(K + G/3)) above which vibrations grew in walls of sand, with F-bar, and without it if
 # friction is steep and there is no cohesion.
 FED, FED_ALONE, STEEP = 0.08, 0.095, 0.46

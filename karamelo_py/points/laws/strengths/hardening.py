@@ -112,7 +112,8 @@ def precompute(strength, memory, heat):
 def first_guess(strength, before, q, slope):
     """Return a first guess of the plastic strain (0 for q below the flow stress), and a bound k.
 
-    `slope` is 3 G. After a change c, Newton's method changes the strain by at most about k c^2.
+    `slope` is 3 G. After an iteration of Newton's method has changed the strain by c, the next one
+    changes it by at most about k c^2.
     """
     return real(0, q), real(0, q)
 

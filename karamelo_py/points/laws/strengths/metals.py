@@ -150,7 +150,7 @@ def power_law(factor, exponent, strain, value, increment):
 def power_law_guess(exponent, strain, hard, excess, slope):
     """Return `first_guess` from two derivatives of the power law `hard` (Chebyshev's method).
 
-    `excess`, stress minus flow stress, falls by `slope` with the strain.
+    `excess` is stress minus flow stress; it decreases by `slope` per unit of strain.
     """
     some = strain > round_off(strain)
     inverse = where(some, 1 / where(some, strain, 1), 0)
