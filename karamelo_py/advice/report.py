@@ -153,10 +153,7 @@ def materials(hub: Hub, block: Any) -> list[Material]:
 
 
 def _say_of_equations(say: Callable, simulation: Simulation, nodes: int) -> None:
-    """Print the number of unknowns, and the memory of the equations.
-
-    The equations couple the nodes of each point.
-    """
+    """Print unknowns and memory of the equations, which couple the nodes of each point."""
     s = simulation.setup
     d, reach = s.kin.dimension, round(support(s.basis, s.kin) ** (1 / s.kin.dimension)) - 1
     size = nodes * (2 * reach + 1) ** d * d * d * 8

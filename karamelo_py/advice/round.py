@@ -88,10 +88,7 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] | None:
-    """Return the solids that are square plates under round bodies.
-
-    The result is None if other solids are not round.
-    """
+    """Return solids that are square plates under round ones; None if others are not round."""
     reach = [float(middle.apart(solid).max()) for solid in solids]
     round_ = [
         _is_round(solid.region, domain.contains, middle, far)

@@ -78,8 +78,7 @@ def _complain(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-# Subcommands that are imported on demand; each has DESCRIPTION, add_options(parser) and
-# run(options).
+# Subcommands imported on demand; each has DESCRIPTION, add_options(parser) and run(options).
 ELSEWHERE = {
     "bench": ("karamelo_py.app.bench.command", "Measure the speed of this machine."),
     "view": ("karamelo_py.app.view", "Draw pictures or a movie of dumps."),

@@ -49,8 +49,7 @@ OPEN_MPI = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1",
     "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
 }
-# Large pages make four processes of a million points 10 % faster. NumPy requests them only for new
-# arrays.
+# Large pages make four processes of a million points 10 % faster; NumPy needs a request.
 PAGES = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 PAUSE = 0.05  # seconds between polls
 GRACE = 2.0  # seconds after the end of mpiexec in which processes must end

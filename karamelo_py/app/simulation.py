@@ -449,10 +449,7 @@ class Simulation:
 
     @property
     def log(self) -> Columns:
-        """Columns of the log, as arrays.
-
-        If the columns have changed, only the rows since then are included.
-        """
+        """Columns of the log, as arrays; only the rows since the columns changed."""
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])

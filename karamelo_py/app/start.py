@@ -21,10 +21,7 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Open standard streams that are closed.
-
-    Otherwise, files opened later would get their descriptors.
-    """
+    """Open closed standard streams; otherwise later files would get their descriptors."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(handle)

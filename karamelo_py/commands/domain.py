@@ -43,8 +43,7 @@ def dimension(hub: Hub, dimensions: Argument, *bounds: Argument) -> None:
         1, 2 or 3.
     bounds
         ``xmin, xmax, h`` in 1D; ``xmin, xmax, ymin, ymax, h`` in 2D; ``xmin, xmax, ymin, ymax,
-        zmin, zmax, h`` in 3D; h is the cell size. Omit them in older scripts that use
-        create_domain.
+        zmin, zmax, h`` in 3D; h is the cell size. Omit them in scripts with create_domain.
 
     Example
     -------
@@ -132,7 +131,7 @@ def boundary(
     Notes
     -----
     ``delete`` and ``reflect`` are for splashes; for a body against a wall, use fix velocity_nodes.
-    A warning names the first point that is deleted or reflected; the end of the run reports their
+    A warning names the first point that is deleted or reflected; the end of the run gives their
     number.
 
     A point is deleted before the step in which it would leave: the run returns to its last stored

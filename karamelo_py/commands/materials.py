@@ -155,13 +155,11 @@ def load_path(
     sxx, syy, szz, sxy, sxz, syz
         Prescribed Cauchy stress, tension positive; the strain is found by iteration.
     volumetric
-        Volumetric strain exx + eyy + ezz. Normal strains that are not specified are equal to each
-        other.
+        Volumetric strain exx + eyy + ezz. Unspecified normal strains are equal to each other.
     turn
         Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        Duration, for rate-dependent laws; default 1. Without strains or stresses, the state is held
-        for this time.
+        Duration, for rate-dependent laws; default 1. Without strains or stresses, a hold time.
 
     Example
     -------

@@ -161,8 +161,7 @@ def scheme(
         Arguments of the style; explicit schemes have none.
     start
         With ``half``, forces act for half of the first explicit step, so that velocities and
-        kinetic energies belong to the logged time; with ``full`` (default), they act for the whole
-        step.
+        kinetic energies belong to the logged time; with ``full`` (default), for all of it.
 
     Example
     -------

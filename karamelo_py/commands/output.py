@@ -39,8 +39,7 @@ def dump(
     Notes
     -----
     File names are relative to the folder where the program was started; ``~`` is the home folder.
-    Folders must exist. Existing files are overwritten, but later snapshots of an earlier, longer
-    run remain.
+    Folders must exist. Files are overwritten, but later snapshots of a longer run remain.
 
     Example
     -------

@@ -275,12 +275,11 @@ def restart(hub: Hub, every: EveryOrNever, file: OutputFile | None = None) -> No
     the last two steps of the shorter run, which end exactly at T.
 
     A file (HDF5) contains all fields of points and nodes, the state of fixes, computes, dumps and
-    plots, and the values that commands such as ``value`` have returned. If a run is killed while
-    writing, the previous file remains. The last state of each run is always written. A failed run
-    writes last_good.<step>.h5 instead: the initial state if its time step was above the stable
-    limit from the start, or, if its energy has grown, a state at most ten steps before the growth.
-    This file is not written with boundary(delete), or if the run was resumed from a file at that
-    step.
+    plots, and values returned by commands such as ``value``. If a run is killed while writing, the
+    previous file remains. The last state of each run is always written. A failed run writes
+    last_good.<step>.h5 instead: the initial state if its time step was above the stable limit from
+    the start, or, if its energy has grown, a state at most ten steps before the growth. This file
+    is not written with boundary(delete), or if the run was resumed from a file at that step.
 
     Dumps include the state at an interruption or failure. A resumed run removes this snapshot from
     files with several snapshots.

@@ -114,10 +114,7 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """Return True if a command must do nothing.
-
-    In a rehearsal and when a script is resumed, points have another state.
-    """
+    """Return True to do nothing: in a rehearsal or a resumed script, points have another state."""
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

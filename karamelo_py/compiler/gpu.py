@@ -42,9 +42,6 @@ class NoCard(Exception):
         self.hint = hint
 
 
-# --- shared memory ----------------------------------------------------------------------------
-
-
 def counted(array: np.ndarray, i: int, step: int) -> int:
     """Add to an integer of an array atomically; return the old value."""
     array[i] += step
@@ -103,9 +100,6 @@ def aligned_record(array, i, count):
         return llvm.make_tuple(builder, result, numbers)
 
     return result(array, types.int64, count), codegen
-
-
-# --- code -------------------------------------------------------------------------------------
 
 
 def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
@@ -198,9 +192,6 @@ def numbers_of(function: Callable, arguments: tuple, i: int) -> int:
 
 def assembled(text: str, processor: str) -> str:
     return machine.assembly(text, TRIPLE, processor, library() if '@"__nv_' in text else None)
-
-
-# --- execution --------------------------------------------------------------------------------
 
 
 def bandwidth(card: Any, size: int = 1 << 30) -> float:
@@ -450,9 +441,6 @@ class Card(_Coded):
 def card() -> Card | Emulator:
     """Return the GPU, or with KARAMELO_PY_GPU=emulated the emulator."""
     return Emulator() if os.environ.get("KARAMELO_PY_GPU") == "emulated" else Card()
-
-
-# --- arrays on a card -------------------------------------------------------------------------
 
 
 class _There(NamedTuple):

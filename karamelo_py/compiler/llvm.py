@@ -151,9 +151,6 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
     return None
 
 
-# --- lanes ----------------------------------------------------------------------------------------
-
-
 def scalar_of(kind: types.Type) -> types.Type:
     return kind.scalar if isinstance(kind, Lanes) else kind
 
@@ -184,9 +181,6 @@ def overloaded(kind: ir.Type) -> str:
     if isinstance(kind, ir.VectorType):
         return f"v{kind.count}{kind.element.intrinsic_name}"
     return kind.intrinsic_name
-
-
-# --- memory ---------------------------------------------------------------------------------------
 
 
 def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
@@ -227,9 +221,6 @@ def _converted(
     items = zip(kind, unpack(builder, value), strict=True)
     parts = [_converted(builder, item, value, to, truth) for item, value in items]
     return make_struct(builder, to(kind), parts)
-
-
-# --- tuples and arrays ----------------------------------------------------------------------------
 
 
 def make_tuple(builder: ir.IRBuilder, kind: types.Type, items: Sequence) -> ir.Value:
@@ -291,9 +282,6 @@ def item_pointer(
 def byte_pointer(builder: ir.IRBuilder, pointer: ir.Value, offset: ir.Value) -> ir.Value:
     address = builder.gep(builder.bitcast(pointer, I8.as_pointer()), [offset])
     return builder.bitcast(address, pointer.type)
-
-
-# --- functions and loops --------------------------------------------------------------------------
 
 
 def external(

@@ -144,8 +144,7 @@ def _logarithm_near_one(x):
 
 @implements(exponential, by_type=True)
 def _exponential(x):
-    # Adding a number whose spacing is 1 rounds; not all processors have an instruction for
-    # rounding.
+    # Adding a number whose spacing is 1 rounds; not all processors can round directly.
     most, far = (1000, 1.5 * 2**52) if _bits(x).mantissa == 52 else (130, 1.5 * 2**23)
 
     def exponential(x):

@@ -62,9 +62,6 @@ def _many_threads(lowering: Any) -> bool:
     return in_one_module()
 
 
-# --- shared memory words ----------------------------------------------------------------------
-
-
 def _word(builder: ir.IRBuilder, address: Any) -> ir.Value:
     return builder.inttoptr(address, I64.as_pointer())
 
@@ -138,8 +135,6 @@ def _add_among(array, i, j, value):
     return types.none(array, types.int64, types.int64, types.int64), codegen
 
 
-# --- threads ----------------------------------------------------------------------------------
-
 # address of the arguments, index, address of the `Failure`
 _TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
 _PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
@@ -160,10 +155,7 @@ if hasattr(os, "register_at_fork"):
 def _share_out(
     count: int, run_range: int, task: int, arguments: int, threads: int, failure: int
 ) -> None:
-    """Run a task for each index in [0, count), by a function of ranges.
-
-    If `threads` is 0, all threads are used.
-    """
+    """Run a task for each index in [0, count), by ranges; `threads` = 0 uses all threads."""
     do, threads = _PART(run_range), threads or config.NUMBA_NUM_THREADS
     size = min(count, threads)
     ends = [count * k // size for k in range(size + 1)] if size else [0, 0]
@@ -206,10 +198,7 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Store items.
-
-    Returns the address of a function of the items and an index, and the address of the items.
-    """
+    """Store items; return the address of a function of them and an index, and their address."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     stored = held_as(lowering, items, kind)
     task = _address(lowering, function.seen.__qualname__, _Task(function.seen, kind), 2)
@@ -250,8 +239,6 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
     function = llvm.external(builder, "karamelo_share_out", ir.VoidType(), kinds)
     builder.call(function, [*numbers, failure_at(builder)])
 
-
-# --- teams ------------------------------------------------------------------------------------
 
 # Only the leader writes _STATE: it waits, leads, or has ended. Every index is processed once: 1. A
 # ticket contains the number of the loop and the indices left in a range. Indices are taken by
@@ -392,10 +379,7 @@ def by_threads(share: Callable) -> Callable:
 
 
 def by_team(function: Callable) -> Callable:
-    """Make ``f(mode, ...)``, which runs ``function(mode, ...)`` by a team if there is one.
-
-    The result is an integer.
-    """
+    """Make ``f(mode, ...)``, which runs ``function(mode, ...)`` (an integer) by a team, if any."""
     inner = noinline(function)
 
     @shared

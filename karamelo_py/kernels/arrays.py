@@ -36,8 +36,7 @@ class Nodes(NamedTuple):
     fields: tuple  # (N, components) each
 
 
-# Column of the first component in node records. A 3D vector is padded to four numbers, which fill a
-# register.
+# Column of the first component in node records. 3D vectors are padded to fill a register.
 MASS = 0
 
 
@@ -112,8 +111,7 @@ class Tiling(NamedTuple):
     # (T + 1, r, 2) int16: first and last node in each row of the box (in 3D, row i ny + j), counted
     # from the start of the row; last < first if the row is empty; r = 0 if boxes are not refined
     rows: np.ndarray
-    # (T + 1, 5) int64: range of its records in the buffers; Grid.first, step_x and step_y of its
-    # nodes there
+    # (T + 1, 5) int64: rows of its records in the buffers; Grid.first, step_x and step_y there
     buffer: np.ndarray
     # (T + 1, 14): largest move, largest rate, failed point + 1; in energy checks also kinetic and
     # stored energy, number of the solid (-1: several), mass, momentum, elastic energy, and elastic

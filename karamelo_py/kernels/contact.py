@@ -119,9 +119,6 @@ def turn(kin, nodes, n, change, again):
     """Add a change to a field's angular velocity, or if `again` to the one that strains points."""
 
 
-# --- two bodies at a position -----------------------------------------------------------------
-
-
 class Where(NamedTuple):
     node: int  # number of the node in the first field
     x: tuple  # (d,)
@@ -277,8 +274,8 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The remainder is along a face or an edge, or 0. The two parts are perpendicular, so one impulse
-    is enough.
+    The remainder is along a face or an edge, or 0. The parts are perpendicular: one impulse is
+    enough.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -416,10 +413,7 @@ def closing_part(contact, a, b):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return by how much a pair approaches faster than it takes to close the gap in this step.
-
-    The result is 0 without contact.
-    """
+    """Return how much faster a pair approaches than closes the gap in this step, or 0."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -452,9 +446,6 @@ def _friction_of(yielding, friction, push, slide, share):
     slip = sqrt(dot(slide, slide))
     stop = share * slip * slip * slip / compliance
     return min(stop, friction * push) / slip, stop <= friction * push
-
-
-# --- all bodies at a position -----------------------------------------------------------------
 
 
 @noinline
@@ -502,9 +493,6 @@ def _count_partners(which, bodies, node, count):
 @noinline
 def _share(contact, i, j):
     return 1.0 / max(contact.partners[i], contact.partners[j], 1)
-
-
-# --- v* ---------------------------------------------------------------------------------------
 
 
 @noinline
@@ -715,9 +703,6 @@ def list_pairs(bodies, grids, spans, pairs):
                         pairs.gaps[count] = gap
                         count += 1
     return count
-
-
-# --- the velocity that deforms ----------------------------------------------------------------
 
 
 @noinline

@@ -40,9 +40,6 @@ class TouchingSurface(NamedTuple):
     lost: int  # address of the function for points without a way out
 
 
-# --- contact at points ------------------------------------------------------------------------
-
-
 def _stencil_of(s, points, p):
     grid, now = record(s.grids, points.grid[p]), s.control.motion[0].now
     location = location_at(s.basis, s.kin, points.x[now] if s.frame.moves else points.home, p)
@@ -103,8 +100,7 @@ def _list_point(body, surface, s, block, p):
     times, dt = s.control.step[0], s.control.values[arrays.DT]
     h, none = s.grids.h[0], zero_vector(s.kin, 0.0)
     x = load_vector(kin, points.x[s.control.motion[0].now], p)
-    # Reject points that cannot reach the surface in this step; a search within a short distance is
-    # cheap.
+    # Reject points that cannot reach the surface in this step; nearby searches are cheap.
     speed = 0.0
     for c in range(d):
         speed += abs(points.v[c, p])
@@ -206,9 +202,6 @@ def _give_to_points(body, s, block, number, measures):
     add_to(s.control.totals, WORK, work)
 
 
-# --- contact at nodes -------------------------------------------------------------------------
-
-
 @noinline
 def _lead_nodes(body, s):
     first = arrays.of_momentum(s.kin)
@@ -291,9 +284,6 @@ def _follow(s, n, again):
                     for k in range(s.kin.dimension):
                         v = nodes.update[m, k] if again else nodes.velocity[m, k]
                         nodes.velocity[n, k] = v
-
-
-# --- rows -------------------------------------------------------------------------------------
 
 
 @noinline

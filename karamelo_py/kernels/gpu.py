@@ -77,9 +77,6 @@ def nodes_in_cell(basis: Any, kin: Any) -> int:
     return basis.line_nodes**kin.dimension
 
 
-# --- visits of points -------------------------------------------------------------------------
-
-
 @functools.cache  # a single stage for all launches
 def while_steps_go_on(function: Callable) -> Callable:
     def go_on(i, fate, *arguments):
@@ -311,9 +308,6 @@ def _with_cell(totals, cells, cell, first, step):
     return tuple([t + where(occupied, x, t - t) for t, x in zip(totals, sums, strict=True)])
 
 
-# --- lists of the points by cell --------------------------------------------------------------
-
-
 def _weight(number):
     return int(number) + (OCCUPIED if number > 0 else 0)
 
@@ -392,7 +386,6 @@ def sort_cell(corners: int) -> Callable:
     return sort_cell
 
 
-# --- order in memory --------------------------------------------------------------------------
 # Threads of a warp have adjacent cells, so the first points of these cells should be adjacent in
 # memory, then the second points, and so on.
 
@@ -426,9 +419,6 @@ def take_rows(i, fate, rows, come_from, room):
 def put_rows(i, fate, rows, room):
     for k in range(rows.shape[0]):
         rows[k, i] = room[k, i]
-
-
-# --- nodes, and the clock ---------------------------------------------------------------------
 
 
 def of_nodes(row: Any) -> Callable:

@@ -94,10 +94,7 @@ def work_of_loads(i, fate, s, about, target):
 
 
 def on_node(nodes_of: Callable, task: int, values: int = 0, length: Callable = kick) -> Callable:
-    """Return the thread function that applies a hook to one node.
-
-    `task` is ACT or RUB; `length` returns the time for which the hook acts.
-    """
+    """Return the thread function of a hook's `task` at a node, for the time that `length` gives."""
     control_of = _control(values)
 
     def visit_member(i, fate, s, about, *tag):

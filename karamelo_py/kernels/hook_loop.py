@@ -799,8 +799,7 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 def point_hooks(stage, then, hooks, s, arguments_of):
     """Call the point functions of `stage` in each block.
 
-    `arguments_of` is a pair of functions: arguments of a block's point functions, and its heat
-    arrays.
+    `arguments_of` has two functions: arguments of a block's point functions, its heat arrays.
     """
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)

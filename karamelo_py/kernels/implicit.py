@@ -268,7 +268,6 @@ def keep_stress(matter, stress):
         store(stress, p, points.mass[p] * specific_volume(law) * P)
 
 
-# --- at the nodes -----------------------------------------------------------------------------
 # Each node sums over its points in order; nodes are divided among threads.
 
 

@@ -116,9 +116,6 @@ class Links(NamedTuple):
     weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, right-hand side last
 
 
-# --- surfaces ---------------------------------------------------------------------------------
-
-
 @point_function()
 def closest(shape, kin, x, reach):
     """Return the depth of `x` in a shape and the outward unit direction (d,), 0 beyond `reach`."""
@@ -180,9 +177,6 @@ def _closest_of_parts(shape, kin, x, reach):
         if sign * (other - within) > 0:
             within, out = other, way
     return within, out
-
-
-# --- matrices ---------------------------------------------------------------------------------
 
 
 @noinline
@@ -269,9 +263,6 @@ def _begin(links, body, k):
         for a in range(6):
             inverse[a, c] = J[a, 6]
         links.u[k, c] = work.u[c]
-
-
-# --- finding links ----------------------------------------------------------------------------
 
 
 @noinline
@@ -414,9 +405,6 @@ def _set_spring(links, link, joint, way, times):
     link.stiff[0] = kick * joint.damping
     if joint.stiffness * dt * kick * _along(links, link.ways[0], link.ways[0]) > 1:
         link.stiff[0] += kick * dt * joint.stiffness
-
-
-# --- impulses ---------------------------------------------------------------------------------
 
 
 @noinline
@@ -630,9 +618,6 @@ def _solve(links, bodies):
         body.state[0].failed += 1
 
 
-# --- collisions -------------------------------------------------------------------------------
-
-
 @noinline
 def _approach(links, link, dt):
     """Return the speed of approach before the step if the bodies collide in it, else 0."""
@@ -736,9 +721,6 @@ def _collide(links, bodies, dt):
             body.solution.momentum[a] += links.given[n, a]
             body.solution.u[a] += links.jump[n, a]
             links.u[n, a] = body.solution.u[a]
-
-
-# --- a step -----------------------------------------------------------------------------------
 
 
 @noinline

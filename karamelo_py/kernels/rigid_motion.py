@@ -123,9 +123,6 @@ def records(kind: np.dtype, count: int = 1) -> Any:
     return np.zeros(count, kind).view(np.recarray)
 
 
-# --- rotation ---------------------------------------------------------------------------------
-
-
 @noinline
 def _turn_about(state, axis, angle):
     q, c, s = state.q, cos(0.5 * angle), sin(0.5 * angle)
@@ -239,9 +236,6 @@ def set_mass(body):
         for a in range(3):
             for b in range(3):
                 M[3 + a, 3 + b] += constants.inertia[k] * axis[a] * axis[b]
-
-
-# --- Newton's method --------------------------------------------------------------------------
 
 
 @noinline
@@ -414,9 +408,6 @@ def solve(body, dt):
             return
         _iterate(body, dt, True)
     state.failed += 1
-
-
-# --- a step -----------------------------------------------------------------------------------
 
 
 @noinline

@@ -102,10 +102,7 @@ def _begin_tiles(sorting):
 
 @shared_out
 def _order_parts(sorting, k):
-    """Place the k-th part of the points (counting sort).
-
-    This advances `ends` from the begin to the end of each tile.
-    """
+    """Place the k-th part of the points (counting sort); advances `ends` to the ends of tiles."""
     ends, tile, order = sorting.ends, sorting.tile, sorting.order
     parts = ends.shape[0]
     for p in range(tile.size * k // parts, tile.size * (k + 1) // parts):

@@ -19,7 +19,7 @@ from karamelo_py.points.basis.cpdi.block import InBlock, block_of, is_one_block,
 from karamelo_py.points.basis.product import Stencil, inverse_spread, spacing
 from karamelo_py.points.kinematics import from_columns
 
-# --- affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point
+# Affine sums (mass, momentum, MLS force): lanes are arranged like node records once per point
 # instead of per node, which halves the work of a scatter in 2D, and saves 33 % in 3D.
 
 
@@ -109,7 +109,7 @@ def affine_parts(quantities, w, stencil, loads):
     return tuple([eq.affine_part(quantity, w, stencil, load) for quantity, load in pairs])
 
 
-# --- corners of domains as nodes. CPDI functions are sums over corners, N_I = sum_c w_c
+# Corners of domains as nodes: CPDI functions are sums over corners, N_I = sum_c w_c
 # N_I^lin(x_c). Operations that are linear in the weight or gradient of a node are done with the few
 # corners, which interpolate from the nodes around them and distribute to these.
 

@@ -128,10 +128,7 @@ def _take_all(rows, s, step):
 
 
 def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bool]:
-    """Make a function that carries out the rows of a scheme.
-
-    It returns False if a point failed.
-    """
+    """Make a function that carries out the rows of a scheme. It returns False if a point failed."""
     cached: Any = functools.cache(rows_of_kind)  # for interpreted runs
 
     def take_all(kind, s, hooks, more):
@@ -146,8 +143,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# A step, and the rows before the first step. With `more`, a fused step leaves sums for the next
-# one.
+# A step, and the rows before the first. With `more`, a fused step leaves sums for the next.
 step, begin = _taking(rows_of), _taking(first_rows)
 
 

@@ -2,9 +2,8 @@
 
 A scheme lists its stages once, in ``rows``. Four things are derived from them: the staged step, in
 which fixes act on points between stages; the fused step with the fewest passes over the points,
-whose first scatter joins the last pass of the previous step; the text of `karamelo-py check`; and
-the memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact
-(`plain`).
+whose first scatter joins the last pass of the previous step; the text of `karamelo-py check`; the
+memory traffic of `karamelo-py bench`. Scenes add rows for F-bar, XPIC, heat and contact (`plain`).
 """
 
 from collections import namedtuple
@@ -171,10 +170,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of a pass.
-
-    Strain depends on a preceding move, and on which step's velocity it uses.
-    """
+    """List the tasks of a pass; strain depends on an earlier move, and on the step of velocity."""
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -232,10 +228,7 @@ _FUSED: dict[type, Any] = {
 
 
 def fused(rows: Iterable[Any]) -> list[Any]:
-    """List the rows of a step with the fewest passes.
-
-    Nodal sums must exist at its start.
-    """
+    """List the rows of a step with the fewest passes. Nodal sums must exist at its start."""
     return _FusedStep(rows).rows
 
 

@@ -1,7 +1,6 @@
 """Views of a point, `pt`, and of a node in its stencil, `node`, which equations use.
 
-Views exist only while a kernel is traced. docs/house/kernels.md lists their attributes, with shapes
-and units.
+Views exist only while a kernel is traced. docs/house/kernels.md lists their attributes.
 """
 
 from collections import namedtuple

@@ -119,10 +119,7 @@ class Forms:
 
 
 def number(hub: Scene, argument: Any, name: str, expected: str | None = None) -> float:
-    """Return a finite constant.
-
-    In a rehearsal, the result of a run is NaN.
-    """
+    """Return a finite constant. In a rehearsal, the result of a run is NaN."""
     value = argument.value(hub)
     if isinstance(value, float):
         return finite(hub, value, name, argument)

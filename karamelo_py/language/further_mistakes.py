@@ -34,8 +34,7 @@ _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 class Dependents:
     def __init__(self) -> None:
         self.names: set[str] = set()
-        # Kinds of parts to which an unknown name may belong, and kinds of which no part was
-        # deleted.
+        # Kinds of parts that an unknown name may have, and kinds of which no part was deleted.
         self.kinds: set[str] = set()
         self.undeleted: set[str] = set()
         self.lacks_columns = False

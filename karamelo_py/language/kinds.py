@@ -29,7 +29,7 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Keyword:
-    """Marks a field that is given as ``name=value``; by default, the name is that of the field."""
+    """Marks a field that is given as ``name=value``; by default the field's name is used."""
 
     name: str = ""
 
@@ -148,8 +148,7 @@ class Kind:
     """Description of an argument, and its conversion.
 
     If there are `words`, only these are accepted. `family` is set if the argument names a style of
-    this family. If `with_numbers`, other arguments ``name=value`` of the call are numbers in the
-    formula.
+    this family. If `with_numbers`, arguments ``name=value`` of the call are numbers in it.
     """
 
     text: str

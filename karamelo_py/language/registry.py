@@ -94,10 +94,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Remove an imported module if it is from another folder.
-
-    Returns True if this folder has a module of that name.
-    """
+    """Remove an imported module of another folder; return True if this folder has that module."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:
@@ -150,10 +147,7 @@ def find(family: str, name: str) -> Any:
 
 
 def called(family: str, ID: str, name: str) -> Any:
-    """Return a style as `find` does.
-
-    If the style was written before the ID, the error says so.
-    """
+    """Return a style as `find` does. If the style was written before the ID, the error says so."""
     if not knows(family, name) and knows(family, ID):
         message = f"'{ID}' is a style, and the ID comes first"
         raise ScriptError(message, argument="ID", expected=f"{family}(ID, {ID}, {name}, ...)")

@@ -56,10 +56,7 @@ EMPTY, KEYWORD = inspect.Parameter.empty, inspect.Parameter.KEYWORD_ONLY
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Return the parameters of a command or style, without the hub.
-
-    Raises TypeError for an annotation that is not supported.
-    """
+    """Return a command's or style's parameters without the hub; raises TypeError for others."""
     record = is_record(target)
     try:
         if record and not hasattr(target, "given"):
@@ -108,8 +105,7 @@ def call(
 ) -> Any:
     """Call a command or make a style; store the arguments in `converted`.
 
-    `name` is used in messages, such as ``run`` or ``fix body_force``. Raises ScriptError, with a
-    mark.
+    `name` is for messages, such as ``run`` or ``fix body_force``. Raises ScriptError with a mark.
     """
     if arguments and target in FORMS:
         # The word of a form takes precedence over a variable.

@@ -72,7 +72,7 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # The blank is for a minus sign. The first column has none, since pandas would read it as a
+        # The blank is for a minus sign. The first column has none: pandas would read it as a
         # column.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()

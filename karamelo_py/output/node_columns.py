@@ -174,8 +174,7 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 def brought(simulation: Any, name: str) -> np.ndarray:
     """Return sums (nodes, 2) of N times a value over the points of this process.
 
-    The columns are a multiple of a unit and a remainder, so that their sum has more digits than a
-    double.
+    The columns, a multiple of a unit and a remainder, have more digits together than a double.
     """
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))

@@ -485,8 +485,7 @@ class SpacePicture(PlanePicture):
         places = self._project(x)
         shows = np.flatnonzero(self._shows(places, side))
         ids, places, values = ids[shows], places[shows], values[shows]
-        # Sort from far to near, then by id. As integers, the bits of negative floats are ordered by
-        # magnitude.
+        # Sort from far to near, then by id. As integers, negative floats are ordered by magnitude.
         bits = places[:, 2].astype(np.float32).view(np.int32).astype(np.int64)
         keys = np.where(bits < 0, -0x80000000 - bits, bits) << 32 | ids.astype(np.int64)
         rows = super()._rows(keys, places, values, side)
@@ -539,10 +538,7 @@ class SpacePicture(PlanePicture):
         return colours
 
     def _light(self, x: np.ndarray, side: float, some: np.ndarray) -> np.ndarray:
-        """Return the light on `some` points.
-
-        The normal of the surface points to the side with fewer points.
-        """
+        """Return the light on `some` points; normals point to the side with fewer points."""
         lo, size = x.min(axis=0), np.ptp(x, axis=0)
         cell = max(1.5 * side, size.max() / 120, np.finfo(float).tiny)
         at = (x - lo) / cell + 2

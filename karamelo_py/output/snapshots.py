@@ -27,10 +27,7 @@ class Snapshot(NamedTuple):
 
 
 def read(path: Path, first: int = 0) -> Iterator[Snapshot]:
-    """Yield snapshots from number `first` on.
-
-    Raises ScriptError if the file is not a dump.
-    """
+    """Yield snapshots from number `first` on. Raises ScriptError if the file is not a dump."""
     readers: dict[str, Callable[[Path, int], Iterator[Snapshot]]] = {
         ".h5": _hdf5, ".hdf5": _hdf5, ".vtu": _vtu, ".pvd": _pvd,
     }  # fmt: skip

@@ -85,10 +85,9 @@ def rub(mu, load, memory, stop):
 
     The force `stop` = m v/dt would stop a free point, but loaded points would creep. Therefore slip
     also stretches a spring as stiff as the normal contact, whose force `hold` is returned to the
-    friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). Points bounce on a
-    stiff contact. Therefore friction that earlier steps left `unused` may be used later, up to mu
-    times the `mean` load. On a point that always slides, friction is mu times the load of each
-    step.
+    friction cone (Wriggers 2006, "Computational Contact Mechanics", chapter 5). As points bounce on
+    stiff contacts, friction left `unused` by earlier steps may be used later, up to mu times the
+    `mean` load. On a point that always slides, friction is mu times the load of each step.
     """
     hold, mean, unused = memory
     mean = mean + NEW * (load - mean)

@@ -33,8 +33,7 @@ GROWING = 2  # windows of growth before a warning
 def unknown_work(hub: Hub) -> str:
     """Return the source of work that is not tracked, or "".
 
-    Work of compiled hooks is summed. A Python fix declares by `Fix.conserves` that it does no other
-    work.
+    Work of compiled hooks is summed. Python fixes declare by `Fix.conserves` that they do none.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)

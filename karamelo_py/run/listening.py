@@ -28,10 +28,7 @@ class Listener:
     """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step has been chosen, and nothing is compiled yet.
-
-        `resumed`: the run continues from a restart file.
-        """
+        """The first step is chosen, nothing is compiled; `resumed`: from a restart file."""
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
         """Compilation is done."""

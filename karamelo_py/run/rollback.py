@@ -24,10 +24,7 @@ class Stopped(ScriptError):
 
 
 def decide(status: int, *, grown: bool, halves: bool, returns: int) -> str:
-    """Return what to do after `status` or a gain of energy (`grown`).
-
-    `returns` is the number of returns to the last good state.
-    """
+    """Return what to do after `status` or an energy gain; `returns` counts earlier returns."""
     if status == DONE:
         return HALVE if grown and halves and returns < RETURNS else CONTINUE
     return HALVE if halves else STOP
@@ -39,7 +36,7 @@ class RollBack:
         self.point = RollbackPoint(hub, halve)
 
     def begin(self, simulation: Backend, first_step: int, ruined: bool, looks: bool) -> None:
-        """Begin with the present state, or with that of a file.
+        """Begin with the present state, or with the state in a file.
 
         `ruined`: the step was too large in the run that wrote the file.
 

@@ -71,10 +71,7 @@ def keeping_share(hub: Hub) -> float:
 
 
 def _keeps_velocities(hub: Hub) -> bool:
-    """Return True for FLIP and similar transfers, without moments and not with usl.
-
-    Points then carry their velocities through the grid.
-    """
+    """Return True if points carry velocities: FLIP and similar, no moments, not usl."""
     update = hub.update
     return (
         update.method.frame.moves

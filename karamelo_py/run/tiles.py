@@ -80,8 +80,7 @@ class Tiles:
         self._steps = grid_boxes.steps_of(self._nodes)
         self.shapes = -(-self._cells // self.size)
         self.first = grid_boxes.numbered(self.shapes)
-        # In the total frame, points reach at most two cells beyond their tile, or three with
-        # contact.
+        # In the total frame, points reach at most two cells beyond their tile (contact: three).
         far = 2 if len(lattices) == 1 else 3
         widest = (self.size + 2 * far) * self.per_cell + 1 + 2 * self.beyond
         widest = np.minimum(widest, self._nodes)

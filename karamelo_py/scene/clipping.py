@@ -44,8 +44,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
     Returns the mask of boxes that reach into the region, and the pieces of cut boxes.
 
-    Boxes are first cut at the domain and at the region's bounding box, so that faces along axes are
-    exact.
+    Boxes are first cut at the domain and the region's bounding box: faces along axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -72,10 +71,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger pieces of adjacent boxes.
-
-    The fractions of the small pieces become 0.
-    """
+    """Merge small pieces into the nearest larger ones of adjacent boxes; they become 0."""
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -140,8 +136,7 @@ def _measure(
         whole &= inmost >= (0.5 - NOTHING) * edges.min(axis=0)
         passed = (np.abs(inmost) < reach) & ~whole
         slopes[:, ~passed] = 0
-        # If corners and centre are on the same side, the surface may still cross the box as a thin
-        # sheet.
+        # If corners and centre are on the same side, a thin sheet may still cross the box.
         unseen = np.abs(np.sign(depth).sum(axis=0)) == len(depth)
         edge = np.where(unseen, SHEET, EDGE) * edges.max(axis=0)
         bent = passed & (off > (edge if halved == HALVED else np.minimum(edge, PLANE * size)))

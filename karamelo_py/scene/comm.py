@@ -12,8 +12,7 @@ import numpy as np
 from karamelo_py.script.errors import ScriptError
 
 T = TypeVar("T")
-# SIGINT comes from Ctrl-C, SIGTERM from batch systems and kill, SIGHUP from a closed terminal (not
-# on Windows).
+# SIGINT: Ctrl-C; SIGTERM: batch systems and kill; SIGHUP: closed terminals (not on Windows).
 NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 ENDING = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
 

@@ -141,10 +141,7 @@ def numbered(lattices: Sequence[Lattice]) -> list[Lattice]:
 
 
 def boxes(first: Sequence[int], last: Sequence[int], weight: int) -> Iterator[np.ndarray]:
-    """Yield indices (m, d) from `first` to `last`, last axis fastest.
-
-    m is about CHUNK / `weight`.
-    """
+    """Yield indices (m, d) from `first` to `last`, last axis fastest; m ~ CHUNK / `weight`."""
     for begin, end in chunks(first, last, weight):
         yield positions(first, last, begin, end)
 

@@ -29,10 +29,7 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Numbers of bytes, including swap.
-
-    Caches that the system does not report (ZFS) do not count as `free`.
-    """
+    """Bytes, including swap; caches that the system does not report (ZFS) are not `free`."""
 
     free: float
     whole: float
@@ -41,8 +38,7 @@ class MachineMemory(NamedTuple):
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
     """Return the memory available to `processes`, or None if the system does not report it.
 
-    The limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) are
-    respected.
+    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) count.
     """
     import psutil
 

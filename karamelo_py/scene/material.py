@@ -12,8 +12,7 @@ class MaterialPart(Named):
 
     `kind` is a family such as ``eos``, and `style` its member.
 
-    `made` is the law; if the style makes several, `laws` are the laws by kind. `given` are the
-    arguments.
+    `made` is the law, or `laws` are several laws by kind; `given` are the arguments.
     """
 
     def __init__(

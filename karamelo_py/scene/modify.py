@@ -109,14 +109,12 @@ class Fix(Publisher):
     # Contact does not change these velocities.
     prescribes_velocity = False
     prescribes_rotation = False  # prescribes the angular velocity of nodes, whose torque is ID_s
-    # Directions in which nodes are held or bounded. Splines are modified at cell faces whose nodes
-    # are all held.
+    # Directions in which nodes are held or bounded. Splines change at faces whose nodes are all
+    # held.
     held_directions: tuple[int, ...] = ()
-    # Friction coefficient (formula) of this wall in directions without a formula; None:
-    # frictionless.
+    # Friction coefficient (formula) of this wall in directions without a formula, or None.
     wall_friction: Any = None
-    # Declared fields (`compiler.fields`). A fix that sets forces on points in ``initial_integrate``
-    # lists `Force`.
+    # Declared fields (`compiler.fields`); `Force` if ``initial_integrate`` sets forces on points.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
     by_sizes = False  # takes sizes of points from their volumes, for a thickness of 1
@@ -137,11 +135,9 @@ class Fix(Publisher):
     brakes = False
     water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
-    # True: Python hooks add no energy except work that is summed. If False, the energy balance is
-    # not monitored.
+    # True: Python hooks do no work that is not summed. False: the energy balance is not monitored.
     conserves = False
-    # Steps between calls of ``between_steps()``, which returns True if it deleted points;
-    # 0: no calls.
+    # Steps between calls of ``between_steps()`` (0: none), which returns True if it deleted points.
     every = 0
     friction: float | None = None  # between the two `solids`, in contact on the grid
     solids: tuple = ()  # solids of a fix without a group

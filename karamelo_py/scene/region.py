@@ -95,8 +95,7 @@ class Region(Named):
         """Return the depth (n,) of `x` (n, >= d), negative outside, ignoring `exterior`.
 
         Depths may be underestimated and cut off at `reach`, but must be linear near plane parts of
-        the surface. The default tests `contains` along the axes, and misses shapes thinner than
-        `reach`.
+        the surface. The default tests `contains` along the axes, and misses thinner shapes.
         """
         d = self.dimension
         reach *= math.sqrt(d)
@@ -137,10 +136,7 @@ def split_exterior(arguments: Sequence[Argument]) -> tuple[Sequence[Argument], b
 
 
 def check_order(lo: float, hi: float, names: Sequence[str], argument: int) -> None:
-    """Raise ScriptError if a lower end is above its upper end.
-
-    `argument` is the argument number of the lower end.
-    """
+    """Raise ScriptError if a lower end, argument number `argument`, is above its upper end."""
     if lo > hi:
         raise ScriptError(
             f"{names[argument]} = {lo:g} is above {names[argument + 1]} = {hi:g}",

@@ -113,10 +113,7 @@ class Solid(Named):
             )
 
     def put(self, hub: Scene, placement: Placement, *, may_be_empty: bool = False) -> None:
-        """Store the points.
-
-        Raises ScriptError for no points, too many, or points at x < 0 if axisymmetric.
-        """
+        """Store the points. Raises ScriptError for no or too many points, and for radii below 0."""
         count, d = len(placement.x0), self.domain.dimension
         if not count and not may_be_empty:
             raise ScriptError(
@@ -140,7 +137,7 @@ class Solid(Named):
             volume = volume * self.domain.depth(placement.x0[:])
         else:
             volume = volume * self.domain.thickness
-        # As in `Placement`, but per radian if axisymmetric. Read-only; equal values are stored
+        # As in `Placement`, but per radian if axisymmetric; read-only; equal values are stored
         # once.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))

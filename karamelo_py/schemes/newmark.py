@@ -24,7 +24,7 @@ def _damping(scheme: "Newmark") -> str:
 
 
 class Newmark(NamedTuple):
-    """Implicit steps with inertia, longer than those of explicit schemes (Newmark 1959).
+    """Implicit steps with inertia, longer than explicit ones (Newmark 1959).
 
     The step must be set by `set_dt`. Vibrations faster than the step are damped only if `gamma` is
     above 1/2, `rho` below 1, or the rule euler. The acceleration at the beginning of a step is

@@ -26,8 +26,7 @@ CLOSE = (
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# A larger tolerance would accept the first correction without equilibrium; a smaller one is below
-# round-off.
+# A larger tolerance would accept a first correction without equilibrium; a smaller is round-off.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 
@@ -48,7 +47,7 @@ class QuasiStatic(NamedTuple):
         ``auto``: amg from 2000 unknowns in 3D, and from 5000 in 2D if the matrix is symmetric.
     stabilisation
         Ghost stabilisation (Coombs 2023) for nodes that overlap only a sliver of the body: jumps of
-        gradients at the border are penalised with this fraction of Young's modulus. 0 turns it off.
+        gradients at the border are penalised with this fraction of Young's modulus. 0: none.
     limit
         Action if no equilibrium is found even with 1/1024 of a step: ``error``, or ``stop``, which
         ends the run. After ``stop``, the script continues with the `time` of the last equilibrium,

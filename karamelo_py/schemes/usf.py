@@ -11,8 +11,8 @@ class USF(NamedTuple):
     """Update the stress before the forces, with the nodal velocity at the start of the step.
 
     Points have already moved with this velocity, so F is multiplied by (I - dt grad v)^-1, with
-    gradients at present positions. The published I + dt grad v adds energy and shrinks bodies that
-    rotate.
+    gradients at present positions. The published I + dt grad v adds energy and shrinks rotating
+    bodies.
 
     The log shows stress, volume and strain at the beginning of a step (usavg: with half of the
     increment). With rate-form laws, a rotation by w dt in a step causes a volume strain of -(w

@@ -72,8 +72,7 @@ class ScriptError(Exception):
     others: "list[ScriptError]" = field(default_factory=list)
     # The correct statements, for syntax errors.
     statements: list = field(default_factory=list)
-    # Kind of message (codes.toml); wrong word; kind of part that it should name; similar known
-    # name.
+    # Kind of message (codes.toml); wrong word; kind of part it should name; similar known name.
     code: str = ""
     name: str | None = None
     kind: str = ""

@@ -44,8 +44,7 @@ def _select(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# Functions that have a separate loop each. One loop for all others selects the function for each
-# number.
+# Functions with a separate loop; one loop for all others selects the function per number.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")

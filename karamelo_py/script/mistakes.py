@@ -1,7 +1,6 @@
 """Explain syntax errors.
 
-Tokens are passed to Lark's parser one by one, so that the token at which it stops and its stack are
-known.
+Lark's parser gets the tokens one by one, so that the token at which it stops is known.
 """
 
 import re

@@ -40,10 +40,7 @@ def read_bytes(path: Path, largest: int | None = LARGEST) -> bytes:
 
 
 def read_text(path: Path, largest: int | None = LARGEST) -> str:
-    """Read a text.
-
-    Raises OSError, or ValueError if the file is not a text.
-    """
+    """Read a text. Raises OSError, or ValueError if the file is not a text."""
     data = read_bytes(path, largest)
     for mark, code in _CODES:
         if data.startswith(mark):

@@ -115,8 +115,7 @@ class Measured(NamedTuple):
     def limit(self) -> str:
         """The component that takes at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
-        Otherwise it is ``arithmetic`` (instructions or latency), or ``unknown`` if not
-        `told_apart`.
+        Otherwise ``arithmetic`` (instructions or latency); ``unknown`` if not `told_apart`.
         """
         if not self.told_apart:
             return "unknown"

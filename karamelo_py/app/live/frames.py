@@ -38,10 +38,7 @@ class Frame(NamedTuple):
 
 
 def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
-    """Return a mask of about `POINTS` points, the same in all states.
-
-    Small solids are complete.
-    """
+    """Return a mask of about `POINTS` points, the same in all states. Small solids are complete."""
     counts = np.bincount(solids)
     least = np.minimum(counts, POINTS // (10 * np.count_nonzero(counts)))
     small = counts * POINTS < least * len(ids)

@@ -58,8 +58,7 @@ class StudyPage:
     def judge(self, judged: Callable, colours: Mapping[str, str]) -> None:
         """Colour runs by class.
 
-        ``judged(row)`` returns the row with its class and the reason; `colours` gives the colour of
-        each class.
+        ``judged(row)`` adds class and reason to a row; `colours` gives the colour of each class.
         """
         self._judged, self._about["classes"] = judged, {**colours}
 

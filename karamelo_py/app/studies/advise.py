@@ -260,8 +260,7 @@ class Adviser:
     def best(self) -> Candidate | None:
         """Return the best candidate, after all runs that may change it.
 
-        Choices that could become the cheapest are refined until their candidate is the next finer
-        variant.
+        Choices that could become the cheapest are refined to the variant before their candidate.
         """
         while True:
             best = next(iter(self.candidates()), None)

@@ -159,10 +159,7 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Return the label of a choice.
-
-    Values that mean nothing alone get the name of their variable.
-    """
+    """Label a choice; values without meaning alone get the name of their variable."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -171,8 +168,7 @@ def label(choice: Mapping[str, str]) -> str:
 class Family:
     """Lines of runs, distinguished by the variables `by` and by all others that differ.
 
-    `along` is the variable that changes along a line; by default, it is the number with the most
-    values.
+    `along` changes along a line; by default, it is the number with the most values.
     """
 
     def __init__(

@@ -41,8 +41,7 @@ from karamelo_py.script.syntax import CommandCall
 PATIENCE = 10  # seconds for a scheduler to answer
 TO_CLOSE = 3  # seconds for connections to close
 TRIES = 3
-# Options of a Dask cluster on this machine: its three processes then take 2 % of a core instead of
-# 10 %.
+# Dask cluster on this machine: its three processes take 2 % of a core instead of 10 %.
 FRUGAL = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.tick.interval": "1s",
@@ -279,8 +278,7 @@ class Elsewhere:
     ):  # fmt: skip
         """Store how to reach the machines.
 
-        `send` makes contents known to the machines; its result is passed to a machine that asks for
-        them.
+        `send` makes contents known to the machines; its result goes to those that ask.
 
         `workers` returns the number of threads of each worker by address, or nothing if workers
         cannot be chosen.

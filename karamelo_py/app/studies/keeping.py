@@ -49,10 +49,7 @@ def look_at(
     row: Mapping[str, str], folder: Path, over: str, column: str, *, within: float = WITHIN,
     parts: Container[str] = (),
 ) -> Kept:  # fmt: skip
-    """Classify a run.
-
-    The computes `parts` are components of the energy, which may fall or grow.
-    """
+    """Classify a run. The computes `parts` are components of the energy, which may fall or grow."""
     run_folder = folder / row["folder"]
     messages = record_of(run_folder).get("messages", [])
     causes = tuple(dict.fromkeys(_general(note) for note in messages))
@@ -82,8 +79,7 @@ def _general(note: Mapping[str, str]) -> str:
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
     """Return a Markdown table with a row for each value of the variables `by`, and silent failures.
 
-    Numbered messages follow the table. Variables that depend only on the row variables get no
-    columns.
+    Numbered messages follow. Variables that depend only on the row variables get no columns.
     """
     rows = table.rows
     keys = [tuple(row[name] for name in by) for row in rows]

@@ -234,8 +234,7 @@ def histories(
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     """Return a mask (n,) of rows with increasing time.
 
-    A stopped run ends with an earlier good state. A run that went back has rows that were discarded
-    later.
+    A stopped run ends with an earlier good state. One that went back has discarded rows.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)

@@ -162,17 +162,13 @@ class Study:
         compiled = {kind_of(key) for key in self.rows}
 
         def ready() -> Any:
-            """Return the next case.
-
-            The first case of a kind starts before others of this kind, because it compiles.
-            """
+            """Return the next case; the first of a kind starts before others, as it compiles."""
             kinds = (((case, folder), kind_of(case.values())) for case, folder in queue)
             return next((i for i, kind in kinds if kind in compiled or kind not in started), None)
 
         try:
             while queue or running:
-                # Each of several places has a next case ready, so that it need not wait for this
-                # process.
+                # Several places each have a next case ready, and need not wait for this process.
                 size = self.place.size
                 while len(running) < size + size * (size > 1) and (item := ready()):
                     queue.remove(item)

@@ -121,10 +121,7 @@ class ArgumentBuffer:
         return words, arrays
 
     def in_memory(self, plan: Plan, at: int | None = None) -> tuple[bytearray, int]:
-        """Write the arguments for memory that begins at `at`.
-
-        Returns the bytes, and the address of the tuple.
-        """
+        """Write the arguments for memory at `at`; return the bytes and the tuple's address."""
         memory = bytearray(max(plan.text.size, 1))
         if at is None:
             at = ctypes.addressof(ctypes.c_char.from_buffer(memory))

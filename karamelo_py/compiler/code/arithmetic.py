@@ -473,7 +473,7 @@ OPERATIONS: dict[Any, Callable] = {
 }
 
 
-# NumPy's names of these functions, and its functions that convert to reals.
+# NumPy's names of functions, and its functions that convert to reals.
 _IN_NUMPY = {
     "absolute": abs, "add": operator.add, "subtract": operator.sub, "multiply": operator.mul,
     "true_divide": operator.truediv, "negative": operator.neg, "power": operator.pow,

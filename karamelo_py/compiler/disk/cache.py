@@ -2,8 +2,8 @@
 
 A file ``.kernel`` contains the name, result and callees of a kernel. Its key is a hash of the
 function, the argument types and the sources of the code that writes kernels. If this file is
-missing, the kernel is traced, and its machine code is looked up in a file ``.code`` by the hash of
-the LLVM text.
+missing, the kernel is traced, and its machine code is sought in a file ``.code`` by the hash of the
+LLVM text.
 
 Since files become code, a file is read only if its checksum is correct and no other user can write
 it. Otherwise the kernel is compiled, with a warning.

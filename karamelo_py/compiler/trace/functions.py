@@ -219,8 +219,7 @@ def outdate_kernels() -> None:
 class PointFunction:
     """Function of one point, implemented for classes of its first `tags` arguments.
 
-    Plain Python selects the implementation by the arguments' classes, kernels select it by their
-    types.
+    Plain Python selects by the arguments' classes, kernels select by their types.
     """
 
     def __init__(self, stub: Callable, tags: int, otherwise: bool):

@@ -99,9 +99,7 @@ def item_of(builder: ir.IRBuilder, kind: HeldTuple, pointer: ir.Value, k: int) -
 
 
 def at_hand(value: Any) -> Any:
-    """Copy a held tuple to private memory before a loop, so that LLVM can retain items in
-    registers.
-    """
+    """Copy a held tuple to private memory before a loop, so that LLVM can use registers."""
     return value
 
 

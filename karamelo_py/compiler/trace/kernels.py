@@ -246,8 +246,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain the function, so a different function does not require compiling them
-    again.
+    Callers do not contain the function, so another function needs no new compilation of them.
     """
     key = function, signature, session.changes
     addresses = session.addresses

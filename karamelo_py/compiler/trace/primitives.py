@@ -70,8 +70,7 @@ def point_function(
     compile time. With ``otherwise`` the decorated function is the default.
 
     Implementations process one point, or several in lanes (:mod:`karamelo_py.compiler.lanes`).
-    Functions that branch must be listed in ``scalarised`` of a class, and are called point by
-    point.
+    Functions that branch are listed in ``scalarised`` of a class, and called point by point.
     """
 
     def declare(stub: Callable) -> PointFunction:
@@ -145,10 +144,7 @@ def _round_off(template):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index.
-
-    This saves a test per access, 10 % of a sweep.
-    """
+    """Return `i` as a non-negative array index. This saves a test per access, 10 % of a sweep."""
     return i
 
 

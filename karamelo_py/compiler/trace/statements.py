@@ -59,7 +59,7 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
 
 @functools.cache
 def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """List functions by name and first line, which is that of the first decorator."""
+    """List functions by name and first line, including decorators."""
     functions: dict[tuple[str, int], list] = {}
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.FunctionDef):
@@ -212,8 +212,6 @@ class AstCompiler:
     def branches(self) -> bool:
         return bool(self.depth or self.returns or self.breaks or self.continues)
 
-    # --- branches
-
     def edge(self) -> Edge:
         return self.flow.edge(self.names)
 
@@ -241,8 +239,6 @@ class AstCompiler:
             self.depth -= 1
             edges += self.here()
         self.meet(edges)
-
-    # --- expressions
 
     def do(self, node: ast.AST) -> Any:
         return _COMPILED.get(type(node), AstCompiler.unknown)(self, node)
@@ -467,8 +463,6 @@ class AstCompiler:
         return dict(self.comprehended(node, lambda: (self.do(node.key), self.do(node.value))))
 
     GeneratorExp = ListComp
-
-    # --- statements
 
     def block(self, statements: list[ast.stmt]) -> None:
         for statement in statements:

@@ -64,9 +64,6 @@ WAYS = "xlo", "xhi", "ylo", "yhi", "zlo", "zhi", "surface", "volume"
 SMALL = 1e-4  # below this b, (1 - exp(-b)) / b is a series
 
 
-# --- fields ---------------------------------------------------------------------------------------
-
-
 class RelativeVelocity(Field):
     shape = vector
     columns = ("wx", "wy", "wz")
@@ -149,9 +146,6 @@ POINT_FIELDS = RelativeVelocity, UnseenPressure, WorkOfForces
 NODE_FIELDS = (
     WaterSums, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
 )  # fmt: skip
-
-
-# --- points to nodes ------------------------------------------------------------------------------
 
 
 def _is_wet(pt):
@@ -325,9 +319,6 @@ class WaterMomentumAgain(eq.NodalQuantity):
             lambda pt, w: (pt.water[0] * pt.water_v, ()) if len(pt.water) else (),
         ),
     )
-
-
-# --- at the nodes ---------------------------------------------------------------------------------
 
 
 def _taken_up(b):
@@ -526,9 +517,6 @@ class MakeFlux(NamedTuple):
             dv += out[n, d + k]
             work += w * (m * dv - dt * pushed[k])
         field(nodes.fields, WorkAtNodes)[n, 0] += work
-
-
-# --- nodes to points ------------------------------------------------------------------------------
 
 
 class MoveWater(eq.Task):

@@ -23,8 +23,7 @@ class BasisTraits(NamedTuple):
     nodes_per_cell: int = 1  # 2 with mid-nodes
     # gradients jump at cell faces; points that cross add energy, less with smaller steps
     gradient_jumps: bool = False
-    # Stable step / (h/c) at low speed: in the updated frame, there with usf, and in the total
-    # frame.
+    # Stable step / (h/c) at low speed: updated frame, the same with usf, total frame.
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
@@ -36,7 +35,7 @@ class BasisTraits(NamedTuple):
     # Fraction of the stable step with corrected accelerations (updated frame)
     corrected_share: float = 0.8
     bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
-    drift_limits: DriftLimits | None = None  # None: those of similar bases
+    drift_limits: DriftLimits | None = None  # None: as for similar bases
     # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     # ``deformation`` (F in 2D or 3D), ``corners`` (of the `element`)
     shape: tuple[str, ...] = ()

@@ -56,8 +56,7 @@ class JohnsonCookDamage(NamedTuple):
     Parameters
     ----------
     d1, d2, d3
-        Failure strain d1 + d2 exp(d3 t) at the reference rate, with t = mean stress / von Mises
-        stress.
+        Failure strain d1 + d2 exp(d3 t) at the reference rate; t = mean stress / von Mises stress.
     d4
         Rate coefficient; 0 for none.
     d5

@@ -114,10 +114,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """Return a law that also stores its plastic strain rate, for cells of size `h`.
-
-    The rate is the last number of the state.
-    """
+    """Return a law that also stores its plastic strain rate (last), for cells of size `h`."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

@@ -67,8 +67,7 @@ class HyperelasticFormula(OfInvariants, Fields):
         Heat capacity per unit mass, conductivity and coefficient of linear expansion of a material
         with a temperature, as for neo-hookean.
     T
-        Temperature at which the formula is checked; also the initial temperature, unless the solid
-        sets one.
+        Temperature for checking the formula; also the initial one, unless the solid sets one.
 
     Example
     -------

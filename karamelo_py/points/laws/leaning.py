@@ -12,10 +12,7 @@ LEANING: dict[type, Callable[[Any, Any], bool]] = {}  # by kind of law
 def warn_of_leaning(
     kind: type, of: str, when: Callable[[Any, Any], bool], cure: str, title: str = "directions"
 ) -> None:
-    """Warn if a law of `kind` would shear out of the plane of a scene.
-
-    ``when(law, scene)`` returns True in this case.
-    """
+    """Warn if a law of `kind` would shear out of the plane: if ``when(law, scene)`` is True."""
     LEANING[kind] = when
     known_failure(
         kind,

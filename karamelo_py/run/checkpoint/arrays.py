@@ -90,8 +90,7 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
 def stored(simulation: SceneState, kept: dict[str, np.ndarray] | None = None) -> Iterator[Stored]:
     """Yield the content of a restart file for the present state, or for the `kept` one.
 
-    All ranks call this; rank 0 gets the arrays, in the same order and bit for bit as in a serial
-    run.
+    All ranks call this; rank 0 gets the arrays, bit for bit as in a serial run.
     """
     if not kept:
         simulation.bring()

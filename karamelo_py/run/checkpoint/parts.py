@@ -252,10 +252,7 @@ class RollbackPoint:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps to `end`, and return the status.
-
-        States of parts are restored at the steps where they were noted.
-        """
+        """Repeat the steps to `end`; restore states of parts at noted steps; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

@@ -104,8 +104,7 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and derivatives of the forces.
 
-        With `supposed`, `u` is not yet known, and the contact and sticking of the last step are
-        assumed.
+        With `supposed`, `u` is not known yet; contact and sticking are as in the last step.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u
@@ -175,8 +174,7 @@ class Contact:
         """Add the effect of contact at the beginning of the step to accelerations `a` (m, d).
 
         Approaching pairs in contact get zero relative normal acceleration. Pairs that stuck get
-        zero relative acceleration in all directions; other pairs slide with the velocities `v` (m,
-        d).
+        zero relative acceleration; other pairs slide with the velocities `v` (m, d).
         """
         B, touched, stuck = self._across(), self.touched(), self.touched(-1)
         touched = touched & (B @ a.ravel() > 0)  # other pairs may separate

@@ -166,7 +166,7 @@ class Equations:
     def _find_pairs(self, stabilised: bool) -> None:
         """Find the pairs of nodes in common stencils, and lay out K, a block per pair.
 
-        The pairs include those of the ghost stabilisation, and each node with itself.
+        The pairs include pairs of the ghost stabilisation, and each node with itself.
         """
         d, k, m = self.d, self.per_node, len(self.nodes)
         ways = (x[seen.nodes] for x in self.places.T for seen, _ in self.parts)

@@ -346,8 +346,7 @@ class LoadSteps:
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at their nodes, and set nodal velocities.
 
-        A fix gets the velocity that nodes would have without it. On rigid solids, all other forces
-        act.
+        A fix gets the velocity that nodes would have without it. On rigid solids, other forces act.
         """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update

@@ -104,7 +104,7 @@ class Seepage:
         self.drains = self.suction < self.K
         ratio = self.content / self.pores
         self.before = self._scale(ratio - 1) * np.log(ratio)
-        # Weight and mobility are those of water that fills the pores.
+        # Use weight and mobility of water that fills the pores.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)

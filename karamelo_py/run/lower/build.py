@@ -222,8 +222,7 @@ def lower(
 ) -> tuple[arrays.Setup, Tiles]:  # fmt: skip
     """Make the arrays of a run from the scene, with the `previous` state of existing points.
 
-    With `ids` (first, end), the arrays contain only these points, and the tiles of this process of
-    `comm`.
+    With `ids` (first, end), the arrays contain these points only, and this process's tiles.
     """
     comm = comm or hub.settings.comm
     method = hub.update.method

@@ -228,8 +228,7 @@ def _call(simulation: SceneState, fix: Fix, hook: Callable, view: PointsView | N
 
     If each process calls it for its own points, check that all processes agree.
 
-    With different collective calls, processes would deadlock; published values that differ are
-    partial sums.
+    Different collective calls would deadlock; published values that differ are partial sums.
     """
     with blaming(fix.mark):
         hook(view)

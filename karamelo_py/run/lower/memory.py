@@ -1,7 +1,6 @@
 """Memory of a scene, or of the part on one process; a scene that does not fit is refused.
 
-The minimum that a run needs is compared with the memory, so a scene that could run is never
-refused.
+Only the minimum that a run needs is compared: no scene that could run is refused.
 """
 
 import gc

@@ -61,8 +61,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
 
 
 IMBALANCE = 1.1  # factor by which a new division must reduce the largest work
-# Ratio of lengths above which bodies are cut along long tiles. Loops over rows with gaps are half
-# as fast.
+# Ratio of lengths above which bodies are cut along long tiles; gaps in rows make loops slow.
 ROWS = 4
 OF_TILES = ("number", "range", "grid", "box", "rows")
 FINE = 1000  # the cost of a tile is an integer, in this fraction of a unit

@@ -1,7 +1,6 @@
 """Meshes in Abaqus or CalculiX decks: parts, instances, sets, surfaces, generated nodes.
 
-Further keywords that move or copy nodes raise ScriptError (Abaqus Keywords Reference; CalculiX
-manual).
+Keywords that move or copy nodes are errors (Abaqus Keywords Reference; CalculiX manual).
 """
 
 import re

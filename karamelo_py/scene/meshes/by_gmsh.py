@@ -122,8 +122,7 @@ def read_by_gmsh(path: Path) -> Mesh:
 class _Header:
     """File content that Gmsh's library drops: names of empty groups, and groups by element.
 
-    When Gmsh reads format versions 1 and 2, it puts all elements of an entity into all groups of
-    the entity.
+    For format versions 1 and 2, Gmsh puts all elements of an entity into all its groups.
     """
 
     def __init__(self, path: Path):

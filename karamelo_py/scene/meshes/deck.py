@@ -175,10 +175,7 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name.
-
-    A deck may have many sets, so each is a function that lists its numbers in the mesh.
-    """
+    """Sets by name, as functions that list numbers in the mesh, since a deck may have many sets."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)

@@ -89,9 +89,8 @@ def elements_of(
 ) -> list[MeshElements]:
     """Return elements of `dimension` in a mesh or its `group`, one item per type.
 
-    With `lower`, groups of lower dimension, such as a boundary, are accepted. Raises ScriptError if
-    there are no elements, if a type is not supported, and if nodes are off z = 0 in 2D or off the x
-    axis in 1D.
+    With `lower`, groups of lower dimension, such as a boundary, are accepted. Raises ScriptError
+    for missing elements, unsupported types, and nodes off z = 0 in 2D or the x axis in 1D.
     """
     chosen = mesh.chosen(group)
     of = f"group '{group}'" if group is not None else "the mesh"
@@ -197,10 +196,7 @@ def _bulge(shape: Shape, nodes: np.ndarray, reference: tuple) -> float:
 
 
 def _once(numbers: np.ndarray) -> np.ndarray:
-    """Drop repeated elements.
-
-    Older formats repeat elements that are in two physical groups.
-    """
+    """Drop repeated elements. Older formats repeat elements that are in two physical groups."""
     _, first = np.unique(np.sort(numbers, axis=1), axis=0, return_index=True)
     return numbers[np.sort(first)]
 

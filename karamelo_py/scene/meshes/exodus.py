@@ -63,10 +63,7 @@ def _variables(path: Path) -> dict[str, tuple[np.ndarray, str]]:
 
 
 def read_exodus(path: Path) -> Mesh:
-    """Read blocks, side sets and node sets.
-
-    Raises KeyError or OSError for files of other formats.
-    """
+    """Read blocks, side sets and node sets; raises KeyError or OSError for other formats."""
     variables = _variables(path)
     arrays = {name: array for name, (array, _) in variables.items()}
 

@@ -74,10 +74,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def flat_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Return simplices (m, d, d).
-
-    In 3D, lines and nodes become triangles with repeated corners.
-    """
+    """Return simplices (m, d, d). In 3D, lines and nodes become triangles with repeated corners."""
     simplices: list[np.ndarray] = []
     for elements in parts:
         corners, d = elements.corners, elements.corners.shape[2]

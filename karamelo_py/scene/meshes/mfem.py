@@ -56,10 +56,7 @@ def _middles(elements: list[tuple[str, list[int]]], first: int) -> dict[frozense
 
 
 def read_mfem(path: Path) -> Mesh:
-    """Read a mesh, with attributes as groups.
-
-    Raises ValueError for unsupported content.
-    """
+    """Read a mesh, with attributes as groups. Raises ValueError for unsupported content."""
     text = re.sub(r"#.*", "", path.read_text("latin-1"))
     if not re.match(r"\s*MFEM mesh v1\.[0-3]\b", text):
         head = text.strip().splitlines()[0]

@@ -9,10 +9,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def read_obj(path: Path) -> Mesh:
-    """Read a file.
-
-    Polygons become triangles; objects and groups become sets.
-    """
+    """Read a file. Polygons become triangles; objects and groups become sets."""
     points: list[list[float]] = []
     faces: dict[int, list[list[int]]] = {3: [], 4: []}
     owners: dict[int, list[tuple[str, ...]]] = {3: [], 4: []}
@@ -28,7 +25,7 @@ def read_obj(path: Path) -> Mesh:
                 names[word] = tuple(rest)
             elif word == "f":
                 # Ignore texture and normal after a slash. Negative numbers count back from the last
-                # vertex.
+                # one.
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
                 if min(corners) < 0 or max(corners) >= len(points):

@@ -176,10 +176,7 @@ def _by_content(path: Path) -> Mesh:
 
 
 def _read_all(path: Path) -> None:
-    """Read all of an HDF5 file.
-
-    Raises ValueError if it is damaged, since Gmsh would crash.
-    """
+    """Read all of an HDF5 file. Raises ValueError if it is damaged, since Gmsh would crash."""
     import h5py
 
     def visit(_: str, item: h5py.Group | h5py.Dataset) -> None:
@@ -205,10 +202,7 @@ def _unreadable(path: Path, reason: str, hint: str | None = None) -> ScriptError
 
 
 def _skip_close(file: Any, depth: int) -> None:
-    """Skip to the closing bracket.
-
-    Raises an error if it is missing, as meshio's function would never end.
-    """
+    """Skip to the closing bracket, or raise ValueError: without it, meshio would never end."""
     while depth > 0:
         letter = file.read(1)
         if not letter:

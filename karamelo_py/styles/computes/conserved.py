@@ -129,8 +129,7 @@ class EnergyBalance(Compute):
     Parameters
     ----------
     work
-        Work that loads have done on the group since the start, a function of time and published
-        values.
+        Work of loads on the group since the start, a function of time and published values.
 
     Example
     -------

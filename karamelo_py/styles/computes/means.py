@@ -206,8 +206,7 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    The result is published as ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points that
-    fly ahead.
+    Published as ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points that fly ahead.
 
     Parameters
     ----------

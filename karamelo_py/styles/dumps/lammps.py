@@ -216,7 +216,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    Files are less than half as large as those of dump particle; everything else is the same.
+    Files are less than half as large; everything else is the same as in dump particle.
 
     Example
     -------
@@ -246,8 +246,8 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers have full precision, and are faster to write than text. Everything else is the same as
-    in dump particle.
+    Numbers have full precision, and are faster to write than text. The rest is the same as in dump
+    particle.
 
     Example
     -------
@@ -264,8 +264,7 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers have full precision, and are faster to write than text. Everything else is the same as
-    in dump grid.
+    Numbers have full precision and are faster to write; the rest is the same as in dump grid.
 
     Example
     -------

@@ -73,8 +73,7 @@ class PyPlot(Dump):
     scale
         log: colours show the logarithm of the field.
     quantile
-        Fraction of the values that lie below the lower colour limit, and above the upper one; for
-        example 0.01.
+        Fraction of the values below the lower colour limit, and above the upper one, such as 0.01.
     dpi
         Pixels per inch, by default 100. With 300, a width of 600 gives 1800 pixels.
     fontsize

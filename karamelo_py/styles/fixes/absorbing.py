@@ -137,10 +137,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return P and S wave speeds.
-
-    In saturated soil, they are multiplied by (saturated density) / (dry density).
-    """
+    """Return P and S wave speeds; in saturated soil, times saturated / dry density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

@@ -23,10 +23,7 @@ class EdgeHeat(OnEdge, HeatFix):
         self.region = region
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the surface.
-
-        The result is None for meshes, for which faces of the points' boxes are used.
-        """
+        """Return faces on the surface, or None for meshes, which use the faces of points' boxes."""
         filled = isinstance(solid.places, Filled)
         return whole_faces(solid, self.region, ids) if filled else None
 

@@ -313,8 +313,7 @@ class EdgeTraction(EdgeFix):
     gets the traction times the initial area of this face, as a dead load (magnitude and direction
     do not follow the deformation). The force acts at the point, half a box inside the edge. On a
     plane side, the total force is exactly traction times area. Faces of a hole are loaded too: for
-    a plate with a hole, use the region without the hole. In axisymmetry, area and force are per
-    radian.
+    a plate with a hole, use the region without the hole. Axisymmetric: per radian.
 
     A set of faces in a mesh file loads the nearest points of the group: ``region(top, mesh,
     deck.inp, TOP)`` and ``fix(lid, edge_traction, all, top, all, 0, -1e3)``.

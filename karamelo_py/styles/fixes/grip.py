@@ -37,7 +37,7 @@ def memory_for(hub: Hub, kind: type) -> type:
 
 class Gripping(Fix):
     remembers = ("has_touched",)
-    has_touched = False  # False as long as grips in a restart file can be those of an earlier fix
+    has_touched = False  # if False, grips in a restart file are from an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
     memories: tuple[type, ...] = ()  # fields that only this fix uses

@@ -124,8 +124,7 @@ class GroundMotion(VelocityNodes):
     ----------
     acceleration
         ax, ay, az, one per dimension: a formula of time, or a file with the columns time and
-        acceleration (if it has several, the columns named ax, ay, az). NULL leaves the direction
-        free.
+        acceleration (if it has several, the columns named ax, ay, az). NULL: free direction.
     through
         ID of a fix absorbing of the same nodes, for a compliant base. By default the base is rigid
         and its nodes have the velocity of the record.

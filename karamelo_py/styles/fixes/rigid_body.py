@@ -67,8 +67,7 @@ class RigidBody(Fix):
     force, torque
         Additional force at the centre and torque about it: functions of time and published values.
     motion, turning
-        Prescribed velocity of the centre, and prescribed angular velocity. NULL leaves a component
-        free.
+        Prescribed velocity of the centre and angular velocity. NULL leaves a component free.
     fixed
         Directions in which the body cannot move: any of x, y, z, and rx, ry, rz for rotation.
     pivot
@@ -102,9 +101,9 @@ class RigidBody(Fix):
     the body retains its velocity. In axisymmetry, bodies move only along the axis. Rigid bodies
     pass through held nodes, and, without fix contact/bodies, through each other.
 
-    In load steps (scheme quasi-static) with ulmpm/contacts, the loads on the body and its contact
-    forces are in equilibrium at the end of each step; motion and turning are displacements per unit
-    of time.
+    In load steps (scheme quasi-static) with ulmpm/contacts, loads and contact forces on the body
+    are in equilibrium at the end of each step; motion and turning are displacements per unit of
+    time.
 
     See Also
     --------
@@ -307,10 +306,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Return a formula or None for each axis.
-
-        `ways` are the directions of the components; numbers from 3 on are rotations.
-        """
+        """Return a formula or None for each axis; `ways` are directions, from 3 on rotations."""
         items: list[Expression | None] = [None] * size
         if components is None:
             return items

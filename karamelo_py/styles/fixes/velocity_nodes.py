@@ -259,8 +259,8 @@ class Reaction(Compute):
 
     Notes
     -----
-    The reactions of all fixes velocity_nodes in the group are summed. The sum is 0 before the first
-    step.
+    The reactions of fixes velocity_nodes in the group are summed; before the first step, they are
+    0.
 
     See Also
     --------

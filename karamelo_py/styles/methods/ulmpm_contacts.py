@@ -133,8 +133,7 @@ class ULMPMContacts(Method):
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
         """Return `nodes`, and the nodes that points reach from cells with all corners in `nodes`.
 
-        Splines and domains reach nodes beyond these corners; if those were free, the normal would
-        rotate.
+        Splines and domains reach more nodes; if these were free, the normal would rotate.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes

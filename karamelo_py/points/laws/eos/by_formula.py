@@ -120,10 +120,7 @@ class EosFormula(NamedTuple):
 def eos_of(
     rho0: float, formula: Expression, initial: tuple, style: str, kind: type = ByPressure
 ) -> NamedTuple:
-    """Build the law.
-
-    Raises ScriptError if, at rest, p is not finite or the bulk modulus is not positive.
-    """
+    """Build the law. Raises ScriptError unless p is finite and K positive at rest."""
     term = plain(formula, "p")
     slopes = [derivative(term, name) for name in NAMES[:2]]
     rest = dict(zip(NAMES, (1.0, *initial), strict=True))

@@ -36,8 +36,7 @@ class Remembered(NamedTuple):
 def remembers(strength: type, **numbers: float | str) -> None:
     """Declare a strength's history variables: names (also of dump columns) and initial values.
 
-    A value is a number or the name of a parameter; ``ep``, the equivalent plastic strain, comes
-    first.
+    A value is a number or the name of a parameter; ``ep`` (equivalent plastic strain) is first.
     """
     name = f"{strength.__name__}Memory"
     memory_class = namedtuple(name, numbers, module=strength.__module__)
