@@ -139,4 +139,5 @@ def pore_water(
             hint="a material takes the dry density, (1 - n) times the density of its grains",
         )
     k = KozenyCarman() if kozeny else ConstantPermeability()
-    material.fluid = PoreWater(n, drag, K, rho, k, K if suction is None else suction)
+    suction = K if suction is None else suction
+    material.fluid = PoreWater(n, drag, K, rho, k, suction, hub.update)

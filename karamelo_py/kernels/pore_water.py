@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import arrays
+from karamelo_py.kernels.equations import pore_pressure as pressures
 from karamelo_py.kernels.equations import pore_water as pores
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
@@ -11,7 +12,7 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import AtNodes, Company, NodeTask, companies
+from karamelo_py.kernels.table import AtNodes, Company, NodeTask, Once, companies
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -62,6 +63,58 @@ class Water(NamedTuple):
 @companies.on(Water)
 def _companies_water(tag):
     return COMPANIES
+
+
+def _foresee(s):
+    return pressures.Foresee(_rim(s), _surface(s))
+
+
+def _add_pressure(s):
+    return pressures.AddPressure(_rim(s), _surface(s))
+
+
+def _make_flux_of_step(s):
+    return pores.MakeFluxOfStep(_rim(s))
+
+
+# Nodal velocities that fixes hold are known before the pressure is solved for.
+SOLVE = (
+    AT_WATER,
+    NodeTask(pressures.ForgetVelocity()),
+    AtNodes(arrays.POST_VELOCITIES_TO_GRID, arrays.ON_VELOCITY),
+    NodeTask(pressures.Foresee, make=_foresee),
+    Once(pressures.solve),
+    NodeTask(pressures.AddPressure, make=_add_pressure),
+)
+COMPANIES_OF_SOLUTION = (
+    (MassMomentum, Company(then=(pores.WaterMomentum(),))),
+    (
+        InternalForce,
+        Company(
+            then=(
+                pores.Drag(), pores.PoreVolumes(), pores.WaterForce(), pressures.SumsOfCells(),
+            )  # fmt: skip
+        ),
+    ),
+    (NodalUpdate, Company(before=SOLVE)),
+    (Move, COMPANIES[4][1]),
+    (
+        Strain,
+        Company(
+            before=(NodeTask(pores.MakeFluxOfStep, make=_make_flux_of_step),),
+            first=(pores.Seep(),),
+        ),
+    ),
+)
+
+
+class SolvedWater(NamedTuple):
+    """Pore water whose pressure at the end of a step is solved for."""
+
+
+@companies.on(SolvedWater)
+def _companies_solved_water(tag):
+    return COMPANIES_OF_SOLUTION
 
 
 class SlowWater(NamedTuple):

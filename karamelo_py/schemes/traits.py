@@ -36,5 +36,7 @@ class SchemeTraits(NamedTuple):
     bears_drift: bool = False
     # vibrations are damped, with two points per cell and direction
     damps: bool = False
+    # solves for the pore pressure at the end of a step
+    solves_pressure: bool = False
     # returns the parameters that damp vibrations, as text
     damping: Callable[[Any], str] = lambda scheme: ""

@@ -336,12 +336,12 @@ def _is_rim(nodes, kin, n, rim):
     return squared >= rim * rim * V * V
 
 
-def _is_open(nodes, n):
+def is_open(nodes, n):
     p = field(nodes.fields, GivenPressure)[n, 0]
     return p == p
 
 
-def _close_if_dry(nodes, kin, n):
+def close_if_dry(nodes, kin, n):
     """Close a node of a seepage face unless its pressure or flow is outward."""
     prescribed, sums = field(nodes.fields, GivenPressure), field(nodes.fields, WaterSums)
     of_V, of_area = of_volumes(kin), of_pressure(kin) + kin.dimension
@@ -356,7 +356,7 @@ def _close_if_dry(nodes, kin, n):
 
 
 def _is_closed(nodes, kin, n, rim):
-    return not _is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
+    return not is_open(nodes, n) and _is_rim(nodes, kin, n, rim)
 
 
 def _by_pressure(nodes, kin, n, rim):
@@ -368,7 +368,7 @@ def _by_pressure(nodes, kin, n, rim):
     sums, d, of_P = field(nodes.fields, WaterSums), kin.dimension, of_pressure(kin)
     of_V, p = of_volumes(kin), real(0, sums[n, 0])
     per_volume = 1 / sums[n, of_V]
-    if _is_open(nodes, n):
+    if is_open(nodes, n):
         p = field(nodes.fields, GivenPressure)[n, 0]
     elif _is_rim(nodes, kin, n, rim):
         p = sums[n, of_V + 2] * per_volume
@@ -376,28 +376,95 @@ def _by_pressure(nodes, kin, n, rim):
     return [share * (sums[n, of_P + k] - sums[n, of_P + d + k] * p) for k in range(d)], p
 
 
-def _mass_given(nodes, kin, n, V):
-    """Return the mass flow rate of water into a node; store it by `WAYS`."""
-    supply, sums, d = field(nodes.fields, GivenFlux), field(nodes.fields, WaterSums), kin.dimension
-    whole, squared = real(0, V), real(0, V)
-    if supply is None:
-        return whole
+def _faces(nodes, kin, n):
+    """List the areas and the volume of a node, by `WAYS`."""
+    sums, d = field(nodes.fields, WaterSums), kin.dimension
+    V, squared, areas = sums[n, of_volumes(kin)], real(0, sums[n, 0]), []
     for k in range(d):
         area = sums[n, of_pressure(kin) + d + k]
         squared += area * area
-        supply[n, 2 * k] *= max(-area, real(0, V))
-        supply[n, 2 * k + 1] *= max(area, real(0, V))
-    supply[n, 2 * d] *= sqrt(squared)
-    supply[n, 2 * d + 1] *= V
-    for k in range(2 * d + 2):
+        areas += [max(-area, real(0, V)), max(area, real(0, V))]
+    return [*areas, sqrt(squared), V]
+
+
+def supply_at(nodes, kin, n):
+    """Return the mass flow rate of water that fixes will supply to a node."""
+    supply = field(nodes.fields, GivenFlux)
+    whole = real(0, nodes.sums[n, 0])
+    if supply is None:
+        return whole
+    for k, size in enumerate(_faces(nodes, kin, n)):
+        whole += supply[n, k] * size
+    return whole
+
+
+def _mass_given(nodes, kin, n):
+    """Return the mass flow rate of water into a node; store it by `WAYS`."""
+    supply = field(nodes.fields, GivenFlux)
+    whole = real(0, nodes.sums[n, 0])
+    if supply is None:
+        return whole
+    for k, size in enumerate(_faces(nodes, kin, n)):
+        supply[n, k] *= size
         whole += supply[n, k]
     return whole
 
 
-def _is_wet_node(nodes, kin, n):
+def is_wet_node(nodes, kin, n):
     sums = field(nodes.fields, WaterSums)
     soil, water = nodes.sums[n, arrays.MASS], sums[n, arrays.MASS]
     return soil > 0 and water > 0 and sums[n, of_volumes(kin)] > 0
+
+
+class DragAt(NamedTuple):
+    m_s: arrays.Number  # mass of the soil
+    left: arrays.Number  # exp(-b)
+    taken: arrays.Number  # f
+    whole: arrays.Number  # mass of soil and dragged water
+
+
+def forces_at(task, kin, nodes, n, dt):
+    """Return `DragAt`, and by direction: force on the water, on the whole mass, v and w."""
+    water, d, of_P = field(nodes.fields, WaterSums), kin.dimension, of_pressure(kin)
+    m, m_s, D = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], water[n, of_drag(kin)]
+    along = real(0, m)
+    pushed, _ = _by_pressure(nodes, kin, n, task.rim)
+    if _is_closed(nodes, kin, n, task.surface):
+        # A wall supports the weight of water next to it, which is not in the mean pressure.
+        squared = real(0, m)
+        for k in range(d):
+            area = water[n, of_P + d + k]
+            along += water[n, arrays.of_force(kin) + k] * area
+            squared += area * area
+        along /= squared
+    per_mass, per_soil = 1 / m, 1 / m_s
+    left, taken = _taken_up(dt * D * per_mass)
+    forces = []
+    for k in range(d):
+        of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
+        by_pressure = pushed[k]
+        carried = along * water[n, of_P + d + k]
+        on_water = water[n, of_force] - carried + by_pressure
+        v = nodes.sums[n, of_momentum] * per_soil
+        w = water[n, of_momentum] * per_mass - v
+        rest = nodes.sums[n, of_force] + carried + water[n, of_P + k] - by_pressure
+        forces.append((on_water, rest + (1 - taken) * on_water + D * taken * w, v, w))
+    return DragAt(m_s, left, taken, m_s + m * (1 - taken)), forces
+
+
+def share_forces(task, kin, nodes, n, dt):
+    if not is_wet_node(nodes, kin, n):
+        return
+    water, out, d = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate), kin.dimension
+    drag, forces = forces_at(task, kin, nodes, n, dt)
+    put_at(out, n, 2 * d, drag[:3])
+    for k in range(d):
+        of_force = arrays.of_force(kin) + k
+        on_water, force, v, _ = forces[k]
+        water[n, of_force] = on_water
+        nodes.sums[n, of_force] = force
+        nodes.sums[n, arrays.of_momentum(kin) + k] = drag.whole * v
+    nodes.sums[n, arrays.MASS] = drag.whole
 
 
 @node_task
@@ -411,38 +478,9 @@ class ShareForces(NamedTuple):
     goes_through = ("sums", "water sums", "water update")
 
     def at_node(task, kin, nodes, n, dt):
-        if not _is_wet_node(nodes, kin, n):
-            return
-        water, out = field(nodes.fields, WaterSums), field(nodes.fields, WaterUpdate)
-        d, of_P = kin.dimension, of_pressure(kin)
-        _close_if_dry(nodes, kin, n)
-        m, m_s, D = water[n, arrays.MASS], nodes.sums[n, arrays.MASS], water[n, of_drag(kin)]
-        along = real(0, m)
-        pushed, _ = _by_pressure(nodes, kin, n, task.rim)
-        if _is_closed(nodes, kin, n, task.surface):
-            # A wall supports the weight of water next to it, which is not in the mean pressure.
-            squared = real(0, m)
-            for k in range(d):
-                area = water[n, of_P + d + k]
-                along += water[n, arrays.of_force(kin) + k] * area
-                squared += area * area
-            along /= squared
-        per_mass, per_soil = 1 / m, 1 / m_s
-        left, taken = _taken_up(dt * D * per_mass)
-        whole = m_s + m * (1 - taken)
-        put_at(out, n, 2 * d, (m_s, left, taken))
-        for k in range(d):
-            of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
-            by_pressure = pushed[k]
-            carried = along * water[n, of_P + d + k]
-            on_water = water[n, of_force] - carried + by_pressure
-            v = nodes.sums[n, of_momentum] * per_soil
-            w = water[n, of_momentum] * per_mass - v
-            rest = nodes.sums[n, of_force] + carried + water[n, of_P + k] - by_pressure
-            water[n, of_force] = on_water
-            nodes.sums[n, of_force] = rest + (1 - taken) * on_water + D * taken * w
-            nodes.sums[n, of_momentum] = whole * v
-        nodes.sums[n, arrays.MASS] = whole
+        if is_wet_node(nodes, kin, n):
+            close_if_dry(nodes, kin, n)
+        share_forces(task, kin, nodes, n, dt)
 
 
 @node_task
@@ -454,7 +492,7 @@ class DragWater(NamedTuple):
 
     def at_node(task, kin, nodes, n, dt):
         out, d = field(nodes.fields, WaterUpdate), kin.dimension
-        if not _is_wet_node(nodes, kin, n):
+        if not is_wet_node(nodes, kin, n):
             put_at(out, n, 0, (0,) * (2 * d))
             return
         water = field(nodes.fields, WaterSums)
@@ -472,51 +510,76 @@ class DragWater(NamedTuple):
         nodes.sums[n, arrays.MASS] = m_s
 
 
+def _make_flux(task, kin, nodes, n, dt):
+    flux, d = field(nodes.fields, Flux), kin.dimension
+    across = real(0, dt)
+    if not is_wet_node(nodes, kin, n):
+        put_at(flux, n, 0, (0,) * (d + 4))
+        if field(nodes.fields, GivenFlux) is not None:
+            put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
+        return
+    water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
+    out, of_V, of_area = field(nodes.fields, WaterUpdate), of_volumes(kin), of_pressure(kin) + d
+    m, V = water[n, arrays.MASS], water[n, of_V]
+    pushed, p = _by_pressure(nodes, kin, n, task.rim)
+    per_mass, per_volume = 1 / m, 1 / V
+    for k in range(d):
+        if task.of_step:
+            again[n, k] = m * (nodes.velocity[n, k] + out[n, k])
+        j = (again[n, k] - m * nodes.velocity[n, k]) * per_volume
+        flux[n, k] = j
+        across += j * water[n, of_area + k]
+    drained = is_open(nodes, n)
+    if not task.of_step:
+        enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
+        drained = drained and not enters
+    closed = not drained and _is_rim(nodes, kin, n, task.rim)
+    supply = _mass_given(nodes, kin, n)
+    stays = across + supply if closed else supply
+    leaves = across + supply if drained else real(0, dt)
+    means = water[n, of_V + 2] * per_volume, water[n, of_V + 3] * per_volume
+    put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
+    # With the mean relative velocity in the step, the remaining work is the work of weight
+    # minus the work of drag, and the work of pressure on water that enters or leaves.
+    work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
+    for k in range(d):
+        of_momentum = arrays.of_momentum(kin) + k
+        v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
+        # a fix that holds the soil prescribes its velocity throughout
+        held = not task.of_step and nodes.update[n, k] == v
+        before = v if held else nodes.update[n, k] - dv
+        w = 0.5 * ((water[n, of_momentum] + again[n, k]) * per_mass - before - v)
+        dv += out[n, d + k]
+        work += w * (m * dv - dt * pushed[k])
+    field(nodes.fields, WorkAtNodes)[n, 0] += work
+
+
 @node_task
 class MakeFlux(NamedTuple):
+    """Computes the flux of the velocities that were mapped again."""
+
     rim: float
 
+    of_step = False
     says = "flux of the water"
     goes_through = ("sums", "velocity", "water sums", "water again", "flux")
 
     def at_node(task, kin, nodes, n, dt):
-        flux, d = field(nodes.fields, Flux), kin.dimension
-        across = real(0, dt)
-        if not _is_wet_node(nodes, kin, n):
-            put_at(flux, n, 0, (0,) * (d + 4))
-            if field(nodes.fields, GivenFlux) is not None:
-                put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
-            return
-        water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
-        of_V, of_area = of_volumes(kin), of_pressure(kin) + d
-        m, V = water[n, arrays.MASS], water[n, of_V]
-        pushed, p = _by_pressure(nodes, kin, n, task.rim)
-        per_mass, per_volume = 1 / m, 1 / V
-        for k in range(d):
-            j = (again[n, k] - m * nodes.velocity[n, k]) * per_volume
-            flux[n, k] = j
-            across += j * water[n, of_area + k]
-        enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
-        drained = _is_open(nodes, n) and not enters
-        closed = not drained and _is_rim(nodes, kin, n, task.rim)
-        supply = _mass_given(nodes, kin, n, V)
-        stays = across + supply if closed else supply
-        leaves = across + supply if drained else real(0, dt)
-        means = water[n, of_V + 2] * per_volume, water[n, of_V + 3] * per_volume
-        put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
-        # With the mean relative velocity in the step, the remaining work is the work of weight
-        # minus the work of drag, and the work of pressure on water that enters or leaves.
-        out = field(nodes.fields, WaterUpdate)
-        work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
-        for k in range(d):
-            of_momentum = arrays.of_momentum(kin) + k
-            v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
-            # a fix that holds the soil prescribes its velocity throughout
-            before = v if nodes.update[n, k] == v else nodes.update[n, k] - dv
-            w = 0.5 * ((water[n, of_momentum] + again[n, k]) * per_mass - before - v)
-            dv += out[n, d + k]
-            work += w * (m * dv - dt * pushed[k])
-        field(nodes.fields, WorkAtNodes)[n, 0] += work
+        _make_flux(task, kin, nodes, n, dt)
+
+
+@node_task
+class MakeFluxOfStep(NamedTuple):
+    """Computes the flux of the velocities v* and w*; open nodes let water in, too."""
+
+    rim: float
+
+    of_step = True
+    says = MakeFlux.says
+    goes_through = ("sums", "velocity", "water sums", "water update", "water again", "flux")
+
+    def at_node(task, kin, nodes, n, dt):
+        _make_flux(task, kin, nodes, n, dt)
 
 
 class MoveWater(eq.Task):

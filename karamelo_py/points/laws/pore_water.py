@@ -33,6 +33,7 @@ class Saturated(NamedTuple):
     rho: float  # density of the water at zero pressure
     permeability: Any  # tag: how it depends on porosity
     suction: float  # suction at which the saturation is 1/e; K: pores remain full
+    K_of_waves: float  # K, or 0 if the pressure is solved for and does not limit the step
 
     in_lanes = True
 
@@ -85,7 +86,7 @@ def _trace(law, kin, state, slow):
     # K / n ((1 - n)^2 / dry + n / rho), with one division
     dry = laws.specific_volume(law) * laws.jacobian(law, kin, state)
     grains, pores = 1 - law.n, state.pores * (state.pores + (1 - law.n))
-    return slow + law.K * ((grains * grains * law.rho * dry + pores) / (pores * law.rho))
+    return slow + law.K_of_waves * ((grains * grains * law.rho * dry + pores) / (pores * law.rho))
 
 
 @laws.wave_speed_squared.on(Saturated)
@@ -93,7 +94,7 @@ def _wave_speed_squared_saturated(law, kin, state):
     # Slightly above the larger eigenvalue of the two phases, without a root; drag slows waves down.
     slow = laws.wave_speed_squared(law.law, kin, state.skeleton)
     trace = _trace(law, kin, state, slow)
-    return trace - slow * law.K / (law.rho * trace)
+    return trace - slow * law.K_of_waves / (law.rho * trace)
 
 
 @laws.wave_speed_bound.on(Saturated)
@@ -109,6 +110,12 @@ def _filled(law, state):
 def pore_pressure(law, kin, state):
     ratio = _filled(law, state)
     return where(ratio < 1, law.suction, law.K) * logarithm_near_one(ratio)
+
+
+@laws.number
+def pore_stiffness(law, kin, state):
+    """Return K/n."""
+    return law.K / porosity(law, kin, state)
 
 
 @laws.number

@@ -266,7 +266,9 @@ def lower(
     )
     bodies = lower_bodies(hub, lattices) if fixes_of_bodies(hub) else NoBodies()
     fluids = (solid.material.fluid for solid in hub.solids.values())
-    tag = "tag_in_load_steps" if hub.update.scheme.traits.implicit else "tag"
+    traits = hub.update.scheme.traits
+    tag = "tag_of_solution" if traits.solves_pressure else "tag"
+    tag = "tag_in_load_steps" if traits.implicit else tag
     company = [getattr(fluid, tag) for fluid in fluids if fluid is not None]
     company += [*rotating(kin, transfer), NoCompany()]
     setup = arrays.Setup(

@@ -9,6 +9,7 @@ from karamelo_py.language.rules import FLAT, HATS_AND_SPLINES, Restrictions
 from karamelo_py.points.kinematics import Space
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
 from karamelo_py.points.laws.pore_water import ConstantPermeability, KozenyCarman, Saturated
+from karamelo_py.scene.hub import Update
 from karamelo_py.scene.solid import Solid
 from karamelo_py.scene.views import PointsView
 
@@ -16,7 +17,7 @@ UNDRAINED, DRAINED = 3e-4, 2.0  # time factors c_v t / H^2
 RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
-          "basis": HATS_AND_SPLINES, "scheme": ("musl", "quasi-static"), "kinematics": FLAT},
+          "basis": HATS_AND_SPLINES, "scheme": ("musl", "semi-implicit", "quasi-static"), "kinematics": FLAT},
     without=("heat", "delete", "reflect", "thin"),
     but={"single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
@@ -24,7 +25,7 @@ RESTRICTIONS = Restrictions(
 
 
 class PoreWater(NamedTuple):
-    tag, tag_in_load_steps = rows.Water(), rows.SlowWater()
+    tag, tag_in_load_steps, tag_of_solution = rows.Water(), rows.SlowWater(), rows.SolvedWater()
     point_fields, node_fields = rows.Water.point_fields, rows.Water.node_fields
 
     n: float
@@ -33,6 +34,7 @@ class PoreWater(NamedTuple):
     rho: float
     permeability: ConstantPermeability | KozenyCarman
     suction: float
+    update: Update
 
     @property
     def words(self) -> str:
@@ -44,7 +46,8 @@ class PoreWater(NamedTuple):
         return RESTRICTIONS if self.suction == self.K else RESTRICTIONS._replace(only=slow)
 
     def around(self, law: NamedTuple) -> NamedTuple:
-        return Saturated(law, *self)
+        solved = self.update.scheme.traits.solves_pressure
+        return Saturated(law, *self[:-1], K_of_waves=0.0 if solved else self.K)
 
     @property
     def stiffness(self) -> float:
