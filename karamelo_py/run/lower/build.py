@@ -37,6 +37,7 @@ from karamelo_py.points.transfers import flip_coefficient, lost_fractions, store
 from karamelo_py.run import periodic
 from karamelo_py.run.boxes import no_nodes
 from karamelo_py.run.implicit import check as implicit
+from karamelo_py.run.lower import solved_pressure
 from karamelo_py.run.lower.bodies import lower_bodies
 from karamelo_py.run.lower.walls import with_walls
 from karamelo_py.run.mpi.partition import SharedTiles
@@ -99,6 +100,8 @@ def check_scene(hub: Hub) -> None:
     _check_restrictions(hub)
     if hub.update.scheme.traits.implicit:
         implicit.check(hub)
+    if hub.update.scheme.traits.solves_pressure:
+        solved_pressure.check(hub)
     basis = type(method.basis)
     if not method.frame.moves or not (deformed.defined(basis) or carried.defined(basis)):
         return
