@@ -36,7 +36,12 @@ BODY = """
     dt_factor(0.5)
     run(10)
 """
+SCHEMES = "musl", "semi-implicit"
 same_kernels = pytest.mark.xdist_group("pore water")
+
+
+def column(scheme):
+    return COLUMN.replace("dimension", f"scheme({scheme})\n    dimension", 1)
 
 
 def terzaghi(T, depth=1.0):
@@ -67,8 +72,11 @@ def test_consolidation_is_that_of_terzaghi(run_script, k):
 
 
 @same_kernels
-def test_a_restarted_column_has_the_same_bits(run_script):
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_restarted_column_has_the_same_bits(run_script, scheme):
     text = (INPUTS / "in.terzaghi").read_text("utf-8")
+    text = text.replace("dimension(", f"scheme({scheme})\ndimension(")
+    text = text.replace("bottom, 0)", "bottom, 1e-4*sin(100*time))")
     text = text.replace("run_time(Tv*H^2/cv)", "run(300)\nwrite_restart(half.h5)\nrun(200)\nDUMP")
     text = text.replace(
         "DUMP", "dump(d, all, particle, 1, d.*.txt, x, vx, wx, pore_pressure)\nrun(1)"
@@ -82,19 +90,20 @@ def test_a_restarted_column_has_the_same_bits(run_script):
 
 
 @same_kernels
-def test_steady_seepage_follows_darcy(run_script):
+@pytest.mark.parametrize(("scheme", "steps"), [("musl", 15000), ("semi-implicit", 1000)])
+def test_steady_seepage_follows_darcy(run_script, scheme, steps):
     """1000 Pa across 1 m of 1e-2 m/s: 1e-2 (1000/9810) m/s; each wall takes half of the force."""
     log = last(
         run_script(
-            COLUMN
-            + """
+            column(scheme)
+            + f"""
             fix(lid, velocity_nodes, top, 0)
             fix(drain, pore_pressure, top, 0)
             fix(source, pore_pressure, bottom, 1000)
             fix(start, initial_pore_pressure, all, 1000*(1 - x0))
             log_modify(custom, step, time, drain_s, source_s, base_x, lid_x)
-            set_output(15000)
-            run(15000)
+            set_output({steps})
+            run({steps})
             """
         )
     )
@@ -105,7 +114,10 @@ def test_steady_seepage_follows_darcy(run_script):
 
 
 @same_kernels
-def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(run_script):
+@pytest.mark.parametrize(("scheme", "steps"), [("musl", 10000), ("semi-implicit", 1000)])
+def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(
+    run_script, scheme, steps
+):
     """Darcy: p = q/k rho g x. Drawn out instead, water lowers the pressure of a closed column."""
     tail = """
         fix(lid, velocity_nodes, top, 0)
@@ -114,24 +126,25 @@ def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(run_scr
         fix(start, initial_pore_pressure, all, 9810*{q}/1e-2*(1 - x0))
         compute(p, probe, all, pore_pressure)
         log_modify(custom, step, time, face_s, rain_s, p)
-        set_output(10000)
-        run(10000)
+        set_output({steps})
+        run({steps})
         """
-    log = last(run_script(COLUMN + tail.format(q=1e-3)))
+    log = last(run_script(column(scheme) + tail.format(q=1e-3, steps=steps)))
     assert abs(log["face_s"] - 1) < 1e-4
     assert abs(log["rain_s"] + 1) < 1e-6
     assert abs(log["p"] / (9810 * 0.1 / 2) - 1) < 2e-3
-    log = last(run_script(COLUMN + tail.format(q="(-1e-6)").replace("10000", "5000")))
+    log = last(run_script(column(scheme) + tail.format(q="(-1e-6)", steps=steps // 2)))
     assert log["face_s"] == 0
     assert abs(log["p"] / (-9810e-4 / 2 - 2.2e9 / 0.4 * 1e-6 * log["Time"]) - 1) < 1e-6
 
 
 @same_kernels
-def test_water_and_soil_rest_under_gravity(run_script):
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_water_and_soil_rest_under_gravity(run_script, scheme):
     """The reaction is the weight of both; the wall carries the water next to it."""
     log = last(
         run_script(
-            COLUMN
+            column(scheme)
             + """
             fix(weight, body_force, all, -9.81)
             fix(drain, pore_pressure, top, 0)
@@ -192,6 +205,7 @@ WAYS = {
     "ulmpm, FLIP, linear, 1": "2, -1, 1, -1, 1, 0.25",
     "ulmpm, FLIP, quadratic-spline, 0.99": "2, -1, 1, -1, 1, 0.25",
     "tlmpm, PIC, linear": "3, -1, 1, -1, 1, -1, 1, 0.25",
+    "tlmpm, FLIP, linear, 1": "2, -1, 1, -1, 1, 0.25",
 }
 
 
@@ -203,6 +217,8 @@ def test_water_and_momentum_are_conserved(state_interpreted, way, boxes):
     v = "0.3*sin(13*x0 + 7*y0), 0.3*cos(11*x0 - 5*y0)" + ", 0.1" * (domain[0] == "3")
     body = ", ".join(["-0.25, 0.25"] * int(domain[0]))
     script = BODY.format(way=way, domain=domain, body=body, v=v)
+    if way.startswith("tlmpm"):
+        script = script.replace("dimension", "scheme(semi-implicit)\ndimension")
     names = "vx", "vy", "wx", "wy", "water_content", "pore_pressure"
     before, after = (
         state_interpreted(text, *names, boxes=boxes)
@@ -246,6 +262,24 @@ def test_check_says_whether_water_flows_in_time(run_interpreted, Tv, word):
     assert "flux of the water; inflow and outflow of water" in out
 
 
+@same_kernels
+def test_check_says_how_many_steps_the_dry_soil_would_take(run_interpreted):
+    """As many as the scheme takes: 0.9 x 0.9 h/c with c^2 = 1e7/1590."""
+    text = (INPUTS / "in.terzaghi").read_text("utf-8").replace("dt_factor(0.5)", "")
+    out = run_interpreted(text, "-var", "Tv", "1", command="check").out
+    assert "with scheme(semi-implicit), limited by the dry soil, about 1540 steps" in out
+    fix = "fix(c, local_damping, all)\nrun_time("
+    assert "semi-implicit" not in run_interpreted(
+        text.replace("run_time(", fix), "-var", "Tv", "1", command="check"
+    ).out
+    out = run_interpreted(
+        text.replace("dimension(", "scheme(semi-implicit)\ndimension("), "-var", "Tv", "1",
+        command="check",
+    ).out  # fmt: skip
+    assert "about 1540 steps" in out and "waves" in out
+    assert "volumes of cells" in out
+
+
 def test_a_modified_skeleton_keeps_its_water(run_interpreted):
     script = (
         COLUMN
@@ -261,6 +295,40 @@ def test_a_modified_skeleton_keeps_its_water(run_interpreted):
     )
     log = run_interpreted(script.replace("N = 16", "N = 4")).log
     assert abs(log["p"][-1] / 50 - 1) < 1e-6
+
+
+def test_an_undrained_column_carries_its_load_with_water(run_script):
+    """The exact answer without waves: load K/n / (K/n + M), from the first hundred steps on."""
+    log = run_script(
+        column("semi-implicit").replace("1e-2)", "1e-9)")
+        + """
+        fix(load, force_nodes, top, -1000)
+        compute(p, probe, all, pore_pressure, x=0)
+        compute(q, probe, all, pore_pressure, x=1)
+        log_modify(custom, step, p, q, base_x)
+        set_output(200)
+        run(200)
+        """
+    ).log
+    for name, exact in (("p", 5500 / 5.51), ("q", 5500 / 5.51), ("base_x", 1000)):
+        assert abs(log[name][-1] / exact - 1) < 1e-6
+
+
+@same_kernels
+@pytest.mark.parametrize("k", ["1e-3", "1e-4", pytest.param("1e-5", marks=pytest.mark.full)])
+def test_the_step_of_the_dry_soil_consolidates_as_terzaghi_has_it(run_script, k):
+    """Semi-implicit steps are 21 times longer than explicit ones, each at its own step."""
+    text = (INPUTS / "in.terzaghi").read_text("utf-8").replace("dt_factor(0.5)", "")
+    text = text.replace("dimension(", "scheme(semi-implicit)\ndimension(")
+    text = text.replace("set_output(1000)", f"set_output({round(0.01 / float(k))})")
+    log = run_script(text, "-var", "k", k, "-var", "Tv", "1", "-var", "scale", "1").log
+    assert log["Step"][-1] == pytest.approx(1.54 / float(k), rel=1e-3)
+    for T in (0.02, 0.1, 0.5, 1.0):
+        at = np.argmin(abs(log["T"] - T))
+        U, p = terzaghi(log["T"][at], 1 - 1 / 64)
+        assert abs(log["U"][at] - U) < 0.0025
+        assert abs(log["p0"][at] - p) < 0.001
+    assert abs(log["base_x"][-1] - 1000) < 0.1
 
 
 REFUSED = {
@@ -314,7 +382,37 @@ def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
     assert f"pore_water does not support {REFUSED[head]}" in err
 
 
+NOT_SOLVED = {
+    "method(ulmpm, FLIP, linear, 1)": ("", "method ulmpm"),
+    "method(tlmpm, FLIP, quadratic-spline, 1)": ("", "the basis quadratic-spline"),
+    "method(tlmpm, FLIP, linear, 1)": ("fix(c, local_damping, all)", "fix local_damping"),
+    "method(tlmpm, PIC, linear)": ("fix(v, velocity_particles, all, 1, 0)", "velocity_particles"),
+    "method(tlmpm, FLIP, linear, 0.9)": (
+        "fix(v, velocity_nodes, all, geq0, NULL)",
+        "fix velocity_nodes with a bound",
+    ),
+    "method(tlmpm, FLIP, linear, 0.99)": (
+        "region(left, block, -INF, 0.25, -INF, INF)\ngroup(left, nodes, region, left, all)\n"
+        "fix(out, absorbing, left, clay, xlo)",
+        "absorbing",
+    ),
+}
+
+
+@pytest.mark.parametrize("head", NOT_SOLVED)
+def test_what_a_solution_for_the_pressure_does_not_support_is_refused(run_interpreted, head):
+    tail, words = NOT_SOLVED[head]
+    change = {"head": f"{head}\nscheme(semi-implicit)", "tail": f"{tail}\nrun(1)"}
+    err = run_interpreted(SCENE.format(**USUAL | change), status=1).err
+    assert "semi-implicit" in err and words in err and err.count("error:") == 1
+
+
 MISTAKES = [
+    (
+        {"head": "method(tlmpm, FLIP, linear, 1)\nscheme(semi-implicit)", "water": ""},
+        (),
+        "scheme semi-implicit solves for the pressure of pore water, and no solid has any",
+    ),
     ({"kind": "axisymmetric(true)"}, (), "does not support axisymmetric scenes"),
     ({"water": "pore_water(clay, n=1, permeability=1e-3)"}, (), "the porosity is 1"),
     ({"water": "pore_water(clay, n=0.4)"}, (), "the permeability is given nowhere"),

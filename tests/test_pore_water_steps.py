@@ -194,6 +194,54 @@ def test_the_pressure_rises_first_as_mandel_and_cryer_found(run_script, cells):
     assert np.abs(log["plate_y"][2:] / -1e4 - 1).max() < 0.005
 
 
+@pytest.mark.parametrize("cells", [8, pytest.param(16, marks=pytest.mark.full)])
+def test_semi_implicit_steps_have_the_pressure_of_mandel_and_cryer(run_script, cells):
+    """From the undrained state on, between plates whose velocity is the exact one."""
+    centre, _, terms, rates, c, p0 = mandel(0.2, 1e-3, 1e4, 1.0, 0.5)
+    pairs = zip(terms.tolist(), rates.tolist(), strict=True)
+    velocity = " + ".join(f"({-t * r!r})*exp(-{r!r}*(time + dt/2))" for t, r in pairs)
+    # p0 is the mean effective stress that the soil has lost, and sxx = p0
+    G = E / 2.4
+    strain = p0 / (K / N0)
+    exx = (p0 + E * 0.2 / 1.2 / 0.6 * strain) / 2 / G
+    stress = [f"{E * 0.2 / 1.2 / 0.6 * -strain + 2 * G * e!r}" for e in (exx, -strain - exx, 0.0)]
+    log = run_script(
+        f"""
+        N = {cells}
+        method(tlmpm, FLIP, linear, 1)
+        scheme(semi-implicit)
+        dimension(2, 0, 1, 0, 0.5, 1/N)
+        region(layer, block, 0, 1, 0, 0.5)
+        material(clay, linear, 1590, 1e7, 0.2)
+        pore_water(clay, n=0.4, permeability=1e-3)
+        solid(clay, region, layer, 2, clay, 1/N, 0)
+        region(bottom, block, -INF, INF, -INF, 1e-6)
+        region(top, block, -INF, INF, 0.5 - 1e-6, INF)
+        region(left, block, -INF, 1e-6, -INF, INF)
+        region(right, block, 1 - 1e-6, INF, -INF, INF)
+        group(bottom, nodes, region, bottom, all)
+        group(top, nodes, region, top, all)
+        group(left, nodes, region, left, all)
+        group(right, nodes, region, right, all)
+        fix(base, velocity_nodes, bottom, NULL, 0)
+        fix(axis, velocity_nodes, left, 0, NULL)
+        fix(plate, velocity_nodes, top, NULL, {velocity})
+        fix(drain, pore_pressure, right, 0)
+        fix(p, initial_pore_pressure, all, {p0})
+        fix(s, initial_stress, all, {", ".join(stress)}, 0, 0, 0)
+        compute(centre, probe, all, pore_pressure, x=0, y=0)
+        set_output(20)
+        log_modify(custom, step, time, centre, plate_y)
+        run_time({0.5 / c})
+        """
+    ).log
+    late = log["Time"] * c > 0.04
+    exact = np.array([centre(t) for t in log["Time"]])
+    assert abs(log["centre"].max() / exact.max() - 1) < (0.01 if cells == 8 else 0.005)
+    assert np.abs(log["centre"] - exact)[late].max() < (0.016 if cells == 8 else 0.006) * p0
+    assert np.abs(log["plate_y"][late] / -1e4 - 1).max() < 0.009
+
+
 @pytest.mark.parametrize("refine", [1, pytest.param(4, marks=pytest.mark.full)])
 def test_water_seeps_below_a_dam_as_harr_has_it(run_script, refine):
     """q = k h K' / (2 K); the edges of the floor make the order one."""

@@ -12,6 +12,7 @@ from karamelo_py.advice.step_size import (
     words_of_limit,
     words_of_own_step,
     words_of_share,
+    words_of_solution,
 )
 from karamelo_py.advice.suggestions import seconds_of_step, suggestions
 from karamelo_py.compiler.gpu import NoCard, card
@@ -82,6 +83,8 @@ def report(hub: Hub, end_time: float = inf) -> None:
                 if solid.material.fluid is not None:
                     words = solid.material.fluid.time_scale(solid, end_time - simulation.time)
                     say(f"water          {words}")
+            if words := words_of_solution(simulation, end_time - simulation.time):
+                say(f"               {words}")
             slowest = max(hub.fixes.values(), key=lambda fix: fix.seconds(), default=None)
             if slowest is not None and 2 * slowest.seconds() > one:
                 say(f"               most of it for fix {slowest.style} '{slowest.id}'")

@@ -3,8 +3,18 @@
 from math import inf
 
 from karamelo_py.kernels.clock import STILL, STRIDE
+from karamelo_py.run.lower.solved_pressure import is_wet, unsupported
 from karamelo_py.run.simulation import Simulation
-from karamelo_py.run.stable_step import keeping_share, own_step_of_waves, own_weight_of_drift
+from karamelo_py.run.stable_step import (
+    fastest_wave,
+    keeping_share,
+    own_step_of_waves,
+    own_weight_of_drift,
+    sparse,
+)
+from karamelo_py.scene.modify import Fix
+from karamelo_py.schemes.musl import MUSL
+from karamelo_py.schemes.semi_implicit import SemiImplicit
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
 LOST = 2.05  # step / stable step above which every run failed
@@ -107,3 +117,21 @@ def words_of_share(simulation: Simulation) -> str:
     if max(keeping, 1e-9) * (1 + 1e-9) < fraction <= 1 and keeping < DEFAULT_SHARE:
         return words + f": above {keeping:g} a body that drifts gains energy"
     return words
+
+
+def words_of_solution(simulation: Simulation, duration: float) -> str:
+    """Return the steps of semi-implicit for a scene of musl that it supports, or ""."""
+    hub, method = simulation.hub, simulation.hub.update.method
+    fits = method.basis_name == "linear" and not method.frame.moves and is_wet(hub)
+    alone = hub.settings.engine == "processor" and hub.settings.comm.size == 1
+    refused = any(map(_is_refused, hub.fixes.values())) or any(unsupported(hub, ""))
+    if not (fits and alone and isinstance(hub.update.scheme, MUSL)) or refused:
+        return ""
+    courant = DEFAULT_SHARE * SemiImplicit.traits.courant[sparse(hub)]
+    dt = courant * float(simulation.control.step[0].spacing) / fastest_wave(simulation)
+    return f"with scheme(semi-implicit), limited by the dry soil, about {duration / dt:.0f} steps"
+
+
+def _is_refused(fix: Fix) -> bool:
+    yields = fix.wall_friction is not None or (fix.held_directions and not fix.prescribes_velocity)
+    return bool(yields or (fix.restrictions and "semi-implicit" in fix.restrictions.without))

@@ -77,18 +77,19 @@ def pore_water(
 
     The stable step is set by the fast compression wave (about 1850 m/s in water-saturated soil),
     not by the drag. With N cells along a drainage path of length L, consolidation to Tv = 1 takes
-    about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation. If
-    these are too many, as at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a
-    factor, as in inputs/in.terzaghi.
+    about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation.
+    With scheme(semi-implicit), c is the wave speed of the dry soil. If these steps are too many, as
+    at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a factor, as in
+    inputs/in.terzaghi.
 
     Use this command before the first solid of the material. It needs method ulmpm or tlmpm with
-    FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl or quasi-static, and a
-    scene in 1D, plane strain or 3D. With ulmpm and linear, results lose accuracy at strains above
+    FLIP or PIC and linear, quadratic-spline or cubic-spline, scheme musl, semi-implicit or
+    quasi-static, and a scene in 1D, plane strain or 3D. With ulmpm and linear, results lose accuracy at strains above
     10 %.
 
     See Also
     --------
-    fix pore_pressure, fix initial_pore_pressure, material
+    fix pore_pressure, fix initial_pore_pressure, material, scheme semi-implicit
     """
     if (permeability is None) == (intrinsic is None):
         message = "the permeability is given " + ("twice" if intrinsic else "nowhere")

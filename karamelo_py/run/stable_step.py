@@ -264,6 +264,7 @@ def ruling_limit(state: SceneState) -> str:
     slowed = any(viscous for _, viscous in undeformed)
     if slowed and 0 < without < (motion.rate - speed) / SLOWED:
         return "viscosity"
-    if step.courant < corrected_share(state.hub):
+    own = state.hub.update.scheme.traits.solves_pressure
+    if step.courant < corrected_share(state.hub) and not own:
         return "lone_points" if step.courant == lone_point(state.hub) else "light_nodes"
     return "waves"

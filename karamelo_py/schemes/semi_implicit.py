@@ -14,17 +14,14 @@ from karamelo_py.schemes.traits import SchemeTraits
 class SemiImplicit(NamedTuple):
     """Solve for the pore pressure at the end of each step, so that only the dry soil limits it.
 
-    Soil with `pore_water` is explicit, as in usl. The pressure of the water at the end of the step
-    is solved for on the grid, by conjugate gradients, and the drag is implicit (fractional step;
-    Kularathna et al. 2021). The stable step is 0.65 h/c with the wave speed c of the dry soil (0.4
-    h/c with one point per cell), about 15 times the step of musl in water-saturated soil of 10 MPa.
+    The soil is explicit, as in usl; drag and pressure of the water are implicit (Kularathna et al.
+    2021). The pressure, one value per cell, is found by conjugate gradients. The stable step is 0.9
+    h/c with the wave speed c of the dry soil, or 0.55 h/c with one point per cell: 20 times the
+    step of musl in water-saturated soil of 10 MPa.
 
-    Fast waves of the water are damped. Compared with musl, consolidation, seepage and loads that
-    take longer than a wave through the ground have the same results. Slower processes than those
-    of this scheme need quasi-static.
-
-    Water may enter and leave through nodes of fix pore_pressure; nodes of seepage_face, too, are
-    open for a whole step if they are open at its beginning.
+    Waves of the water are damped. Consolidation, seepage, and loads that take longer than a wave of
+    the dry soil needs through the ground have the same results as with musl. For consolidation over
+    days or years, use quasi-static.
 
     Example
     -------
@@ -32,9 +29,10 @@ class SemiImplicit(NamedTuple):
 
     Notes
     -----
-    Method tlmpm with FLIP or PIC and linear. Not supported: processes (``--ranks``), GPUs, bounds
-    and friction of velocity_nodes, fixes that change velocities after forces (local_damping), and
-    velocity_particles on soil.
+    It needs a material with pore_water, method tlmpm, FLIP or PIC and linear. Nodes of fix
+    seepage_face remain open or closed for a step, by the pressure at its beginning. Bounds and
+    friction of velocity_nodes, local_damping, absorbing, ground_motion, velocity_particles on soil,
+    ``--ranks`` and ``--gpu`` are not supported.
 
     See Also
     --------
@@ -42,7 +40,7 @@ class SemiImplicit(NamedTuple):
     """
 
     traits = SchemeTraits(
-        courant=(0.65, 0.4),
+        courant=(0.9, 0.55),
         damps=True,
         damping=lambda scheme: "the pore pressure of the end of the step",
         solves_pressure=True,

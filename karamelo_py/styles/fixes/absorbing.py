@@ -8,6 +8,7 @@ import numpy as np
 from karamelo_py.compiler import where
 from karamelo_py.compiler.fields import Field, vector
 from karamelo_py.kernels.equations.mass_momentum import Normal
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.points.kinematics import Space, total
 from karamelo_py.points.laws import initial_state, shear_part, specific_volume, wave_speed_squared
 from karamelo_py.scene.group import NodeGroup
@@ -88,6 +89,7 @@ class Absorbing(Fix):
 
     published = ("x", "y", "z")
     node_fields = (Normal, Support)
+    restrictions = Restrictions("absorbing", "no absorbing", without=("semi-implicit",))
     order = LAST
     exerts = True
 

@@ -156,7 +156,9 @@ class GroundMotion(VelocityNodes):
     reads_itself = True
     every = 1
     remembers = ("before",)
-    restrictions = Restrictions("ground_motion", "no ground_motion", without=("gpu", "implicit", "semi-implicit"))
+    restrictions = Restrictions(
+        "ground_motion", "no ground_motion", without=("gpu", "implicit", "semi-implicit")
+    )
 
     def __init__(
         self,
