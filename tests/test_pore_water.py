@@ -115,9 +115,7 @@ def test_steady_seepage_follows_darcy(run_script, scheme, steps):
 
 @same_kernels
 @pytest.mark.parametrize(("scheme", "steps"), [("musl", 10000), ("semi-implicit", 1000)])
-def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(
-    run_script, scheme, steps
-):
+def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(run_script, scheme, steps):
     """Darcy: p = q/k rho g x. Drawn out instead, water lowers the pressure of a closed column."""
     tail = """
         fix(lid, velocity_nodes, top, 0)
@@ -269,9 +267,12 @@ def test_check_says_how_many_steps_the_dry_soil_would_take(run_interpreted):
     out = run_interpreted(text, "-var", "Tv", "1", command="check").out
     assert "with scheme(semi-implicit), limited by the dry soil, about 1540 steps" in out
     fix = "fix(c, local_damping, all)\nrun_time("
-    assert "semi-implicit" not in run_interpreted(
-        text.replace("run_time(", fix), "-var", "Tv", "1", command="check"
-    ).out
+    assert (
+        "semi-implicit"
+        not in run_interpreted(
+            text.replace("run_time(", fix), "-var", "Tv", "1", command="check"
+        ).out
+    )
     out = run_interpreted(
         text.replace("dimension(", "scheme(semi-implicit)\ndimension("), "-var", "Tv", "1",
         command="check",

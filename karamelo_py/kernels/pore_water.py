@@ -42,12 +42,14 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s))
 
 
+OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.WaterForce()
+OF_MOVE = Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))
 COMPANIES = (
     (MassMomentum, Company(then=(pores.WaterMomentum(),))),
-    (InternalForce, Company(then=(pores.Drag(), pores.PoreVolumes(), pores.WaterForce()))),
+    (InternalForce, Company(then=OF_FORCE)),
     (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
     (NodalUpdate, Company(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
-    (Move, Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))),
+    (Move, OF_MOVE),
     (Strain, Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
 SLOW_COMPANIES = COMPANIES[:1]
@@ -88,16 +90,9 @@ SOLVE = (
 )
 COMPANIES_OF_SOLUTION = (
     (MassMomentum, Company(then=(pores.WaterMomentum(),))),
-    (
-        InternalForce,
-        Company(
-            then=(
-                pores.Drag(), pores.PoreVolumes(), pores.WaterForce(), pressures.SumsOfCells(),
-            )  # fmt: skip
-        ),
-    ),
+    (InternalForce, Company(then=(*OF_FORCE, pressures.SumsOfCells()))),
     (NodalUpdate, Company(before=SOLVE)),
-    (Move, COMPANIES[4][1]),
+    (Move, OF_MOVE),
     (
         Strain,
         Company(

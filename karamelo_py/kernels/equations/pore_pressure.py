@@ -36,7 +36,6 @@ from karamelo_py.kernels.clock import step_size
 from karamelo_py.kernels.equations import pore_water as pores
 from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.records import put_at
-from karamelo_py.points import laws
 from karamelo_py.points.basis.product import digits
 from karamelo_py.points.grid import Grid
 from karamelo_py.points.laws.pore_water import pore_stiffness
@@ -443,14 +442,10 @@ def _solve(system):
 
 def solve(s):
     """Add the forces of the increments of pressure to `NodeResponse`."""
-    fields = s.nodes.fields
+    kinds = pores.WaterSums, CellSums, CellPressures, NodeResponse
+    of_fields = [field(s.nodes.fields, kind) for kind in kinds]
     step = s.control.values[arrays.TIMESTEP] + 1
-    _solve(
-        System(
-            s.kin, s.grids, s.spans, field(fields, pores.WaterSums), field(fields, CellSums),
-            field(fields, CellPressures), field(fields, NodeResponse), step_size(s), step,
-        )  # fmt: skip
-    )
+    _solve(System(s.kin, s.grids, s.spans, *of_fields, step_size(s), step))
 
 
 @node_task

@@ -17,7 +17,8 @@ UNDRAINED, DRAINED = 3e-4, 2.0  # time factors c_v t / H^2
 RESTRICTIONS = Restrictions(
     "pore_water", "a dry material",
     only={"method": ("ulmpm", "tlmpm"), "transfer": ("FLIP", "FLIP/per-time", "PIC"),
-          "basis": HATS_AND_SPLINES, "scheme": ("musl", "semi-implicit", "quasi-static"), "kinematics": FLAT},
+          "basis": HATS_AND_SPLINES, "scheme": ("musl", "semi-implicit", "quasi-static"),
+          "kinematics": FLAT},
     without=("heat", "delete", "reflect", "thin"),
     but={"single": "precision(double): water is stiff",
          "F-bar": "no anti_volumetric_locking: the pressure of the water does not lock"},
