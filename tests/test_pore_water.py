@@ -266,19 +266,12 @@ def test_check_says_how_many_steps_the_dry_soil_would_take(run_interpreted):
     text = (INPUTS / "in.terzaghi").read_text("utf-8").replace("dt_factor(0.5)", "")
     out = run_interpreted(text, "-var", "Tv", "1", command="check").out
     assert "with scheme(semi-implicit), limited by the dry soil, about 1540 steps" in out
-    fix = "fix(c, local_damping, all)\nrun_time("
-    assert (
-        "semi-implicit"
-        not in run_interpreted(
-            text.replace("run_time(", fix), "-var", "Tv", "1", command="check"
-        ).out
-    )
-    out = run_interpreted(
-        text.replace("dimension(", "scheme(semi-implicit)\ndimension("), "-var", "Tv", "1",
-        command="check",
-    ).out  # fmt: skip
-    assert "about 1540 steps" in out and "waves" in out
+    solved = text.replace("dimension(", "scheme(semi-implicit)\ndimension(")
+    out = run_interpreted(solved, "-var", "Tv", "1", command="check").out
+    assert re.search(r"limited by +waves\nsteps +about 15(39|40),", out)
     assert "volumes of cells" in out
+    damped = text.replace("run_time(", "fix(c, local_damping, all)\nrun_time(")
+    assert "semi-implicit" not in run_interpreted(damped, command="check").out
 
 
 def test_a_modified_skeleton_keeps_its_water(run_interpreted):
