@@ -370,7 +370,7 @@ def _precondition(system):
 
 @noinline
 def _multiply(system, share):
-    """Turn the direction, multiply the matrix by it; return direction times product."""
+    """Update the direction and its product with the matrix; return the product of both."""
     pressures, count, result = system.pressures, _count_below(system.kin.dimension), 0.0
     for r in range(1, 1 + system.spans[0, 0]):
         below = _below(system.kin, _grid_of(system.grids, system.spans[r, 0]))
@@ -450,7 +450,7 @@ def solve(s):
 
 @node_task
 class AddPressure(NamedTuple):
-    """Adds the increment to the pressure force and the mean pressure, and shares the forces."""
+    """Adds the increment to force and mean of the pressure; sets the forces for fixes."""
 
     rim: float
     surface: float
