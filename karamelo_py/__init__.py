@@ -7,7 +7,7 @@ __all__ = ["KarameloWarning", "Simulation", "SimulationError", "read_rows"]
 
 
 def __getattr__(name):
-    """Import what is for programs only when one asks for it: the command line starts faster."""
+    """Import the Python interface only on request: the command line starts faster."""
     if name in __all__:
         home = "plot" if name == "read_rows" else "simulation"
         return getattr(import_module(f"karamelo_py.app.{home}"), name)

@@ -1,4 +1,4 @@
-"""Several points at once: lanes of a vector register as a number type of point functions.
+"""Lanes: a number type for point functions that holds the numbers of several points.
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,

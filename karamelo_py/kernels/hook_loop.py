@@ -557,7 +557,7 @@ def without_whole(hooks):
 
 
 def known_to_hooks(nodes):
-    """Return the fields that the loop uses; others would have it compiled again."""
+    """Return only the fields that the loop uses; further ones would need a compilation."""
     return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
 
 

@@ -15,10 +15,10 @@ Point function ``(pt: OnePoint) -> (v, x, total)``: `dt` is the time for which t
 `kick` the time for which forces act.
 
 Heat function ``(pt: WarmPoint) -> (share, supply, T)``: `value` and `other` are the first and
-second formula, `face` the point's area, `supply` its heating power, `share` the fraction it takes
-of the nodal temperature change. The total is the heat supplied; if the hook holds, `other` is the
-target temperature. Node functions of heat get capacity, temperature before and after the step, and
-heat flow, in the order of `OneNode`.
+second formula, `face` the point's area, `supply` its heating power, `share` is the fraction of the
+nodal temperature change that it takes. The total is the heat supplied; if the hook holds, `other`
+is the target temperature. Node functions of heat get capacity, temperature before and after the
+step, and heat flow, in the order of `OneNode`.
 
 Functions of whole points (:func:`vector_hook`) get vectors, fields and the state of the law, and
 are compiled into the loop.
@@ -300,7 +300,7 @@ def vector_hook(
     function
         ``function(*read, values, dt)`` gets the quantities in `reads`, the values of the fix's
         `formulas`, and the time of the move. It returns the new values of `writes` and, with
-        `publishes`, a number or vector to sum and publish; several results as a tuple.
+        `publishes`, a number or vector to sum and publish; several results form a tuple.
     reads
         Words of `WORDS`, classes of declared fields (a number, vector or tuple of numbers), or
         functions (law, kin, state) such as ``laws.cauchy_stress``.

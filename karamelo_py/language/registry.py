@@ -1,4 +1,4 @@
-"""Commands and styles: built-in ones in styles.toml, others from packages.
+"""Commands and styles: styles.toml lists the built-in ones, packages provide further ones.
 
 A package offers a style in its pyproject.toml::
 

@@ -56,7 +56,7 @@ EMPTY, KEYWORD = inspect.Parameter.empty, inspect.Parameter.KEYWORD_ONLY
 
 @cache
 def parameters(target: Any) -> list[Parameter]:
-    """Return a command's or style's parameters without the hub; raises TypeError for others."""
+    """Return the parameters without the hub; raises TypeError for unsupported annotations."""
     record = is_record(target)
     try:
         if record and not hasattr(target, "given"):

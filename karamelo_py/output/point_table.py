@@ -171,7 +171,7 @@ class PointTable:
     def velocity_moment(self) -> np.ndarray | None:
         """Sums of N v (X - x), (n, d d), if the transfer stores them; otherwise None.
 
-        The vectors X - x are present ones: in the total frame, F times the reference vectors.
+        The vectors X - x are in the present state: in the total frame, F times reference vectors.
         """
         rows = self._rows
         have = [

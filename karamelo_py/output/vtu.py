@@ -30,7 +30,7 @@ ARRAYS = {
 
 
 def arrays_of(names: Sequence[str], dimension: int) -> dict[str, list[str]]:
-    """Return arrays whose components are among the columns `names`, or are 0 in this dimension."""
+    """Return arrays by name, if `names` contains all their components that `dimension` has."""
 
     def vanishes(name: str) -> bool:
         axes = {"xyz123".index(axis) % 3 for axis in name[1:]}

@@ -243,9 +243,9 @@ class MeshSolid(Solid):
     Notes
     -----
     Elements are as in region mesh. Elements of lower dimension are ignored; elements with their
-    centroid outside the domain are, too, with a warning. Volumes of higher-order elements are those
-    within the curved edges. The cpdi methods need elements of one shape, with straight edges. In 2D
-    the mesh must have z = 0.
+    centroid outside the domain are, too, with a warning. Volumes of higher-order elements include
+    their curved edges. The cpdi methods need elements of one shape, with straight edges. In 2D the
+    mesh must have z = 0.
 
     See Also
     --------

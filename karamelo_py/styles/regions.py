@@ -16,7 +16,7 @@ _NAMES = ("xlo", "xhi", "ylo", "yhi", "zlo", "zhi")
 
 
 class Primitive(region.Region):
-    """Base of shapes that are bounded by planes along some axes and round in the others."""
+    """Base of shapes that are bounded by planes along some axes and round in the other axes."""
 
     slabs: Sequence[tuple] = ()  # (axis, lower end, upper end)
     across: Sequence[int] = ()  # axes across which the shape is round

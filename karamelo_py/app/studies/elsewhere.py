@@ -278,7 +278,7 @@ class Elsewhere:
     ):  # fmt: skip
         """Store how to reach the machines.
 
-        `send` makes contents known to the machines; its result goes to those that ask.
+        `send` makes contents known to the machines; its result goes to machines that ask.
 
         `workers` returns the number of threads of each worker by address, or nothing if workers
         cannot be chosen.

@@ -52,7 +52,7 @@ def styles(choices: Sequence[dict[str, str]]) -> list[tuple[str, int, int]]:
     """Choose a colour, and the numbers of a marker and of a dash pattern, for each choice.
 
     The first variable sets colour and marker, the others set the dashes. Known words have fixed
-    styles; others get the next unused style.
+    styles; new words get the next unused style.
     """
     names = list(choices[0]) if choices else []
     if not names:

@@ -86,8 +86,8 @@ def left_out(fit: Fit, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def best(x: np.ndarray, y: np.ndarray) -> tuple[str, Fit, float]:
     """Return the fit with the smallest leave-one-out error, its name and its error.
 
-    A polynomial needs twice as many runs as coefficients. In leave-one-out predictions, the lengths
-    of the Gaussian process are those fitted to all runs (Rasmussen & Williams 2006, eq. 5.12).
+    A polynomial needs twice as many runs as coefficients. Leave-one-out predictions of the Gaussian
+    process use the lengths that fit all runs (Rasmussen & Williams 2006, eq. 5.12).
     """
     fits: dict[str, Fit] = {
         name: partial(polynomial, degree=degree)

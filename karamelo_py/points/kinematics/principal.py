@@ -123,7 +123,7 @@ class TurningFrame(NamedTuple):
 
 
 def in_frame(s, directions):
-    """Return components in a frame: diagonal (3,), and off-diagonal ones of the pairs."""
+    """Return components in a frame: diagonal (3,), and one off-diagonal number per pair."""
     if s.kin.dimension == 2:
         k, g = directions
         apart, mean = 0.5 * (s.xx - s.yy), 0.5 * (s.xx + s.yy)

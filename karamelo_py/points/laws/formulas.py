@@ -111,7 +111,7 @@ PLAIN: dict[str, Callable] = {
 
 
 def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -> Expression:
-    """Return the formula in operations that laws support; raise ScriptError for others."""
+    """Return the formula in operations that laws support; raise ScriptError if it cannot be."""
     results: dict[int, Expression] = {}
     for one in terms.in_order(formula):
         operands = [results[id(operand)] for operand in one.operands]

@@ -207,7 +207,7 @@ def fastest(C: np.ndarray) -> float:
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
     acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
-    # for directions between those sampled, 3 degrees apart
+    # allows for directions between the samples, 3 degrees apart
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 

@@ -204,7 +204,7 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        # The tiles are already those for the present number of processes.
+        # The tiles already belong to the present number of processes.
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:

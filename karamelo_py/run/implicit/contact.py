@@ -120,8 +120,8 @@ class Contact:
     def _rub(self, along: np.ndarray, supposed: bool) -> None:
         """Compute the drag and its derivatives by return mapping.
 
-        Pairs are tried as sticking; those beyond Coulomb's cone slide on it (Simo & Laursen 1992,
-        "An augmented Lagrangian treatment of contact problems involving friction").
+        Pairs are tried as sticking; if the friction exceeds Coulomb's cone, they slide on it (Simo
+        & Laursen 1992, "An augmented Lagrangian treatment of contact problems involving friction").
         """
         k, N, slip, C = self.stiffness, self.normal, self.slip, self.tangent
         glued = np.isinf(self.mu)

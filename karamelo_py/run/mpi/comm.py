@@ -158,7 +158,7 @@ class MpiComm(SerialComm):
 
 
 def check_same_run(hub: Scene) -> None:
-    """Check that all processes begin the same run; if not, one reports it and the others quit."""
+    """Check that all processes begin the same run; if not, one of them reports it and all quit."""
     comm = hub.settings.comm
     present = [hub.mark and (hub.mark.file, hub.mark.line), len(hub.runs)]
     words = comm.agree(1 + crc32(repr((present, hub.interpreter.presets)).encode()))

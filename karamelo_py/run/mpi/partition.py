@@ -37,7 +37,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
     multiprocessors", IEEE Transactions on Computers C-36, 570-580. If a layer of tiles must be
     divided, it is cut across the next longest direction. `places` (T, d) are lower corners, `work`
     (T,) integers; tiles without work belong to any part. The last direction is cut only if it is
-    `rows` times as long as the others.
+    `rows` times as long as each other direction.
     """
     d = places.shape[1]
     least = np.append(np.ones(d - 1), rows)

@@ -61,10 +61,10 @@ class EdgeHeatFlux(EdgeHeat):
 
     Notes
     -----
-    Each point gets the heat that flows through the adjacent surface of the region. Areas are those
-    of the smooth surface at the start (for a mesh, of the faces of points). To load part of an
-    edge, restrict the group, or set q to 0 elsewhere. Planes at the edge of the domain and symmetry
-    planes are not loaded.
+    Each point gets the heat that flows through the adjacent surface of the region. Areas are
+    measured on the smooth surface at the start (for a mesh, on the faces of points). To load part
+    of an edge, restrict the group, or set q to 0 elsewhere. Planes at the edge of the domain and
+    symmetry planes are not loaded.
 
     Publishes the heating power as ID_s and the area as ID_area (in 2D per unit thickness, in
     axisymmetry per radian).

@@ -81,7 +81,7 @@ class ContactBodies(Fix):
     Publishes the force on the first solid or region as ID_x, ID_y, ID_z.
 
     The fix works in every method, together with contact with deformable solids. Stacks come to
-    rest, even with a heavy body on light ones. Momentum and angular momentum are conserved to
+    rest, even if a heavy body lies on light bodies. Momentum and angular momentum are conserved to
     round-off. No collision adds energy. Collisions in a step are resolved singly, fastest first.
 
     Disks and spheres are exact. Corners and edges of other shapes are rounded by balls of 0.05

@@ -34,9 +34,9 @@ class CuttingTool(ToolFix):
 
     Notes
     -----
-    A point between the faces, at the depth p from the nearer one, gets the force K G (1 - D) p out
-    of it, with the shear modulus G and the damage D (de Vaucorbeil & Nguyen 2021). Publishes the
-    force on the points as ID_x, ID_y, ID_z.
+    A point between the faces, at the depth p from the nearer one, gets the force K G (1 - D) p,
+    normal to this face and outwards, with the shear modulus G and the damage D (de Vaucorbeil &
+    Nguyen 2021). Publishes the force on the points as ID_x, ID_y, ID_z.
 
     See Also
     --------
