@@ -57,7 +57,7 @@ FAILURES = {
         ({"method": "ulmpm, FLIP, Bernstein-quadratic, 1"},
          {"method": "tlmpm, FLIP, Bernstein-quadratic, 1"})
     ],
-    "bodies that break without reason": [
+    "numerical fracture": [
         ({"method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"}, {"v": "-1, 0"}),
         ({"method": "ulmpm, FLIP, linear, 1", "more": "fix(g, body_force, all, 0, -0.2)"}, {}),
         ({"method": "ulmpm, FLIP, linear, 1", "v": "-1, 0"},

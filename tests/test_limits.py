@@ -11,7 +11,7 @@ PAGE = (Path(__file__).parent.parent / "docs" / "limits.md").read_text("utf-8")
 ROWS = re.findall(r"^\| ([^|]+?) \| [^|]+ \|$", PAGE, re.M)[1:]
 # What a row calls missing: styles that would end it, as (family, part of a name).
 STYLES = {
-    "two layers of points": [("method", "two"), ("solid", "water")],
+    "separate points for soil": [("method", "two"), ("solid", "water")],
     "cracks in laminae": [("damage", "cohesive"), ("fix", "cohesive")],
     "ignition": [("eos", "ignition")],
     "UMAT": [("material", "umat")],

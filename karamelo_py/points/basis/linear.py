@@ -47,7 +47,7 @@ def _apart(scene: Any) -> dict[str, Any] | None:
 
 known_failure(
     Linear,
-    "bodies that break without reason",
+    "numerical fracture",
     when=lambda basis, scene: scene.moves and scene.elastic and scene.strain > STRETCH,
     reason="strains will be about {scene.strain:.1g} (from speed and weight); with a linear basis, "
     "points more than a cell apart separate (numerical fracture)",
