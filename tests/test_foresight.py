@@ -583,7 +583,7 @@ def test_units_are_named_where_the_step_is_far_above_the_stable_one(
     result = run_interpreted(text, command=command)
     assert result.err.count("warning: ") == 1 and "| set_dt(0.02)" in result.err
     assert ("units of densities, moduli, lengths and times may be mixed" in result.err) == told
-    assert ("in mm, t, s 1e-9" in result.err) == told
+    assert ("mm, t, s: 9810, 1e-9" in result.err) == told
 
 
 @pytest.mark.parametrize("command", ["run", "check"])
@@ -611,7 +611,15 @@ def test_speeds_that_no_solid_bears_are_told(run_interpreted, v, told):
     start = f"fix(v, initial_velocity_particles, all, {v}, 0)"
     said = run_interpreted(block(2, start, "run(1)"), command="check").err
     assert (f"points move at 1e+03, {1000 / 8.2:.3g}"[:28] in said) == told
-    assert ("The units of velocities, densities and moduli may be mixed" in said) == told
+    assert ("units of velocities, loads, densities and moduli may be mixed" in said) == told
+
+
+@pytest.mark.parametrize(("g", "told"), [(9.81, False), (9810, True)])
+def test_loads_that_crush_a_solid_are_reported(run_interpreted, g, told):
+    """The strain is about g L/c^2, with waves of 8.2."""
+    script = block(2, f"fix(g, body_force, all, 0, {-g})", "run(1)")
+    said = run_interpreted(script, command="check").err
+    assert ("a body has a strain of" in said and "| fix(g, body" in said) == told
 
 
 @pytest.mark.parametrize("command", ["run", "check"])

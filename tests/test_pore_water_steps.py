@@ -432,7 +432,7 @@ def test_a_dam_of_earth_lets_through_what_dupuit_found(run_script):
 @pytest.mark.parametrize(
     ("scheme", "words"),
     [
-        ("quasi-static, solver=amg", "solves water in pores directly"),
+        ("quasi-static, solver=amg", "supports water in pores only with a direct solver"),
         ("newmark", "does not support scheme newmark"),
     ],
 )

@@ -236,6 +236,7 @@ def test_times_are_medians_of_repetitions(folder):
         (["-var", "N"], "not a list of values"),
         (["-var", "N=1,,2"], "not a list of values"),
         (["-var", "N=1,1"], "has a value twice"),
+        (["-var", "N=1,5e6"], "expected: 1.5e6, or 1.0,5e6 for two values"),
         (["-var", "N=1,1", "-var", "speed=2,2", "-zip", "N,speed"], "same combination twice"),
         (["-var", "N=1", "-var", "N=2"], "given twice"),
         (["-var", "N=1:2"], "not a range"),

@@ -48,6 +48,9 @@ SI, MM = (7850, 2.1e11), (7.85e-9, 2.1e5)
         ("units(mm, t, s)", MM, "-9.81*min(time, 1)", "9810"),
         ("units(mm, g, ms)", (7.85e-3, 2.1e5), "9.8", "0.00981"),
         ("", MM, "-9.81", "9810"),
+        ("units(m, kg, s)", SI, "-9810", "9.81"),
+        ("", SI, "-9810", "9.81"),
+        ("", (1.0, 1e3), "-9810", None),
         ("units(mm, t, s)", MM, "-9810", None),
         ("units(m, kg, s)", SI, "-9.81", None),
         ("", SI, "-9.81*min(time, 1)", None),
@@ -59,7 +62,7 @@ def test_gravity_in_other_units_is_told(run_interpreted, units, steel, g, right)
     script = GRAVITY.format(units=units, rho=steel[0], E=steel[1], g=g)
     err = run_interpreted(script, command="check").err
     assert (f"fix: gravity is {right} there" in err) == (right is not None)
-    assert ("an acceleration of 9.81" in err) == (right is not None)
+    assert ("an acceleration of 9" in err) == (right is not None)
 
 
 def test_no_step_mends_units_that_were_doubted(run_interpreted):

@@ -33,12 +33,13 @@ PEEK = 100  # steps; a shorter run is only an inspection of a scene
 ENDLESS = 1e8
 MIXED = 300  # step / stable step above which wrong units are likelier
 DENSITIES = 10.0, 1e5  # kg/m^3, from foams to above osmium; gases are not checked
+CRUSHED = 1.0  # strain under the weight (stresses in kPa are a factor of 1000)
 IMPOSSIBLE = 30.0  # speed / wave speed (mm/s instead of m/s is a factor of 1000)
 SWAPPED = (1e4, 1e2, 3e4), (1e-2, 1e-11, 3e-8)  # density; moduli, in m, kg, s and mm, t, s
 SPEEDS = 1.0, 5e4  # wave speeds in m/s, from jelly to above diamond
 REST = "a scene at rest"
 UNITS = (
-    "in m, kg, s water has the density 1000, steel the modulus 2e11; in mm, t, s 1e-9 and 2e5 (MPa)"
+    "m, kg, s: gravity 9.81, water's density 1000, steel's modulus 2e11; mm, t, s: 9810, 1e-9, 2e5"
 )
 
 
@@ -189,19 +190,20 @@ def warn_about_steps(
     hub.later.clear()
 
 
-def _impossible_speeds(s: SceneFacts) -> Iterator[Advice]:
+def _impossible_values(s: SceneFacts) -> Iterator[Advice]:
     laws = [solid.material.law for solid in s.hub.solids.values()]
     solid = any(not any(law_traits(k).any_speed for k in law_kind(law)) for law in laws)
     if solid and s.speed > 1 and not s.hub.update.above_waves:
         s.hub.update.above_waves = [float(s.speed), float(s.waves)]
+    words = "The units of velocities, loads, densities and moduli may be mixed"
     if solid and s.speed > IMPOSSIBLE:
-        yield Advice(
-            "units of velocities",
-            f"points move at {s.fastest:.3g}, {s.speed:.3g} x the wave speed ({s.waves:.3g}): no "
-            "solid survives an impact at that speed. The units of velocities, densities and moduli "
-            "may be mixed",
-            UNITS,
-        )
+        fact = f"points move at {s.fastest:.3g}, {s.speed:.3g} x the wave speed ({s.waves:.3g})"
+        words = f"{fact}: no solid survives an impact at that speed. {words}"
+        yield Advice("units of velocities", words, UNITS)
+    elif solid and s.sag > CRUSHED:
+        words = f"under its load a body has a strain of {s.sag:.3g}, so it collapses. {words}"
+        mark = next(fix.mark for fix in s.hub.fixes.values() if fix.accelerates)
+        yield Advice("units of loads", words, UNITS, mark=mark)
 
 
 def _other_units(s: SceneFacts) -> Iterator[Advice]:
@@ -258,7 +260,7 @@ def warn(hub: Hub, simulation: Simulation, duration: float, halves: bool) -> Non
     if duration >= PEEK * simulation.dt:
         warn_about_weightless_water(hub, simulation)
     warn_about_rest(hub, simulation, duration)
-    _tell(hub, (*scene.advice("failure"), *_impossible_speeds(scene), *_other_units(scene)))
+    _tell(hub, (*scene.advice("failure"), *_impossible_values(scene), *_other_units(scene)))
 
 
 def warn_about_factor(hub: Hub) -> None:

@@ -124,8 +124,7 @@ def translate_particles(
     region
         ID of the region whose points move.
     shift
-        dx, dy, dz, one per dimension: numbers or formulas of x, y and z. NULL leaves a component
-        unchanged.
+        dx, dy, dz, one per dimension: formulas of x, y and z. NULL leaves a component unchanged.
 
     Example
     -------

@@ -2,8 +2,8 @@
 
 A kernel that indexes point arrays (components, points) with a `LaneGroup` gets `Lanes`: one number
 for each of 4 or 8 consecutive points. Node numbers in lanes gather from node arrays (nodes,
-components). Functions listed in ``scalarised`` of a class are called lane by lane. Each lane has
-the bits of the scalar operation; only sums at nodes differ, by round-off.
+components). Functions listed in ``scalarised`` of a class are called lane by lane. Each lane gives
+the result of the scalar operation bit for bit; only sums at nodes differ, by round-off.
 
 In the last group of a tile, lanes without a point load the first point and contribute nothing.
 """

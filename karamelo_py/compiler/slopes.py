@@ -1,8 +1,8 @@
 """Dual numbers: a value and its derivatives, in forward mode.
 
 Point functions of dual numbers return exact derivatives (Griewank & Walther 2008, "Evaluating
-Derivatives", chapter 3); for the stress of a law this is the consistent tangent. Values have the
-same bits as without derivatives. There is no code for slopes that are the literal 0.
+Derivatives", chapter 3); for the stress of a law this is the consistent tangent. Values are
+identical to a computation without derivatives. There is no code for slopes that are the literal 0.
 """
 
 import math

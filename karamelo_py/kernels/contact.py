@@ -274,7 +274,7 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The remainder is along a face or an edge, or 0. The parts are perpendicular: one impulse is
+    The remainder is along a face or an edge, or 0. As parts are perpendicular, one impulse is
     enough.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))

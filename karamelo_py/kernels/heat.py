@@ -106,7 +106,7 @@ SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# The same, and heat flow by present gradients.
+# The rows of `SHOW`, then the heat flow with present gradients.
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),

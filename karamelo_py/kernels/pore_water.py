@@ -26,7 +26,7 @@ AT_WATER = AtNodes(arrays.POST_WATER_TO_GRID, arrays.ON_SUMS, _of_water)
 
 
 def _rim(s):
-    # With a linear basis every node is at the rim. With splines, B is not exactly 0 inside.
+    # With a linear basis all nodes count as surface nodes. With splines, B is not exactly 0 inside.
     return 0.0 * _surface(s) if isinstance(s.basis, Linear) else _surface(s)
 
 

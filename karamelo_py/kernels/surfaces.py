@@ -2,9 +2,9 @@
 
 Faces (points in 1D, segments in 2D, triangles in 3D) are leaves of a binary tree of boxes; node k
 has children 2k and 2k + 1, so traversal needs no stack. A position is enclosed if its winding
-number is not 0: each face crossed by a ray along the last axis counts 1 or -1. For a common edge of
-two faces, crossings are computed with the same bits, so none is missed or counted twice. (Sunday
-2001; triangles: Ericson 2005, section 5.1.5.)
+number is not 0: each face crossed by a ray along the last axis counts 1 or -1. Two faces get
+identical crossings of their common edge, so none is missed or counted twice. (Sunday 2001;
+triangles: Ericson 2005, section 5.1.5.)
 """
 
 from collections.abc import Callable

@@ -42,8 +42,7 @@ class Tool(NamedTuple):
 def outlines(x: np.ndarray) -> list[np.ndarray]:
     """Return lines (m, 2) around points x (n, 2), along which points fill half of the area.
 
-    Points are spread over three cells, so that nodes at the surface get half as much as inner
-    nodes.
+    Points are spread over three cells, so nodes at the surface get half as much as inner nodes.
     """
     cell = spacing(x, 4)
     if not cell > 0:

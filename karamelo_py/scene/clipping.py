@@ -18,8 +18,8 @@ EDGE = 0.05  # tolerance for the smallest sub-boxes
 SHEET = 0.01  # tolerance for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off / box size
-# Limit of the fraction of a box in smallest sub-boxes whose surface is not plane. A corner in 2D or
-# an edge in 3D has 1/3 of ROUGH; thin sheets have more.
+# Largest part of a box that may consist of smallest sub-boxes with a curved surface. A corner in 2D
+# or an edge in 3D has 1/3 of ROUGH; thin sheets have more.
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # pieces of a box face per direction
@@ -30,7 +30,7 @@ class Pieces(NamedTuple):
     number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) of the box volume
-    # (m,) fraction of each box in smallest sub-boxes whose surface is not plane
+    # (m,) part of each box in smallest sub-boxes with a curved surface
     rough: np.ndarray
 
     def missed(self, size: float) -> float:

@@ -34,7 +34,7 @@ class Solid(Named):
     T0
         Initial temperature; default: the material's.
     GlueToSolid
-        Earlier solid whose velocity field it uses, in methods with a field per solid.
+        Earlier solid whose velocity field this solid uses, in methods with a field per solid.
     """
 
     catalogue = "solids"

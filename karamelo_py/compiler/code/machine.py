@@ -16,7 +16,7 @@ from llvmlite import binding as llvm
 # in 3D run 1.7 times as fast. In long loops, a separate counter for each array costs registers.
 OPTIONS = "--unroll-threshold=4000", "--disable-lsr"
 # With level 0, compilation takes half the time, and steps take up to four times as long; results
-# have the same bits.
+# are identical bit for bit.
 LEVEL = 0 if os.environ.get("KARAMELO_PY_OPTIMISATION") == "0" else 3
 
 

@@ -151,7 +151,7 @@ class InFile:
             return self._data[where]
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
-        # Read all at once, since NumPy would read number by number.
+        # Read all at once: NumPy would read one number at a time.
         return np.asarray(self[()], dtype)
 
 

@@ -29,17 +29,17 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
     update = hub.update
     method = update.method
     if update.thermal and any(solid.rigid for solid in hub.solids.values()):
-        yield "conducts no heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
+        yield "cannot conduct heat with rigid solids", f"mechanical, or {_EXPLICIT}", None
     if update.thermal and method.fields_per_solid:
-        yield "conducts no heat with contact", f"mechanical, or {_EXPLICIT}", method.mark
+        yield "cannot conduct heat with contact", f"mechanical, or {_EXPLICIT}", method.mark
     if update.scheme.solver == "amg" and any(s.material.fluid for s in hub.solids.values()):
-        yield "solves water in pores directly, not with solver=amg", "solver=direct, or auto", None
+        yield "supports water in pores only with a direct solver", "solver=direct, or auto", None
     if method.fields_per_solid and declared([update.scheme], "point_fields"):
         yield "does not support rho with contact", "beta and gamma, or rule=euler", None
     yield from _of_bodies(hub)
     kin = method.kinematics(hub)
     if method.fields_per_solid and isinstance(kin, Twisted):
-        yield "knows no friction of contact around an axis (twist=true)", _EXPLICIT, method.mark
+        yield "does not support contact with friction and twist=true", _EXPLICIT, method.mark
     for solid in hub.solids.values():
         law = solid.material.law
         if solid.rigid:
@@ -48,7 +48,7 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
         averaged = update.anti_locking and takes_average(law)
         if averaged and yields_early_with_fbar(law.strength):
             yield (
-                f"lets '{solid.id}' lose strength: with averaged pressure (F-bar) in its yield "
+                f"makes '{solid.id}' too weak: with averaged pressure (F-bar) in its yield "
                 "surface, the passive pressure of sand was 1.8 instead of 3",
                 "anti_volumetric_locking(false), a dilatancy of 1/3 of the friction, or "
                 f"{_EXPLICIT}",
@@ -58,14 +58,14 @@ def _reasons(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
             bears = _bears_shear(law, kin)
         except NoSlope as function:
             yield (
-                f"knows no derivative of {function}, which the law of '{solid.id}' calls",
+                f"cannot differentiate {function}, which the law of '{solid.id}' calls",
                 f"another function in the law, or {_EXPLICIT}",
                 solid.mark,
             )
             continue
         if not bears and not update.scheme.traits.inertia:
             yield (
-                f"finds no equilibrium of '{solid.id}', which sustains no shear: a gas or fluid",
+                f"finds no equilibrium of '{solid.id}': a gas or fluid carries no shear",
                 f"scheme(newmark), or {_EXPLICIT}",
                 solid.mark,
             )
@@ -133,11 +133,7 @@ def _of_bodies(hub: Hub) -> Iterator[tuple[str, str, Mark | None]]:
             instead = f"method(ulmpm/contacts, ...), or {_EXPLICIT}"
             yield f"supports fix {fix.style} only in ulmpm/contacts", instead, update.method.mark
     if fixes and update.scheme.solver == "amg":
-        yield (
-            "solves for rigid bodies directly, not with solver=amg",
-            "solver=direct, or auto",
-            None,
-        )
+        yield "supports rigid bodies only with a direct solver", "solver=direct, or auto", None
 
 
 def _bears_shear(law: Tag, kin: Tag) -> bool:

@@ -109,7 +109,7 @@ def refusals(hub: Hub, setup: Setup | None = None) -> Iterator[ScriptError]:
                 break
     if setup is not None and not hasattr(type(setup.basis), "line_nodes"):
         yield ScriptError(
-            f"a GPU does not know basis {hub.update.method.basis_name} , whose points reach "
+            f"a GPU does not support basis {hub.update.method.basis_name}, whose points reach "
             "nodes of several cells",
             mark=hub.update.method.mark,
             hint=f"linear, a spline or uGIMP, or {WITHOUT}",

@@ -24,8 +24,7 @@ def read_obj(path: Path) -> Mesh:
             elif word in names:
                 names[word] = tuple(rest)
             elif word == "f":
-                # Ignore texture and normal after a slash. Negative numbers count back from the last
-                # one.
+                # Ignore texture and normal after a slash. Negative numbers count from the end.
                 corners = [int(item.split("/", 1)[0]) for item in rest]
                 corners = [k - 1 if k > 0 else len(points) + k for k in corners]
                 if min(corners) < 0 or max(corners) >= len(points):

@@ -206,7 +206,7 @@ SIGN = np.uint64(1 << 63)
 class PositionQuantile(Compute):
     """Measure the coordinate below which a fraction of the mass lies, in each direction.
 
-    Published as ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points that fly ahead.
+    Publishes ID_x, ID_y, ID_z. Unlike max_position, it ignores a few points far ahead.
 
     Parameters
     ----------

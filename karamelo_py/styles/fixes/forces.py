@@ -33,6 +33,7 @@ from karamelo_py.styles.fixes.formulas import vector
 
 ACCELERATION = Powers(1, 0, -2)
 TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to above osmium; rare in other systems
+FOAM = 20.0  # density in kg/m^3, above those in g/cm^3
 
 
 def accelerate(node):
@@ -103,31 +104,33 @@ class BodyForce(Fix):
             self.node_fields = (MassTimesRadius, TorqueOfLoads, WorkAtNodes)
 
 
-def _is_gravity(formula: Expression) -> bool:
-    if formula.is_constant:
-        return 9.7 < abs(formula.constant) < 9.9
-    return re.search(r"(?<![\d.])9\.8\d*(?![\d.eE])", formula.text) is not None
+def _is_gravity(formula: Expression, g: float) -> bool:
+    text = str(formula.constant) if formula.is_constant else formula.text
+    numbers = re.findall(r"(?<![\w.])\d+\.?\d*(?![\w.])", text)
+    return any(0.99 * g < float(number) < 1.01 * g for number in numbers)
 
 
 def _gravity_in_other_units(fix: BodyForce, scene: Any) -> dict | None:
-    if not any(formula is not None and _is_gravity(formula) for formula in fix.formulas):
-        return None
-    units = fix.hub.output.units
-    densities = [1 / float(specific_volume(s.material.law)) for s in fix.hub.solids.values()]
-    if units and abs(units.si(ACCELERATION) - 1) > 1e-6:
+    units, formulas = fix.hub.output.units, [f for f in fix.formulas if f is not None]
+    volumes = [specific_volume(s.material.law) for s in fix.hub.solids.values()]
+    density = 1 / float(min(volumes))
+    if units:
         evidence, right = f"units({', '.join(units[:3])})", 9.81 / units.si(ACCELERATION)
-    elif not units and TONNES[0] < max(densities) < TONNES[1]:
-        evidence, right = f"a density of {max(densities):.3g}, as in mm, t, s,", 9810.0
+    elif TONNES[0] < density < TONNES[1]:
+        evidence, right = f"a density of {density:.3g}, as in mm, t, s,", 9810.0
     else:
-        return None
-    return {"evidence": evidence, "right": right, "fraction": 9.81 / right}
+        evidence, right = f"a density of {density:.3g}, as in m, kg, s,", 9.81
+    for g in (9.81, 9810.0) if units or not TONNES[1] < density < FOAM else ():
+        if abs(g / right - 1) > 1e-6 and any(_is_gravity(formula, g) for formula in formulas):
+            return {"evidence": evidence, "right": right, "g": g, "fraction": g / right}
+    return None
 
 
 known_failure(
     BodyForce,
     "units of gravity",
     when=_gravity_in_other_units,
-    reason="with {evidence} an acceleration of 9.81 is {fraction:.3g} of gravity",
+    reason="with {evidence} an acceleration of {g:g} is {fraction:.3g} times gravity",
     cure="gravity is {right:.6g} there",
 )
 

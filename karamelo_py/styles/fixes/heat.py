@@ -87,7 +87,7 @@ class TemperatureNodes(HeatFix):
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    # The temperature gradient for the heat flow must contain the prescribed value.
+    # Prescribe it before heat flows, so that temperature gradients include it.
     post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(hold_node, holds=True)
 

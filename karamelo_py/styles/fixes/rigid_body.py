@@ -102,8 +102,7 @@ class RigidBody(Fix):
     pass through held nodes, and, without fix contact/bodies, through each other.
 
     In load steps (scheme quasi-static) with ulmpm/contacts, loads and contact forces on the body
-    are in equilibrium at the end of each step; motion and turning are displacements per unit of
-    time.
+    are in equilibrium at the end of each step; velocities are displacements per unit time.
 
     See Also
     --------

@@ -259,8 +259,7 @@ class Reaction(Compute):
 
     Notes
     -----
-    The reactions of fixes velocity_nodes in the group are summed; before the first step, they are
-    0.
+    The reactions of fixes velocity_nodes in the group are summed, and 0 before the first step.
 
     See Also
     --------

@@ -43,7 +43,7 @@ class VelocityOfPoints(Fix):
 
 
 class VelocityParticles(VelocityOfPoints):
-    """Prescribe the velocity of points, as of a grip that moves other points through the grid.
+    """Prescribe the velocity of points, such as a grip that moves other points through the grid.
 
     Parameters
     ----------

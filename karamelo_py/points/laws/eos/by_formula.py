@@ -142,7 +142,7 @@ def eos_of(
 
 
 class StiffenedGas(NamedTuple):
-    """Pressure of a liquid under strong shocks, as of a gas with additional stiffness.
+    """Pressure of a liquid under strong shocks: a gas with additional stiffness.
 
     Parameters
     ----------

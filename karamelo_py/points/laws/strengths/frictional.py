@@ -66,7 +66,7 @@ def fraction_by_dilatancy(strength, memory):
     of two or three cells). Their stiffness in plastic flow is (a - f (1 - b + b a)) (a - d) times a
     positive number, where f and d are the sines of friction and dilatancy. With b = 0 it is
     negative for a between d and f, so that pressure grows in stripes and strength is lost. With b =
-    (f - d)/(f (1 - d)) it is a square.
+    (f - d)/(f (1 - d)) it is a square and never negative.
     """
     f, d = sines_after(strength, memory.ep)
     # the sine of a steep cone in plane strain may exceed 1
