@@ -40,8 +40,8 @@ steps, and fewer for more than 700 points. With `--full` it takes the whole run.
 
 Energy is relative to the largest energy ([monitor](energy.md#energy-monitor)). Momentum is relative
 to the largest impulse or to sqrt(2 m E), with the largest kinetic energy E. In axisymmetric scenes
-it is the momentum along the axis. Implicit steps have no momentum, since they show forces at the
-end of a step. Impulses are from fixes and rigid solids.
+it is the momentum along the axis. Implicit steps have no value for the momentum, because their
+forces are only known at the end of a step. Impulses are from fixes and rigid solids.
 
 | scene | steps | energy | momentum | why |
 |---|---|---|---|---|
