@@ -521,7 +521,7 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2.5, fibre=(1, 0, 0)",
          "no energy in stretching along the fibres", "max(I4 - 1, 0)"),
         ("I1 - 3 - 2*log(J) + (J - 1)^2, fibre=(1, 0, 0)", "does not contain I4", "with I4"),
-        ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2, fibre=(1, 0)", "'(1, 0)' is no direction",
+        ("I1 - 3 - 2*log(J) + (J - 1)^2 + (I4 - 1)^2, fibre=(1, 0)", "'(1, 0)' is not a direction",
          "(x, y, z)"),
     ],
 )  # fmt: skip
@@ -691,4 +691,4 @@ def test_laws_with_fibres_are_not_wrapped(run_interpreted):
     )
     for wrapper in ("material(w, mullins, m, 2, 1)", "viscosity(prony, m, g=0.2, tau=1)"):
         err = run_interpreted(script.format(wrapper), status=1).err
-        assert "is no isotropic elastic solid" in err
+        assert "is not an isotropic elastic solid" in err

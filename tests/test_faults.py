@@ -107,7 +107,7 @@ def test_init(hub):
         ("viewless", "initial_integrate has to take one argument, the view of the group"),
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
         ("formless", "the field Shapeless has no shape: scalar, vector, tensor or planar"),
-        ("oneword", "the field Wordy has columns that are no tuple of words, as in ('dose',)"),
+        ("oneword", "the field Wordy has columns that are not a tuple of words, as in ('dose',)"),
         ("doubled", "the field Sized: it starts from 2 numbers and has 1 components"),
         ("lost", "the field Unshaped: AttributeError: 'Line' object has no attribute 'dimensions'"),
         ("clashing", "Taken: the column 'vx' is one of every scene"),

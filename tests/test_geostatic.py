@@ -123,7 +123,7 @@ def test_gauss_points_go_to_the_middles_of_their_boxes(n):
 
 @pytest.mark.parametrize("d", [1, 2, 3])
 def test_layers_of_points_of_any_size(d):
-    """2 points per cell of clay under 3 of sand, and a width that is no multiple of either."""
+    """2 points per cell of clay under 3 of sand, and a width that is not a multiple of either."""
     for wide in (1.0, 0.9):
         layers = []
         for size, base, top in ((0.5, 0, 1), (1 / 3, 1, 2)):

@@ -494,7 +494,7 @@ def test_a_folder_is_followed(simulation, tmp_path, monkeypatch, capsys):
     assert next(counts) == 101 and len(Events(few.server.address).next()["frames"]) == 3
     few.server.close()
     (tmp_path / "empty").mkdir()
-    for name, said in (("empty", "neither a log nor a dump"), ("nowhere", "is no folder")):
+    for name, said in (("empty", "neither a log nor a dump"), ("nowhere", "is not a folder")):
         assert main(["view", "--live", str(tmp_path / name)]) == 1
         assert said in capsys.readouterr().err
 

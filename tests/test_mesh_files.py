@@ -903,7 +903,7 @@ def test_named_faces_are_loaded_with_their_whole_area(run_interpreted, tmp_path)
     )
     assert "edge_traction, ..., all, tx, ty" in run_interpreted(wrong, status=1).err
     wrong = script.replace("all, roof, SIDE", "all, body, all")
-    assert "region 'body' is no set of faces" in run_interpreted(wrong, status=1).err
+    assert "region 'body' is not a set of faces" in run_interpreted(wrong, status=1).err
 
 
 def test_a_large_face_loads_all_points_behind_it(run_interpreted, tmp_path):

@@ -1,4 +1,4 @@
-"""The parser: statements, arguments, precedence; what is no script is refused with a place."""
+"""The parser: statements, arguments, precedence; what is not a script is refused with a place."""
 
 import re
 import sys

@@ -401,7 +401,7 @@ def test_errors_carry_message_and_place(tmp_path, capsys):
         with pytest.raises(KeyError, match=says) as missing:
             sim.points[name]
         assert str(missing.value).startswith("there is no")
-    with pytest.raises(TypeError, match="is no number"):
+    with pytest.raises(TypeError, match="is not a number"):
         sim.region("box", "block", [0, 1])
     with pytest.warns(KarameloWarning, match="has no effect"):
         sim.command("dt_factor(0.5)\nset_dt(0.1)")
@@ -431,7 +431,7 @@ def test_a_text_of_one_line(tmp_path, monkeypatch):
         ({"out": "taken"}, 'cannot write to .*taken: .*\nexpected: a folder, .*\n.*out="files" is'),
         ({"out": "taken/files"}, "cannot write to .*files: "),
         ({"out": 3}, "out=3 is not the name of a folder"),
-        ({"script": 3}, "3 is no script\nexpected: the name of a script, or its text"),
+        ({"script": 3}, "3 is not a script\nexpected: the name of a script, or its text"),
     ],
 )
 def test_what_it_is_given_wrongly(tmp_path, monkeypatch, given, message):

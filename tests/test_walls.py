@@ -154,7 +154,7 @@ def test_points_of_flip_learn_the_speed_of_a_wall(run_interpreted, kind, walls, 
 @pytest.mark.parametrize("d", [1, 2, 3])
 @pytest.mark.parametrize("kind", ["ulmpm", "ulmpm/contacts"])
 def test_a_wall_past_the_end_of_the_domain_is_refused(run_interpreted, kind, d, end, refused):
-    """Where the last axis is no multiple of the cells, no node lies at its upper end."""
+    """Where the last axis is not a multiple of the cells, no node lies at its upper end."""
     script = f"""
     method({kind}, FLIP, linear, 1)
     dimension({d}, {"0, 0.5, " * (d - 1)}0, {end}, 0.1)

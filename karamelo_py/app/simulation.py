@@ -301,7 +301,7 @@ class Simulation:
     def _read(self, script: str | PathLike) -> None:
         if not isinstance(script, (str, PathLike)):
             raise ScriptError(
-                f"{script!r} is no script", expected=SCRIPT, hint="variables by name, as in N=3"
+                f"{script!r} is not a script", expected=SCRIPT, hint="variables by name, as in N=3"
             )
         exists = os.path.exists(script)  # also False if the text is too long for a name
         is_text = isinstance(script, str) and not exists and any(c in script for c in "\n(=")
@@ -376,7 +376,7 @@ class Simulation:
         if name.startswith("_") or not registry.knows("command", name):
             names = [*registry.names("command"), *dir(type(self))]
             hint = meant(name, names) or instead("command", name) or instead("fix", name)
-            raise AttributeError(f"there is no command '{name}'" + (f"; {hint}" if hint else ""))
+            raise AttributeError(f"there is not a command '{name}'" + (f"; {hint}" if hint else ""))
 
         command = registry.find("command", name)
         gives = command.__annotations__.get("return") not in (None, "None")
@@ -588,4 +588,4 @@ def _as_script_text(value: Any) -> str:
         texts = len(words) > 1 and all(re.fullmatch(r"[\w.:'-]+", word) for word in words)
         # Words that are separated only by blanks are text, not a formula.
         return f'"{value}"' if texts and not {"and", "or", "not"} & set(words) else value
-    raise TypeError(f"{value!r} is no number, text, True, False, None or function")
+    raise TypeError(f"{value!r} is not a number, text, True, False, None or function")

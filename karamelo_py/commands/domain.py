@@ -131,8 +131,7 @@ def boundary(
     Notes
     -----
     ``delete`` and ``reflect`` are for splashes; for a body against a wall, use fix velocity_nodes.
-    A warning names the first point that is deleted or reflected; the end of the run gives their
-    number.
+    A warning names the first point deleted or reflected; the end of the run gives their number.
 
     A point is deleted before the step in which it would leave: the run returns to its last stored
     state, at most a hundred steps earlier, and repeats these steps, with their Python hooks. If
@@ -184,7 +183,7 @@ def set_periodic(hub: Hub, directions: list[int], shear: float) -> None:
         length = domain.hi[k] - domain.lo[k]
         if abs(domain.cells_of_period(k) * h - length) > 1e-6 * h:
             raise ScriptError(
-                f"the length of the domain, {length:g}, is no multiple of the cells ({h:g})",
+                f"the length of the domain, {length:g}, is not a multiple of the cells ({h:g})",
                 argument="directions",
                 expected="dimension(...) with whole cells in periodic directions",
             )

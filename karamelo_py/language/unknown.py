@@ -101,7 +101,7 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
     head = re.match(r"\s*([a-z][\w-]*(?:/[\w-]+)*)\s*\(", code)
     if head and re.search("[-/]", head[1]) and (line := as_style(script, head[1])):
         return ScriptError(
-            f"'{head[1]}' is no command", mark=mark, hint=line, code="unknown-command"
+            f"'{head[1]}' is not a command", mark=mark, hint=line, code="unknown-command"
         )
     published = [value for value in script.hub.values.names() if value not in SEEDS]
     hint, alike = _meant_by(script, name, [*script.variables, *published, *SEEDS, *CONSTANTS])

@@ -121,7 +121,7 @@ def movie_format(path: Path) -> str:
     ending = path.suffix.lower().lstrip(".")
     if ending not in ("gif", "mp4") or "*" in path.name:
         raise ScriptError(
-            f"'{path.name}' is no name for a movie",
+            f"'{path.name}' is not a name for a movie",
             argument="file",
             expected="a file name without * that ends in .gif or .mp4",
         )

@@ -197,7 +197,7 @@ class NodeGroup(AnyGroup):
                 cells = int((end - low) / h)
                 raise ScriptError(
                     f"the nodes of group '{self.id}' lie at {'xyz'[k]} = {nearest[k]:g}, past the "
-                    f"end of the domain at {end:g}: its side is no multiple of the cells ({h:g})",
+                    f"end of the domain, {end:g}: its side is not a multiple of the cells ({h:g})",
                     argument="group",
                     expected=f"a domain that ends at {low + max(cells, 1) * h:g} or {nearest[k]:g}",
                 )

@@ -261,7 +261,7 @@ def _wrong_field(kind: Any) -> str:
         return " has no shape: scalar, vector, tensor or planar"
     columns = columns_of(kind)
     if not isinstance(columns, tuple):
-        return f" has columns that are no tuple of words, as in ({columns!r},)"
+        return f" has columns that are not a tuple of words, as in ({columns!r},)"
     return ""
 
 

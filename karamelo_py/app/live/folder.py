@@ -27,7 +27,7 @@ class FolderPage:
 
     def __init__(self, folder: Path):
         if not folder.is_dir():
-            raise ScriptError(f"{folder} is no folder", expected="the folder of a run")
+            raise ScriptError(f"{folder} is not a folder", expected="the folder of a run")
         self.folder = folder
         self._states: list[tuple[Path, int, int, float, int]] = []
         self._seen: dict[Path, float] = {}

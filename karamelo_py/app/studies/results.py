@@ -76,7 +76,8 @@ class Law:
         cases = [NamesOfCase("-law", {self.x: float(x)}) for x in xs]
         values = [evaluate(self.node, self.raw, case) for case in cases]
         if not all(isinstance(value, float) for value in values):
-            raise ScriptError(f"-law {self.text} is no number", expected=f"a formula of {self.x}")
+            message = f"-law {self.text} is not a number"
+            raise ScriptError(message, expected=f"a formula of {self.x}")
         return np.array(values)
 
 

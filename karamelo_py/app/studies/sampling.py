@@ -112,7 +112,7 @@ def correlation(path: Path, names: Sequence[str]) -> np.ndarray:
     square = matrix.shape == (len(names),) * 2
     if not (square and np.allclose(matrix, matrix.T) and np.allclose(np.diag(matrix), 1)):
         expected = f"{len(names)} rows of a symmetric matrix with a diagonal of 1"
-        raise ScriptError(f"{path} is no matrix of correlations", expected=expected)
+        raise ScriptError(f"{path} is not a matrix of correlations", expected=expected)
     least = float(np.linalg.eigvalsh(matrix).min())
     if not least > 1e-9:
         raise ScriptError(

@@ -87,7 +87,7 @@ def is_number_type(thing: Any) -> bool:
 
 def _counter(kinds: tuple) -> types.Integer:
     if not all(isinstance(kind, types.Integer) for kind in kinds):
-        raise Untraceable("the ends of a range are no whole numbers")
+        raise Untraceable("the ends of a range are not whole numbers")
     alike = all(kind == kinds[0] for kind in kinds)
     return kinds[0] if alike and kinds[0] in (types.int32, types.uint64) else types.int64
 

@@ -35,7 +35,7 @@ def _index(lowering: Any, thing: Any, count: Any) -> Any:
     """Compute an index, from the end if negative."""
     kind = types.unliteral(lowering.kind_of(thing))
     if not isinstance(kind, types.Integer | types.Boolean):
-        raise Untraceable(f"{kind} is no index")
+        raise Untraceable(f"{kind} is not an index")
     value = lowering.lowered(thing, types.intp)
     is_positive = isinstance(thing, int) and thing >= 0
     if is_positive or isinstance(kind, types.Boolean) or not kind.signed:

@@ -42,7 +42,7 @@ class Direction:
         formulas = formulas_of_place(hub, argument)
         if len(formulas) != 3:
             raise ScriptError(
-                f"'{argument.text}' is no direction",
+                f"'{argument.text}' is not a direction",
                 mark=argument.mark,
                 expected="(x, y, z), not (0, 0, 0)",
             )
@@ -100,7 +100,7 @@ def unit_vector(components: Sequence[float], argument: Argument) -> Vector:
     size = hypot(*components)
     if not 0 < size < np.inf:
         raise ScriptError(
-            f"'{argument.text}' is no direction",
+            f"'{argument.text}' is not a direction",
             mark=argument.mark,
             expected="(x, y, z), not (0, 0, 0)",
         )

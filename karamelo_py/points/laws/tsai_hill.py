@@ -99,7 +99,7 @@ class TsaiHill(NamedTuple):
 def refuse_whole(residual: float) -> None:
     if not residual < 1:
         raise ScriptError(
-            f"a residual fraction of {residual:g} is no failure",
+            f"a residual fraction of {residual:g} means no failure",
             argument="residual",
             expected="a number above 0 and below 1",
         )

@@ -48,7 +48,7 @@ class ElasticMaterial(MaterialArgument):
         if law_traits(law).rebounds and is_isotropic(law):
             return None
         others = "a material such as neo-hookean, ogden, hyperelastic, hencky or linear"
-        return f"is no isotropic elastic solid, whose stress could {cls.purpose}", others
+        return f"is not an isotropic elastic solid, whose stress could {cls.purpose}", others
 
 
 def strained(law: Any, component: int) -> Any:
@@ -84,7 +84,7 @@ class Wlf(NamedTuple):
         values = [one.value(hub) for one in argument.listed()]
         numbers = [one for one in values if isinstance(one, float)]
         if not len(values) == len(numbers) == 3:
-            message = f"'{argument.text}' is no shift"
+            message = f"'{argument.text}' is not a shift"
             raise ScriptError(message, mark=argument.mark, expected=cls.script_kind)
         if not min(numbers[:2]) > 0:
             message = "C1 and C2 of a shift are above 0"

@@ -31,7 +31,7 @@ class VtkDump(TableDump):
         super().__init__(hub, every, file, *columns)
         if not self.one_file_per_step or self.file.suffix != ".vtu":
             stem = self.file.name.replace("*", "").partition(".")[0]
-            message = f"{file} is no name for a series of files"
+            message = f"{file} is not a name for a series of files"
             expected = "a file name with a * and the ending .vtu"
             hint = f"{stem or 'points'}.*.vtu"
             raise ScriptError(message, argument="file", expected=expected, hint=hint)

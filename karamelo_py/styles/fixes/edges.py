@@ -335,7 +335,7 @@ class EdgeTraction(EdgeFix):
     ):
         super().__init__(hub, group, region)
         if (side == "all") != (region.sheet is not None):
-            kind = "is no set of faces" if side == "all" else "is a set of faces"
+            kind = "is not a set of faces" if side == "all" else "is a set of faces"
             raise ScriptError(
                 f"region '{region.id}' {kind}",
                 argument="side",

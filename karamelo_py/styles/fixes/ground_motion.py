@@ -92,7 +92,7 @@ class RecordedAcceleration(BaseAcceleration):
         first, *others = (np.asarray(column, float) for column in table.columns.values())
         if not others or len(first) < 2 or (np.diff(first) <= 0).any():
             raise ScriptError(
-                f"{table.name} is no record: its columns are {', '.join(table.columns)}",
+                f"{table.name} is not a record: its columns are {', '.join(table.columns)}",
                 mark=argument.mark,
                 expected="rows of increasing time, and acceleration",
             )

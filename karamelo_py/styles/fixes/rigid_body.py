@@ -42,7 +42,7 @@ class Components:
     def numbers(self) -> list[float]:
         if not all(item is not None and item.is_constant for item in self.items):
             raise ScriptError(
-                f"{self.argument.text} is no fixed number", mark=self.argument.mark,
+                f"{self.argument.text} is not a fixed number", mark=self.argument.mark,
                 expected="numbers", hint="motion and turning take formulas of time",
             )  # fmt: skip
         return [float(item.constant) for item in self.items if item is not None]

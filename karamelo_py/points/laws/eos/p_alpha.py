@@ -83,7 +83,7 @@ class PAlphaConstants(NamedTuple):
         inner = solid.laws["eos"]
         if len(initial_energy(inner, 1.0)):
             raise ScriptError(
-                f"eos '{solid.id}' is no equation of state of a solid",
+                f"eos '{solid.id}' is not an equation of state of a solid",
                 argument="solid",
                 expected="an eos linear, shock or fluid",
             )
