@@ -528,7 +528,7 @@ def test_mp4_without_ffmpeg_is_refused(plane, monkeypatch):
     with pytest.raises(ScriptError, match="ffmpeg") as caught:
         Movie(plane, 2, "m.mp4", 3, 2)
     assert caught.value.hint == "m.gif"
-    with pytest.raises(ScriptError, match="no name for a movie"):
+    with pytest.raises(ScriptError, match="not a name for a movie"):
         Movie(plane, 2, "m.*.gif", 3, 2)
 
 

@@ -70,7 +70,7 @@ def test_longer_sequences_begin_with_shorter_ones():
 def test_correlated_normals(tmp_path):
     """Correlation and means of 4096 points of Sobol' within a part of 1/sqrt(n)."""
     (tmp_path / "r.csv").write_text("b,a\n0.7,1\n1,0.7\n".replace("b,a", "a,b"), "utf-8")
-    with pytest.raises(ScriptError, match="no matrix of correlations"):
+    with pytest.raises(ScriptError, match="not a matrix of correlations"):
         sampling.correlation(tmp_path / "r.csv", ["a", "b"])
     (tmp_path / "r.csv").write_text("a,b\n1,0.7\n0.7,1\n", "utf-8")
     factor = sampling.correlation(tmp_path / "r.csv", ["a", "b"])

@@ -415,7 +415,7 @@ def test_relaxation_below_the_step_is_reported(run_interpreted, more):
         ("prony, rubber, g=(0.3, 0.2), tau=(1, 0)", "0 is not a number above 0"),
         ("prony, rubber, g=(0.3, x), tau=(1, 2)", "x is not a number above 0"),
         ("prony, rubber, g=(0.6, 0.4), tau=(1, 2)", "no stiffness would remain"),
-        ("prony, wood, g=0.3, tau=1", "no isotropic elastic solid"),
+        ("prony, wood, g=0.3, tau=1", "not an isotropic elastic solid"),
         ("prony, damper, g=0.3, tau=1", "has viscosity prony already"),
         ("prony, thick, g=0.3, tau=1", "before viscosity(newtonian, ...)"),
         ("prony, nothing, g=0.3, tau=1", "unknown material"),
@@ -446,7 +446,7 @@ def test_constants_that_no_body_has(run_interpreted, line, says):
         ("rubber, 2, -9", "above 0"),
         ("stiff, 2, 9", "no energy that could soften"),
         ("warm, 2, 9", "no energy that could soften"),
-        ("wood, 2, 9", "no isotropic elastic solid"),
+        ("wood, 2, 9", "not an isotropic elastic solid"),
         ("damper, 2, 9", "mullins, ...) of the material without viscosity"),
     ],
 )

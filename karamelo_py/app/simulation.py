@@ -376,7 +376,7 @@ class Simulation:
         if name.startswith("_") or not registry.knows("command", name):
             names = [*registry.names("command"), *dir(type(self))]
             hint = meant(name, names) or instead("command", name) or instead("fix", name)
-            raise AttributeError(f"there is not a command '{name}'" + (f"; {hint}" if hint else ""))
+            raise AttributeError(f"there is no command '{name}'" + (f"; {hint}" if hint else ""))
 
         command = registry.find("command", name)
         gives = command.__annotations__.get("return") not in (None, "None")

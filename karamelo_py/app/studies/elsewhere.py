@@ -434,7 +434,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
             kind = getattr(dask_jobqueue, QUEUES[options.on])
             command = kind.job_cls.submit_command.split()[0]
             if shutil.which(command) is None:
-                raise ValueError(f"there is not a command {command}")
+                raise ValueError(f"there is no command {command}")
             cluster = kind()
             _closed(ends, cluster.close, timeout=PATIENCE)
             cluster.scale(jobs=jobs)
