@@ -1,5 +1,6 @@
 """Gases take as heat the kinetic energy that a transfer takes."""
 
+import numpy as np
 import pytest
 from conftest import INPUTS
 from selection import parameters
@@ -108,3 +109,43 @@ def test_sound_with_gradients_that_jump(run_interpreted, basis, speed):
     # 0.021 and 0.035, a fourth of that with cells half as large; of the other speed 1.98.
     assert done.log.err_history[-1] < 0.05
     assert ("sound in a gas: " in done.err) == (speed < 1)
+
+
+FLUX = """
+    method(ulmpm, FLIP, quadratic-spline, 1{more})
+    dimension(1, 0, 1, 0.1)
+    region(all, block, 0, 1)
+    eos(air, ideal-gas, 1, 1.4, p=1, Q1=1, Qh=5e4)
+    strength(none, fluid, 0)
+    material(air, eos-strength, air, none)
+    solid(air, region, all, 2, air, 0.1)
+    p = -1 - 0.5*cos(PI*x0)
+    fix(p, initial_stress, all, p, p, p, 0, 0, 0)
+    fix(v, initial_velocity_particles, all, -x0)
+    region(half, block, 0, 0.5)
+    group(half, particles, region, half, all)
+    compute(left, average_stress, half)
+    compute(all, average_stress, all)
+    waves = all_11 - left_11
+    set_dt(1e-6)
+    set_output(1)
+    log_modify(custom, step, time, waves)
+    run(7)
+"""
+
+
+def test_artificial_heat_flux(run_interpreted):
+    """A uniform rate of compression d: the first cosine of e decays by exp(-pi^2 Qh Q1 h^2 d t).
+
+    From the second step on, since the first has no viscous pressure yet.
+    """
+    log = run_interpreted(FLUX.format(more=", thermo-mechanical")).log
+    decay = log.waves[3:] / log.waves[2]
+    exact = np.exp(-(np.pi**2) * 5e4 * 0.1**2 * (log.Time[3:] - log.Time[2]))
+    assert exact[-1] < 0.98
+    assert abs(decay - exact).max() < 1e-3
+
+
+def test_heat_flux_needs_a_method_with_heat(run_interpreted):
+    out = run_interpreted(FLUX.format(more=""), command="check").out
+    assert "Qh of material air has no effect" in out

@@ -18,5 +18,5 @@ CASE = Case(
     exact=16.0,
     measure=density,
     source="Noh 1987",
-    advice="wall heating",
+    advice="shocks of material",
 )

@@ -61,10 +61,17 @@ CHOICES = (
         ("in.static_collapse",),
     ),
     Choice(
+        lambda s: s.gas and s.speed > 1 and s.d > 1 and s.diffuses,
+        ("method(ulmpm, APIC, cubic-spline)", "scheme(usavg)"),
+        "a gas that moves faster than its waves, with an artificial heat flux",
+        "densities behind the shock are the closest",
+        ("in.noh",),
+    ),
+    Choice(
         lambda s: s.gas and s.speed > 1 and s.d > 1,
         ("method(ulmpm, FLIP, quadratic-spline, 1)", "scheme(usavg)"),
         "a gas that moves faster than its waves",
-        "densities behind the shock are the closest",
+        "densities behind the shock are the closest without a heat flux",
         ("in.noh",),
     ),
     Choice(

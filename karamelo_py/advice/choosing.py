@@ -29,6 +29,7 @@ from karamelo_py.points.laws import LawTraits, can, conductivity, law_kind, law_
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.strengths import shear_modulus
 from karamelo_py.points.laws.strengths.mu_i import MuI
+from karamelo_py.points.laws.viscosity import diffuses_energy
 from karamelo_py.run.loop import RunLoop
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.hub import Hub
@@ -91,8 +92,12 @@ class Scouted(SceneFacts):
         return [part for law in self.laws if (part := parameter(law, "strength", None))]
 
     implicit = property(lambda s: s.scheme.traits.implicit)
+    diffuses = property(lambda s: any(map(diffuses_energy, s.laws)))
     hot = property(
-        lambda s: any(can(law, conductivity) and conductivity(law, 1.0) > 0 for law in s.laws)
+        lambda s: (
+            s.diffuses
+            or any(can(law, conductivity) and conductivity(law, 1.0) > 0 for law in s.laws)
+        )
     )
     elastic_only = property(lambda s: not any(map(yields, s.laws)))
     gas = property(lambda s: any(can(law, taken_heat) for law in s.laws))

@@ -22,6 +22,7 @@ from karamelo_py.kernels.watch import (
 )
 from karamelo_py.points.laws import can
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.laws.viscosity import diffuses_energy
 from karamelo_py.run.lower.build import warms_by_friction
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
@@ -52,7 +53,8 @@ def unknown_work(hub: Hub) -> str:
 
 
 def unknown_heat(hub: Hub) -> bool:
-    return warms_by_friction(hub) or any(
+    energies = any(diffuses_energy(solid.material.law) for solid in hub.solids.values())
+    return energies or warms_by_friction(hub) or any(
         name in HEAT_STAGES and not isinstance(hook, CompiledHook)
         for fix in hub.fixes.values()
         for name, hook in fix.hooks().items()

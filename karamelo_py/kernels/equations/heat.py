@@ -60,14 +60,18 @@ def at_least_round_off(weight):
     return max(weight, round_off(weight))
 
 
-@eq.reads("mass", "state", "material")
+@eq.reads("mass", "state", "material", "deformation gradient")
 def content(pt):
     """Store and return heat capacity, conductivity times volume, and temperature of a point."""
-    (law, state), mass, p = pt.law_and_state, pt.w.points.mass[pt.p], pt.p
+    (law, state, f), mass, p = pt.law_state_F, pt.w.points.mass[pt.p], pt.p
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
     capacity = mass * laws.heat_capacity(law, pt.dt)
-    conductance = volume * laws.conductivity(law, pt.dt)
+    inverse_square = pt.w.grid.inv_h * pt.w.grid.inv_h * inverse_stretch_squared(
+        pt.w.frame, pt.kin, f, pt.dt
+    )
+    most = 1 / (real(4 * pt.kin.dimension, pt.dt) * pt.dt * inverse_square)
+    conductance = volume * laws.conductivity_now(law, pt.kin, state, most)
     pt.of(Temperature)[0, p] = T
     pt.of(Capacity)[0, p] = capacity
     pt.of(Conductance)[0, p] = conductance

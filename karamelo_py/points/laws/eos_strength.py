@@ -8,7 +8,7 @@ temperature are optional (`Absent`, without numbers in the state). Plug-ins may 
 from math import log, sqrt
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from karamelo_py.compiler import where
+from karamelo_py.compiler import real, where
 from karamelo_py.language.arguments import Argument, look_up
 from karamelo_py.language.rules import known_failure, suggestion
 from karamelo_py.language.scene import Scene
@@ -50,9 +50,18 @@ from karamelo_py.points.laws.temperatures import (
     thermal_pressure,
 )
 from karamelo_py.points.laws.thermoelastic import is_warm
-from karamelo_py.points.laws.viscosity import damped, inviscid, viscous_pressure, viscous_speed
+from karamelo_py.points.laws.viscosity import (
+    ViscosityWithFlux,
+    damped,
+    diffuses_energy,
+    energy_diffusivity,
+    inviscid,
+    viscous_pressure,
+    viscous_speed,
+)
 from karamelo_py.script.errors import ScriptError, unknown
 
+LEAST_LEFT = 0.1  # fraction of its energy that a point retains when heat flows
 WARMER = 1.0, 100.0, 1000.0  # temperatures in kelvin above the present one, for a test
 
 
@@ -217,6 +226,14 @@ suggestion(
 )
 
 
+suggestion(
+    EosStrength,
+    when=lambda law, scene: diffuses_energy(law) and not scene.hub.update.thermal,
+    cost="Qh of material {owner.id} has no effect: no heat flows",
+    instead="method(..., thermo-mechanical), or leave Qh out",
+)
+
+
 def _supersonic(law, scene):
     return can(law, eos.taken_heat) and scene.speed > 1
 
@@ -235,11 +252,27 @@ known_failure(
 known_failure(
     EosStrength,
     "wall heating in material '{owner.id}'",
-    when=lambda law, scene: _supersonic(law, scene) and not isinstance(law.viscosity, Absent),
+    when=lambda law, scene: (
+        _supersonic(law, scene)
+        and not isinstance(law.viscosity, Absent)
+        and not (diffuses_energy(law) and scene.hub.update.thermal)
+    ),
     reason="artificial viscosity initially overheats a gas that hits a wall, an axis or a "
     "point: its density there stays too low, around a point by half at four cells and by a "
     "quarter at ten cells, with any basis, transfer and step",
-    cure="finer cells, or TPIC with quadratic-spline, dt_factor(0.1), and no Q1 and Q2",
+    cure="Q1=0.1, Q2=0.1 and Qh=3 in eos ideal-gas, with method(ulmpm, APIC, cubic-spline, "
+    "thermo-mechanical) and scheme(usavg)",
+)
+known_failure(
+    EosStrength,
+    "shocks of material '{owner.id}'",
+    when=lambda law, scene: (
+        (_supersonic(law, scene) and diffuses_energy(law) and scene.hub.update.thermal)
+        and (scene.linear or not scene.moments)
+    ),
+    reason="with {scene.transfer_name} and {scene.basis_name} functions, densities of points "
+    "behind a shock scatter by half or more of their mean",
+    cure="method(ulmpm, APIC, cubic-spline, thermo-mechanical) and scheme(usavg)",
 )
 
 
@@ -513,11 +546,31 @@ def _dissipated_energy_eos_strength(law, kin, state):
 
 @laws.temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
+    """Return the temperature, or internal energy per mass if artificial heat flows."""
+    if isinstance(law.viscosity, ViscosityWithFlux):
+        return state.m.energy[0] * laws.specific_volume(law.eos)
     return sum(state.m.heat)
 
 
 laws.hand_on(EosStrength, "eos", "", (laws.specific_volume,))
-laws.hand_on(EosStrength, "temperature", "", (laws.heat_capacity, laws.conductivity))
+laws.hand_on(EosStrength, "temperature", "", (laws.conductivity,))
+
+
+@laws.hands_on(laws.heat_capacity, EosStrength)
+def _heat_capacity_eos_strength(law, template):
+    if isinstance(law.viscosity, ViscosityWithFlux):
+        return real(1, template)
+    return laws.heat_capacity(law.temperature, template)
+
+
+@laws.conductivity_now.on(EosStrength)
+def _conductivity_now_eos_strength(law, kin, state, most):
+    if not isinstance(law.viscosity, ViscosityWithFlux):
+        return laws.conductivity(law, most)
+    J, _, m = state
+    density = 1 / (laws.specific_volume(law.eos) * J)
+    flux = energy_diffusivity(law.viscosity, m.viscous[0], density, sound(law, J, m))
+    return density * min(flux, most)
 
 
 @laws.wave_speed_squared.on(EosStrength)
@@ -603,17 +656,23 @@ def _damage_initiation_eos_strength(law, kin, state):
 
 @laws.with_temperature.on(EosStrength)
 def _with_temperature_eos_strength(law, kin, state, T):
+    if isinstance(law.viscosity, ViscosityWithFlux):
+        before = state.m.energy[0]
+        after = max(T / laws.specific_volume(law.eos), LEAST_LEFT * before)
+        return _heated_by(state, after - before)
     heat = at_temperature(state.m.heat, T)
     return state._replace(m=state.m._replace(heat=heat))
 
 
 @laws.warmed.on(EosStrength)
 def _warmed_eos_strength(law, kin, state, heat):
+    taken = eos.taken_heat(law.eos, state.m.energy, heat)
+    return _heated_by(state, taken[0]) if len(taken) else state
+
+
+def _heated_by(state, heat):
     m = state.m
-    taken = eos.taken_heat(law.eos, m.energy, heat)
-    if not len(taken):
-        return state
-    energy, loss = m.energy[0] + taken[0], tuple([lost + taken[0] for lost in m.loss])
+    energy, loss = m.energy[0] + heat, tuple([lost + heat for lost in m.loss])
     return state._replace(m=m._replace(energy=(energy, *m.energy[1:]), loss=loss))
 
 

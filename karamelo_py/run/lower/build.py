@@ -33,6 +33,7 @@ from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.further import with_rate, without_rate
 from karamelo_py.points.laws.placed import with_directions
 from karamelo_py.points.laws.temperatures import initial_heat
+from karamelo_py.points.laws.viscosity import diffuses_energy
 from karamelo_py.points.transfers import flip_coefficient, lost_fractions, stores_moment
 from karamelo_py.run import periodic
 from karamelo_py.run.boxes import no_nodes
@@ -86,7 +87,8 @@ def check_scene(hub: Hub) -> None:
     method = hub.update.method
     try:
         method.check(hub)
-        warm = any(laws.can(solid.material.law, initial_heat) for solid in hub.solids.values())
+        materials = [solid.material.law for solid in hub.solids.values()]
+        warm = any(laws.can(law, initial_heat) or diffuses_energy(law) for law in materials)
         if hub.update.thermal and not warm:
             raise ScriptError(
                 "the method is thermo-mechanical, and no solid has a temperature",
