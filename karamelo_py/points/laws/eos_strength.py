@@ -270,7 +270,7 @@ known_failure(
         (_supersonic(law, scene) and diffuses_energy(law) and scene.hub.update.thermal)
         and (scene.linear or not scene.moments)
     ),
-    reason="with {scene.transfer_name} and {scene.basis_name} functions, densities of points "
+    reason="with {scene.transfer_name} and the basis {scene.basis_name}, densities of points "
     "behind a shock scatter by half or more of their mean",
     cure="method(ulmpm, APIC, cubic-spline, thermo-mechanical) and scheme(usavg)",
 )
