@@ -165,7 +165,7 @@ def collides(hub: Hub) -> tuple[str, str] | None:
             "such impulses that it resolves, less with a shorter time step",
             "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
         )
-    if hub.update.method.fields_per_solid:
+    if hub.update.method.fields_per_solid and hub.update.scheme.traits.implicit:
         cause = "collisions: nodes of a surface lose their velocity of approach"
         return cause, "finer cells, which reduce the loss in a collision"
     return None
@@ -173,10 +173,10 @@ def collides(hub: Hub) -> tuple[str, str] | None:
 
 def words_of_contact(simulation: Simulation) -> dict[str, str]:
     largest = float(simulation.energy_watch.watch.largest_energy)
-    lost = simulation.points.total("contact loss")
-    if not lost > LEAST * largest:
+    lost = simulation.hub.fields.lost_by_contact()
+    if not abs(lost) > LEAST * largest:
         return {}
-    much = f"{100 * lost / largest:.3g} % of the largest, by damping and friction of contact"
+    much = f"{100 * lost / largest:.3g} % of the largest, by inelastic contact and friction"
     return {"lost by contact": f"{much} (in the work above)"}
 
 

@@ -159,6 +159,7 @@ class Narrator(Listener):
             "steps": steps,
             "time": simulation.time,
             "energy_change_percent": simulation.energy_watch.change(),
+            "lost_by_contact": self.hub.fields.lost_by_contact(),
             "path_cells": inf if simulation.implicit else float(simulation.control.motion[0].path),
             "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
             "processor_s_in_steps": float(worked),

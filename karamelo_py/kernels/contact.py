@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import kernel, noinline, point_function
-from karamelo_py.compiler.fields import field
+from karamelo_py.compiler.fields import Field, StepField, field, unknowns
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     DT,
@@ -37,13 +37,22 @@ from karamelo_py.kernels.arrays import (
     Nodes,
     Tag,
     of_change,
+    of_force,
     of_momentum,
     vector_at,
 )
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
 from karamelo_py.kernels.table import AtNodes, Once, each_node
-from karamelo_py.kernels.totals import WORK, add_to, add_torque, carry, counts, publish
+from karamelo_py.kernels.totals import (
+    CONTACT_LOSS,
+    WORK,
+    add_to,
+    add_torque,
+    carry,
+    counts,
+    publish,
+)
 from karamelo_py.points.basis.surface import ENTRIES
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import dot, vector, zero_vector
@@ -56,10 +65,22 @@ MEMORY = 100  # steps after a contact in which shapeless bodies approach a wall 
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
 
+class ContactImpulse(StepField):
+    """Impulse of contact on a node in this step; its moment, around an axis."""
+
+    shape = unknowns
+
+
+class StrainingChange(Field):
+    """Change of the velocity that strains a node, by the last active contact there."""
+
+    shape = staticmethod(lambda kin: kin.dimension)
+
+
 class SeparateFields(NamedTuple):
     """Contact at nodes where several of F fields have mass; S solids."""
 
-    node_fields = (Normal, Centre)
+    node_fields = (Normal, Centre, ContactImpulse, StrainingChange)
     looks_beyond = 1  # cells beyond the points' nodes where sums are used
 
     stride: int  # difference of node numbers between consecutive fields, at one position
@@ -110,6 +131,12 @@ def take_around(kin, bodies, control, sides, impulse):
 
 
 @point_function(otherwise=True)
+def work_around(kin, nodes, n):
+    """Return the work of contact around the axis in the step."""
+    return 0.0
+
+
+@point_function(otherwise=True)
 def stay_around(kin, bodies, pair, sides, share):
     """Make a sticking pair's angular velocities, as used to strain points, equal."""
 
@@ -131,6 +158,11 @@ class Touched(NamedTuple):
     """Selects the pairs that were in contact in a step."""
 
     step: int
+
+
+class Place(NamedTuple):
+    node: int
+    count: int  # bodies that meet there
 
 
 class Side(NamedTuple):
@@ -496,13 +528,16 @@ def _share(contact, i, j):
 
 
 @noinline
-def _take(contact, control, side, k, impulse):
-    field_, i, n, per_mass, x = side
+def _take(bodies, control, side, k, impulse):
+    contact, (field_, i, n, per_mass, x) = bodies.contact, side
     slot = contact.prescribed[n, k]
     if not _immovable(contact, n, k):
         contact.change[i, k] += impulse * per_mass
+        field(bodies.nodes.fields, ContactImpulse)[n, k] += impulse
     if not counts(control.ranks, n):
         return
+    if _immovable(contact, n, k) and not contact.free[field_]:
+        add_to(control.totals, CONTACT_LOSS, -float(impulse * bodies.nodes.update[n, k]))
     force = impulse / control.step[0].kick
     add_to(control.totals, contact.slot[field_] + k, force)
     add_torque(control.totals, contact.torque[field_], x, k, force)
@@ -514,16 +549,6 @@ def _take(contact, control, side, k, impulse):
 
 def _before(kin, nodes, n, per_mass):
     return per_mass * vector_at(kin, nodes.sums, n, of_momentum(kin), zero_vector(kin, 0.0))
-
-
-@noinline
-def _work_on(bodies, n, k, impulse, per_mass):
-    """Return the work of a rigid body's impulse at the node's mean velocity in the step."""
-    _, kin, nodes = bodies
-    if _immovable(bodies.contact, n, k):
-        return 0.0
-    before = per_mass * nodes.sums[n, of_momentum(kin) + k]
-    return impulse * 0.5 * (before + nodes.update[n, k] + impulse * per_mass)
 
 
 @noinline
@@ -561,9 +586,6 @@ def _touch_pair(bodies, control, i, j, where):
         warmth = contact.warmth[a, b]
         warm_node(field(nodes.fields, FrictionalHeat), n, warmth * heat * pair.per_n)
         warm_node(field(nodes.fields, FrictionalHeat), m, (1.0 - warmth) * heat * pair.per_m)
-    # With a free rigid body, only the work on the other body counts, without this heat.
-    free = contact.free[a] != contact.free[b]
-    work = 0.0 if free else -heat  # work of rigid bodies
     first, second = Side(a, i, n, pair.per_n, where.x), Side(b, j, m, pair.per_m, where.x)
     if rub > 0:
         for speed in around[:1]:
@@ -572,23 +594,14 @@ def _touch_pair(bodies, control, i, j, where):
         impulse = push * pair.outward[k] / size
         if rub > 0:
             impulse += rub * slide[k]
-        _take(contact, control, first, k, -impulse)
-        _take(contact, control, second, k, impulse)
-        if free:
-            work += _work_on(bodies, m, k, impulse, pair.per_m) if contact.free[a] else 0.0
-            work += _work_on(bodies, n, k, -impulse, pair.per_n) if contact.free[b] else 0.0
-        elif contact.rigid[a] and not _immovable(contact, m, k):
-            work += impulse * nodes.update[n, k]
-        elif contact.rigid[b] and not _immovable(contact, n, k):
-            work -= impulse * nodes.update[m, k]
+        _take(bodies, control, first, k, -impulse)
+        _take(bodies, control, second, k, impulse)
         for slot, sign in ((contact.pair[a, b], -1.0), (contact.pair[b, a], 1.0)):
             if slot >= 0 and counts(control.ranks, n):
                 force = sign * impulse / control.step[0].kick
                 add_to(control.totals, slot + k, force)
                 if contact.torques[slot]:
                     add_torque(control.totals, contact.torques[slot], where.x, k, force)
-    if counts(control.ranks, n):
-        add_to(control.totals, WORK, float(work))
 
 
 @noinline
@@ -612,14 +625,77 @@ def _touch_place(bodies, control, count, where):
 
 
 @noinline
+def _count_work(control, n, work):
+    """Add work on the body of a node, which contact does not give to other bodies."""
+    if counts(control.ranks, n):
+        add_to(control.totals, WORK, work)
+        add_to(control.totals, CONTACT_LOSS, -work)
+
+
+@noinline
+def _count_impulses(bodies, control, place, now):
+    """Count the work of impulses, with the mean velocities in the step.
+
+    With FLIP 1 it is exact if `now`, the velocities (N, d) after the step, are those of the points.
+    """
+    contact, kin, nodes = bodies
+    impulse = field(nodes.fields, ContactImpulse)
+    for i in range(place.count):
+        n, work = _node(contact, place.node, i), 0.0
+        for k in range(kin.dimension):
+            before = nodes.sums[n, of_momentum(kin) + k] / nodes.sums[n, MASS]
+            work += float(impulse[n, k] * 0.5 * (before + now[n, k]))
+        _count_work(control, n, work + work_around(kin, nodes, n))
+
+
+@noinline
+def _count_strain(bodies, control, place):
+    """Count half of the work of stress that contact takes by its change of the straining velocity.
+
+    Stress does work with the mean of the straining velocities before and after the forces.
+    """
+    contact, kin, nodes = bodies
+    change = field(nodes.fields, StrainingChange)
+    for i in range(place.count):
+        n, work = _node(contact, place.node, i), 0.0
+        for k in range(kin.dimension):
+            work -= float(nodes.sums[n, of_force(kin) + k] * change[n, k])
+        _count_work(control, n, 0.5 * control.step[0].kick * work)
+
+
+@noinline
+def _forget_changes(bodies, place):
+    change = field(bodies.nodes.fields, StrainingChange)
+    for i in range(place.count):
+        for k in range(bodies.kin.dimension):
+            change[_node(bodies.contact, place.node, i), k] = 0
+
+
+@noinline
+def _begin_to_count(bodies, control, place):
+    contact, nodes = bodies.contact, bodies.nodes
+    last, impulse = 0, field(nodes.fields, ContactImpulse)
+    for i in range(place.count):
+        n = _node(contact, place.node, i)
+        for j in range(i + 1, place.count):
+            last = max(last, abs(contact.touched[n, contact.meeting[j]]))
+        for k in range(len(bodies.kin.Unknown._fields)):
+            impulse[n, k] = 0
+    if last > 0 and last == int(control.values[TIMESTEP]):
+        _count_strain(bodies, control, place)
+    else:
+        _forget_changes(bodies, place)
+
+
+@noinline
 def touch_node(bodies, grids, control, n):
     contact = bodies.contact
     count = _meet(contact, bodies.nodes, n)
     if count > 1:
-        grid = record(grids, n // contact.stride)
-        step = int(control.values[TIMESTEP]) + 1
-        node, x = n % contact.stride, node_position(grid, n)
-        _touch_place(bodies, control, count, Where(node, x, grid.h, control.values[DT], step))
+        node, x = n % contact.stride, node_position(record(grids, n // contact.stride), n)
+        _begin_to_count(bodies, control, Place(node, count))
+        h, step = record(grids, n // contact.stride).h, int(control.values[TIMESTEP]) + 1
+        _touch_place(bodies, control, count, Where(node, x, h, control.values[DT], step))
 
 
 @noinline
@@ -642,6 +718,7 @@ def _begin_forces(s):
 def _publish_forces(s):
     contact, control, forces = s.contact, s.control, s.contact.forces
     carry(control.totals[WORK])
+    carry(control.totals[CONTACT_LOSS])
     for c in range(1, 1 + forces[0]):
         publish(control, forces[c], 3)
     for c in range(contact.reactions[0]):
@@ -736,8 +813,9 @@ def _stay_pair(bodies, i, j, pair, sticks):
 
 
 @noinline
-def _stay_place(bodies, node, count, step):
-    contact, kin, nodes = bodies
+def _stay_place(bodies, s, place, steps):
+    (contact, kin, nodes), (node, count) = bodies, place
+    step = int(s.control.values[TIMESTEP]) + steps
     last = len(kin.Unknown._fields) - 1
     if not _count_partners(Touched(step), bodies, node, count):
         return
@@ -754,14 +832,8 @@ def _stay_place(bodies, node, count, step):
             n = _node(contact, node, i)
             for k in range(kin.dimension):
                 nodes.velocity[n, k] += contact.change[i, k]
+                field(nodes.fields, StrainingChange)[n, k] += contact.change[i, k]
             turn(kin, nodes, n, contact.change[i, last], True)
-
-
-@noinline
-def stay_node(bodies, step, n):
-    count = _meet(bodies.contact, bodies.nodes, n)
-    if count > 1:
-        _stay_place(bodies, n % bodies.contact.stride, count, step)
 
 
 def _stay(steps):
@@ -773,12 +845,29 @@ def _stay(steps):
     """
 
     def stay(s, n):
-        step = int(s.control.values[TIMESTEP]) + steps
-        if step > 0:  # none before the first step
-            stay_node(_bodies(s), step, n)
+        bodies = _bodies(s)
+        count = _meet(bodies.contact, bodies.nodes, n)
+        if count > 1:
+            place = Place(n % s.contact.stride, count)
+            _forget_changes(bodies, place)
+            if steps:
+                _count_impulses(bodies, s.control, place, s.nodes.velocity)
+            if int(s.control.values[TIMESTEP]) + steps > 0:  # none before the first step
+                _stay_place(bodies, s, place, steps)
+            if steps:
+                _count_strain(bodies, s.control, place)
 
     return (each_node(stay),)
 
 
+def _work_by_update(s, n):
+    count = _meet(s.contact, s.nodes, n)
+    if count > 1:
+        place = Place(n % s.contact.stride, count)
+        _count_impulses(_bodies(s), s.control, place, s.nodes.update)
+        _count_strain(_bodies(s), s.control, place)  # usf strains once
+
+
 SeparateFields.rows_before = _stay(0)  # type: ignore[attr-defined]
 SeparateFields.rows_after = _stay(1)  # type: ignore[attr-defined]
+SeparateFields.rows_work = (each_node(_work_by_update),)  # type: ignore[attr-defined]

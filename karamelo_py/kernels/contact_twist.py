@@ -9,7 +9,7 @@ from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import contact
 from karamelo_py.kernels.arrays import MASS
 from karamelo_py.kernels.equations.twist import AngularVelocity, SumsAround, UpdateAround
-from karamelo_py.kernels.totals import add_to, counts
+from karamelo_py.kernels.totals import CONTACT_LOSS, add_to, counts
 from karamelo_py.points.kinematics.twist import Twisted
 
 AROUND = 2
@@ -44,11 +44,23 @@ def _take_around_twisted(kin, bodies, control, sides, impulse):
     for side, sign in ((first, -1.0), (second, 1.0)):
         slot = fields.prescribed[side.n, AROUND]
         _change(bodies, side.n, side.i, sign * impulse, r)
+        if not slot:
+            field(nodes.fields, contact.ContactImpulse)[side.n, AROUND] += sign * r * impulse
         if counts(control.ranks, side.n):
             torque = sign * r * impulse / control.step[0].kick
             add_to(control.totals, fields.torque[side.field] + 1, torque)
             if slot:
                 add_to(control.totals, slot - 1, -torque)
+                omega = field(nodes.fields, UpdateAround)[side.n, 0]
+                add_to(control.totals, CONTACT_LOSS, -float(sign * r * impulse * omega))
+
+
+@contact.work_around.on(Twisted)
+def _work_around_twisted(kin, nodes, n):
+    """Return the work with the mean of the angular velocities before the step and w*."""
+    sums, update = field(nodes.fields, SumsAround), field(nodes.fields, UpdateAround)
+    impulse = field(nodes.fields, contact.ContactImpulse)[n, AROUND]
+    return float(0.5 * impulse * (sums[n, 1] / sums[n, 0] + update[n, 0]))
 
 
 def _change(bodies, n, i, impulse, r):

@@ -12,7 +12,7 @@ from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
 from karamelo_py.kernels.surfaces import Surface, depth, distance, encloses, nearest, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
-from karamelo_py.kernels.totals import WORK, add_to
+from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
@@ -200,6 +200,7 @@ def _give_to_points(body, s, block, number, measures):
                 torque = (contact.at[i] * f[j] - contact.at[j] * f[i]) / kick
                 s.control.values[contact.torque + c] += torque
     add_to(s.control.totals, WORK, work)
+    add_to(s.control.totals, CONTACT_LOSS, -work)
 
 
 @noinline
@@ -341,7 +342,9 @@ def _part(s):
         else:
             for number, block in enumerate(s.blocks):
                 _give_to_points(body, s, block, number, True)
+        before = motion.work_of(body)
         motion.finish_step(body, s.control, s.kin.dimension)
+        add_to(s.control.totals, CONTACT_LOSS, before + motion.work_of(body))
         energy += motion.kinetic_energy(body)
     s.control.energy[0].of_bodies = energy
 

@@ -106,6 +106,7 @@ class RigidBodies(NamedTuple):
     node_fields = (RigidSums,)
     rows = (each_node(_impose_node), *PUBLISH)
     rows_before = rows_after = (each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
+    rows_work = ()
 
     force: np.ndarray  # (n,) slot of the force on each point's solid, or -1
     torque: np.ndarray  # (n,)

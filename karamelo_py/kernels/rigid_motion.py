@@ -464,6 +464,15 @@ def _velocities_of(body, momentum):
 
 
 @noinline
+def work_of(body):
+    """Return half of the work that contact in the step would do with the present velocity."""
+    state, total, work = body.state[0], body.solution.total, 0.0
+    for k in range(3):
+        work += 0.5 * (total[k] * state.v[k] + total[3 + k] * state.spin[k])
+    return work
+
+
+@noinline
 def finish_step(body, control, dimension):
     """Set the momentum after contact, move the body, and publish its values."""
     state, work, values = body.state[0], body.solution, control.values

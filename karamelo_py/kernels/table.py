@@ -534,7 +534,7 @@ UPDATE = (
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
 )
-ACCELERATE = (*UPDATE, WORK_OF_LOADS)
+ACCELERATE = (*UPDATE, WORK_OF_LOADS, SceneTask(lambda s: s.contact.rows_work))
 MOVE = (
     Gather(Move()),
     AtPoints(arrays.POST_GRID_TO_POINT, 1),

@@ -23,8 +23,9 @@ COARSE, FINE = 1e-200, 1e200  # range of the largest term that allows integer su
 MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign; ordered like the numbers
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
-# Rows of totals, in slots whose published values (time, timestep, dt) are not sums.
-KINETIC, STORED, WORK = 0, 1, 2
+# Rows of totals, in slots whose published values (time, timestep, dt, none) are not sums.
+KINETIC, STORED, WORK, CONTACT_LOSS = 0, 1, 2, 3
+SINCE_START = slice(WORK, CONTACT_LOSS + 1)
 
 
 class Alone(NamedTuple):

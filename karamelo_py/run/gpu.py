@@ -21,7 +21,7 @@ from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_p
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.table import take
-from karamelo_py.kernels.totals import WORK
+from karamelo_py.kernels.totals import CONTACT_LOSS, WORK
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK, more_of
 from karamelo_py.points.basis import support
@@ -317,7 +317,7 @@ class StepsOnCard:
         if not len(self.table):
             return []
         publish = self._publish_some((0, len(self.table)), last)
-        return [*self.collect(*self._slots()), *self.collect(WORK, WORK + 1), publish]
+        return [*self.collect(*self._slots()), *self.collect(WORK, CONTACT_LOSS + 1), publish]
 
     def _publish_some(self, numbers: tuple[int, int], always: bool) -> KernelLaunch:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
@@ -341,7 +341,7 @@ class StepsOnCard:
                 launches.append(self.of_points(fixes.add_more, block, copies))
         if field(s.nodes.fields, WorkAtNodes) is not None:
             launches.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
-        launches += [*self.collect(0, WORK + 1), *self.collect(*solids)]
+        launches += [*self.collect(0, CONTACT_LOSS + 1), *self.collect(*solids)]
         before, behind = (
             self.launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
         )

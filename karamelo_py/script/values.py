@@ -19,7 +19,8 @@ def in_a_row(suffixes: Sequence[str]) -> bool:
 class Values:
     """Named numbers in an array that kernels read and write.
 
-    The array is never reallocated. Slots 0, 1 and 2 are time, timestep (the step number) and dt.
+    The array is never reallocated. Slots 0, 1 and 2 are time, timestep (the step number) and dt;
+    slot 3 has no name (`kernels.totals`).
     """
 
     def __init__(self) -> None:
@@ -32,6 +33,7 @@ class Values:
         self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
+        self._reserve(1)
 
     def publish(self, name: str, value: float = 0.0) -> int:
         """Publish a number and return its slot. A known name retains its slot."""

@@ -13,7 +13,7 @@ from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, row
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.arrays import Hooks, Nodes, Points, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
-from karamelo_py.kernels.totals import WORK, carry
+from karamelo_py.kernels.totals import SINCE_START, carry
 from karamelo_py.output.fields import PIECE
 from karamelo_py.run.boxes import numbers, used
 from karamelo_py.run.mpi.partition import by_tile, join_tilings, share_of_tiling, stripped, work_of
@@ -39,7 +39,7 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
             yield f"tiling/{k}/{name}", getattr(block.tiling, name)[:rows]
     yield from simulation.domain.state().items()
     yield "clock", s.control.clock
-    yield "work", s.control.totals[WORK]
+    yield "work", s.control.totals[SINCE_START]
     for name, array in kept_at_nodes(s):
         yield f"kept/{name}", array
     for k, block in enumerate(s.blocks):
@@ -125,7 +125,8 @@ def _shown_by_nodes(simulation: SceneState) -> Iterator[Stored]:
 def in_file(state: dict[str, np.ndarray]) -> Iterator[Stored]:
     """Yield a state in the form in which files store it: digits of exact sums are normalised."""
     work = state["work"].copy()
-    carry(work)
+    for total in work:
+        carry(total)
     yield from wholes(state | {"clock": state["clock"].view(np.ndarray), "work": work})
 
 

@@ -12,7 +12,7 @@ from karamelo_py.kernels import ranks
 from karamelo_py.kernels.arrays import DT, TIMESTEP, Hooks, NoHooks, Setup
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.ranks import Linked
-from karamelo_py.kernels.totals import WORK, rounded
+from karamelo_py.kernels.totals import CONTACT_LOSS, rounded
 from karamelo_py.run.checkpoint.arrays import kept_at_nodes, own_share, remembered_at, take_points
 from karamelo_py.run.mpi import partition
 from karamelo_py.run.mpi.whole import Whole
@@ -215,7 +215,7 @@ class Subdomain(WholeDomain):
 
     def _totals(self, first: int, count: int) -> None:
         rows = slice(first, first + count)
-        if WORK < first < len(self.control.values) and not self.at_once:
+        if CONTACT_LOSS < first < len(self.control.values) and not self.at_once:
             self.due.update(range(first, first + count))
             self.control.answer[:count] = self.control.values[rows]
             return

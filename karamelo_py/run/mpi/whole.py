@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from karamelo_py.kernels.arrays import Setup, arrays_of
-from karamelo_py.kernels.totals import WORK
+from karamelo_py.kernels.totals import SINCE_START
 from karamelo_py.run.boxes import numbers
 from karamelo_py.run.checkpoint.arrays import of_nodes
 from karamelo_py.run.lower.build import lower
@@ -77,8 +77,8 @@ class Whole:
     def gather(self) -> None:
         simulation, comm = self.simulation, self.simulation.comm
         totals = simulation.control.totals
-        parts = comm.gather(self._own() | {"work": totals[WORK].copy()})
-        totals[WORK] = 0
+        parts = comm.gather(self._own() | {"work": totals[SINCE_START].copy()})
+        totals[SINCE_START] = 0
         blocks = []
         blocks_here = zip(self.setup.blocks, simulation.setup.blocks, strict=True)
         for k, (block, mine) in enumerate(blocks_here):
@@ -94,7 +94,7 @@ class Whole:
             blocks.append(block._replace(points=points))
         self.setup = self.setup._replace(blocks=tuple(blocks))
         if comm.leads:
-            totals[WORK] = sum(share["work"] for share in parts)
+            totals[SINCE_START] = sum(share["work"] for share in parts)
             self._join(parts)
 
     def _own(self) -> dict:

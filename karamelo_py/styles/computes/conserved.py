@@ -9,6 +9,7 @@ from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix
+from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 
 
@@ -102,6 +103,43 @@ class DissipatedEnergy(Energy):
 
     published = ("",)
     measured = "dissipated"
+
+
+class ContactLoss(Compute):
+    """Measure the energy that contact has dissipated since the start; published as ID.
+
+    Example
+    -------
+    compute(Ec, contact_loss, all)
+    log_modify(custom, step, time, Ec)
+
+    Notes
+    -----
+    Contact at nodes (ulmpm/contacts) is inelastic, and dissipates the impulse times the mean of the
+    approach velocities before and after the step, as does friction. It is the work of bodies that
+    contact does not move, and of free rigid bodies, less the work on the points. With musl and
+    usavg it is exact for FLIP 1. Damping and friction of contact/surface and contact/rigid_body
+    are included. The group must be all points. Load steps are not included.
+
+    See Also
+    --------
+    dissipated_energy, energy_balance
+    """
+
+    published = ("",)
+    unit = ENERGY
+
+    def __init__(self, hub: Hub, group: ParticleGroup):
+        super().__init__(hub, group)
+        if not group.all:
+            raise ScriptError(
+                "contact at nodes acts between solids, not between groups of points",
+                argument="group",
+                expected="the group all",
+            )
+
+    def refresh(self) -> None:
+        self.publish_all(self.hub.fields.lost_by_contact())
 
 
 class Drift:

@@ -47,7 +47,7 @@ def takes_average(law: Any) -> bool:
 
 
 class NoContact(NamedTuple):
-    rows = rows_before = rows_after = ()
+    rows = rows_before = rows_after = rows_work = ()
 
 
 class Method:
