@@ -309,7 +309,9 @@ def test_a_wheel_on_a_slope(run_script, mu, far):
 def test_a_box_floats(run_script, refine, draught, end):
     """in.floating: Archimedes. The level is 1.2 + (draught - 0.4) 1.2/4 with what is displaced."""
     text = (INPUTS / "in.floating").read_text("utf-8").replace("refine = 1", f"refine = {refine}")
-    log = run_script(text.replace("end = 8", f"end = {end}")).log
+    result = run_script(text.replace("end = 8", f"end = {end}"))
+    assert abs(float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])) < 1.5
+    log = result.log
     late = log.Time > end / 2
     depth = 1.08 + 0.4 - log.b_y[late].mean()  # d - 0.3 d
     assert depth / 0.7 == pytest.approx(0.48, rel=draught)

@@ -11,6 +11,11 @@ pytestmark = pytest.mark.xdist_group("rigid scenes")
 FULL = pytest.mark.full
 
 
+def closing(result):
+    """The change of the balance of energy, in % of the largest."""
+    return float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])
+
+
 def late(log, name, since):
     """The mean of a column from a part of the run on."""
     return log[name][log.Time > since * log.Time[-1]].mean()
@@ -65,6 +70,13 @@ def test_a_ball_comes_to_rest_in_grains(run_script, change, within):
     assert weight == pytest.approx(density * np.pi / 6 * 0.0254**3, rel=0.1)
 
 
+def test_the_energy_of_a_ball_and_grains_closes(run_script):
+    text = (INPUTS / "in.crater").read_text("utf-8").replace("refine = 1", "refine = 2/3")
+    result = run_script(text, "-var", "alpha", "1", "-var", "T", "0.03")
+    assert abs(closing(result)) < 1
+    assert float(re.search(r"lost by contact +(\S+) %", result.out)[1]) > 10
+
+
 @pytest.mark.parametrize(
     ("refine", "mu"), [(0.75, 0), *(pytest.param(1, mu, marks=FULL) for mu in (0, 1))]
 )
@@ -111,8 +123,7 @@ def test_a_projectile_goes_through_a_plate(run_script, refine):
         result = run_script(INPUTS / "in.perforation", *words, folder=f"v{speed}")
         remains.append(-result.log.b_vy[-1])
         assert np.ptp(result.log.momentum) < 1e-8 * abs(result.log.momentum[0])
-        lost = float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])
-        assert abs(lost) < 0.3
+        assert abs(closing(result)) < 0.3
     assert remains[0] == pytest.approx(181.1, rel=0.04 if refine > 1 else 0.12)
     part = 0.197 / (0.197 + plug)
     limit = 285.4**2 - (remains[0] / part) ** 2
@@ -127,8 +138,7 @@ def test_a_wheel_in_sand(run_script):
     assert late(result.log, "pull", 0.6) == pytest.approx(15, rel=0.25)
     assert late(result.log, "sinkage", 0.9) == pytest.approx(17.5e-3, rel=0.3)
     assert late(result.log, "load", 0.6) == pytest.approx(80, rel=0.02)
-    lost = float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])
-    assert abs(lost) < 0.5 and "warning" not in result.err
+    assert abs(closing(result)) < 0.5 and "warning" not in result.err
 
 
 # --- nothing passes ---------------------------------------------------------------------------

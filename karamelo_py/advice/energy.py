@@ -176,8 +176,10 @@ def words_of_contact(simulation: Simulation) -> dict[str, str]:
     lost = simulation.hub.fields.lost_by_contact()
     if not abs(lost) > LEAST * largest:
         return {}
-    much = f"{100 * lost / largest:.3g} % of the largest, by inelastic contact and friction"
-    return {"lost by contact": f"{much} (in the work above)"}
+    much = f"{100 * abs(lost) / largest:.3g} % of the largest"
+    if lost < 0:
+        return {"gained in contact": f"{much}, e.g. by points that begin inside a body"}
+    return {"lost by contact": f"{much}, by inelastic contact and friction (in the work above)"}
 
 
 def words_of_change(hub: Hub, fraction: float) -> str:

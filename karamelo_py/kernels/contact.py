@@ -160,7 +160,7 @@ class Touched(NamedTuple):
     step: int
 
 
-class Place(NamedTuple):
+class Together(NamedTuple):
     node: int
     count: int  # bodies that meet there
 
@@ -693,7 +693,7 @@ def touch_node(bodies, grids, control, n):
     count = _meet(contact, bodies.nodes, n)
     if count > 1:
         node, x = n % contact.stride, node_position(record(grids, n // contact.stride), n)
-        _begin_to_count(bodies, control, Place(node, count))
+        _begin_to_count(bodies, control, Together(node, count))
         h, step = record(grids, n // contact.stride).h, int(control.values[TIMESTEP]) + 1
         _touch_place(bodies, control, count, Where(node, x, h, control.values[DT], step))
 
@@ -848,7 +848,7 @@ def _stay(steps):
         bodies = _bodies(s)
         count = _meet(bodies.contact, bodies.nodes, n)
         if count > 1:
-            place = Place(n % s.contact.stride, count)
+            place = Together(n % s.contact.stride, count)
             _forget_changes(bodies, place)
             if steps:
                 _count_impulses(bodies, s.control, place, s.nodes.velocity)
@@ -863,7 +863,7 @@ def _stay(steps):
 def _work_by_update(s, n):
     count = _meet(s.contact, s.nodes, n)
     if count > 1:
-        place = Place(n % s.contact.stride, count)
+        place = Together(n % s.contact.stride, count)
         _count_impulses(_bodies(s), s.control, place, s.nodes.update)
         _count_strain(_bodies(s), s.control, place)  # usf strains once
 

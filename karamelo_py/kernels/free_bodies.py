@@ -170,7 +170,7 @@ def _hold(s, slot, x, c, force):
 @noinline
 def _give_to_points(body, s, block, number, measures):
     kin, nodes, points, d = s.kin, s.nodes, block.points, s.kin.dimension
-    kick, work = s.control.step[0].kick, 0.0
+    kick = s.control.step[0].kick
     for i in range(body.count[0]):
         contact = body.contacts[i]
         if contact.block != number:
@@ -183,14 +183,10 @@ def _give_to_points(body, s, block, number, measures):
                 impulse, reaction = weight * contact.impulse[c], s.bodies.held[n, c]
                 if reaction and measures:
                     _hold(s, reaction - 1, node_position(grid, n), c, -impulse / kick)
-                elif nodes.sums[n, arrays.MASS] > 0 and not reaction:
-                    change = arrays.of_change(kin) + c
-                    if measures:
-                        # work by the mean velocity in the step, as for loads
-                        work += impulse * (nodes.update[n, c] - 0.5 * nodes.update[n, change])
-                    else:
-                        nodes.update[n, c] += impulse / nodes.sums[n, arrays.MASS]
-                        nodes.update[n, change] += impulse / nodes.sums[n, arrays.MASS]
+                elif nodes.sums[n, arrays.MASS] > 0 and not (reaction or measures):
+                    change = impulse / nodes.sums[n, arrays.MASS]
+                    nodes.update[n, c] += change
+                    nodes.update[n, arrays.of_change(kin) + c] += change
         if measures:
             s.control.values[contact.area] += contact.face if contact.push > 0 else 0.0
             for c in range(d):
@@ -199,6 +195,25 @@ def _give_to_points(body, s, block, number, measures):
                 i, j, f = (c + 1) % 3, (c + 2) % 3, contact.impulse
                 torque = (contact.at[i] * f[j] - contact.at[j] * f[i]) / kick
                 s.control.values[contact.torque + c] += torque
+
+
+@noinline
+def _work_on_points(body, s, block, number, now):
+    """Count the work on points, with the mean velocities in the step; `now`: those after it."""
+    kin, nodes, points, work = s.kin, s.nodes, block.points, 0.0
+    first = arrays.of_momentum(kin)
+    for i in range(body.count[0]):
+        contact = body.contacts[i]
+        if contact.block != number:
+            continue
+        grid, stencil = _stencil_of(s, points, contact.point)
+        for node in range(support(s.basis, kin)):
+            n, weight, _ = entry(s.basis, kin, grid, stencil, node)
+            mass = nodes.sums[n, arrays.MASS]
+            for c in range(kin.dimension):
+                if mass > 0 and not s.bodies.held[n, c]:
+                    mean = 0.5 * (nodes.sums[n, first + c] / mass + now[n, c])
+                    work += weight * contact.impulse[c] * mean
     add_to(s.control.totals, WORK, work)
     add_to(s.control.totals, CONTACT_LOSS, -work)
 
@@ -361,8 +376,18 @@ def _lead_point(s, block, p):
             points.v[c, p] = v
 
 
+def _count_work(velocity_of):
+    @kernel
+    def count(s):
+        for body in s.bodies.bodies:
+            for number, block in enumerate(s.blocks):
+                _work_on_points(body, s, block, number, velocity_of(s.nodes))
+
+    return (Once(count),)
+
+
 class NoBodies(NamedTuple):
-    rows_first = rows_last = rows_before = rows_after = ()
+    rows_first = rows_last = rows_before = rows_after = rows_work = ()
 
 
 class FreeBodies(NamedTuple):
@@ -376,10 +401,13 @@ class FreeBodies(NamedTuple):
     rows_last = Once(_part), each_point(_lead_point, Rigid)
     rows_before = (each_node(lambda s, n: _follow(s, n, False)),)
     rows_after = (each_node(lambda s, n: _follow(s, n, True)),)
+    rows_work = ()
 
 
 class BodiesAtPoints(FreeBodies):
     """Bodies without contact at nodes."""
 
     rows_last = (*FreeBodies.rows_last, AtNodes(arrays.POST_CONTACT, arrays.ON_UPDATE))
-    rows_before = rows_after = ()
+    rows_before = ()
+    rows_after = _count_work(lambda nodes: nodes.velocity)
+    rows_work = _count_work(lambda nodes: nodes.update)

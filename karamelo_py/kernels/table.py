@@ -502,6 +502,7 @@ WORK_OF_LOADS = WorkOfLoads()
 # The velocity that strains points must satisfy contact, too, unless it is v*.
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
+CONTACT_WORK = SceneTask(lambda s: (*s.bodies.rows_work, *s.contact.rows_work))
 CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
 SERIES = SceneTask(sum_series, "series of XPIC")
@@ -534,7 +535,7 @@ UPDATE = (
     AtNodes(arrays.POST_UPDATE_GRID_STATE, arrays.ON_UPDATE),
     CONTACT,
 )
-ACCELERATE = (*UPDATE, WORK_OF_LOADS, SceneTask(lambda s: s.contact.rows_work))
+ACCELERATE = (*UPDATE, WORK_OF_LOADS, CONTACT_WORK)
 MOVE = (
     Gather(Move()),
     AtPoints(arrays.POST_GRID_TO_POINT, 1),

@@ -105,7 +105,7 @@ class DissipatedEnergy(Energy):
     measured = "dissipated"
 
 
-class ContactLoss(Compute):
+class LostByContact(Compute):
     """Measure the energy that contact has dissipated since the start; published as ID.
 
     Example

@@ -80,7 +80,8 @@ class ULMPMContacts(Method):
     With bernstein-quadratic, contact begins as soon as two solids have mass at one node.
 
     Contact is inelastic at the nodes of a surface: colliding bars of 4, 8 and 16 cells lose 15, 11
-    and 4 % of the kinetic energy.
+    and 4 % of the kinetic energy. The summary of a run names this energy (``lost by contact``), as
+    does compute contact_loss.
 
     For a fixed base, use a rigid solid, or a solid with fix velocity_nodes for all components at
     all corners of its cells. With splines the base should be three cells thick: the surface of a
