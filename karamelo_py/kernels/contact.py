@@ -636,7 +636,7 @@ def _count_work(control, n, work):
 def _count_impulses(bodies, control, place, now):
     """Count the work of impulses, with the mean velocities in the step.
 
-    With FLIP 1 it is exact if `now`, the velocities (N, d) after the step, are those of the points.
+    `now`: velocities (N, d) after the step. If they are mapped from the points, FLIP 1 is exact.
     """
     contact, kin, nodes = bodies
     impulse = field(nodes.fields, ContactImpulse)
