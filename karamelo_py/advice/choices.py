@@ -19,6 +19,13 @@ class Choice(NamedTuple):
 
 CHOICES = (
     Choice(
+        lambda s: s.implicit and s.elastic_only and s.alone and s.weighed and not s.sparse,
+        ("method(tlmpm, FLIP, quadratic-spline, 1)",),
+        "load steps of an elastic body with a body force",
+        "stress varies within cells, and with a linear basis it is constant there",
+        ("in.static_column",),
+    ),
+    Choice(
         lambda s: s.implicit and s.elastic_only and s.alone,
         ("method(tlmpm, FLIP, linear, 1)",),
         "load steps of an elastic body",
@@ -82,11 +89,18 @@ CHOICES = (
         ("in.organ", "in.piston"),
     ),
     Choice(
+        lambda s: s.burns and s.alone and s.d == 1,
+        ("method(tlmpm, TPIC, quadratic-spline)",),
+        "a detonation in one dimension",
+        "points stay in their cells, so the peak is lowered least",
+        ("in.tnt_slab",),
+    ),
+    Choice(
         lambda s: s.gas,
         ("method({grid}, APIC, cubic-spline)",),
         "shocks in a gas",
         "APIC rings least after a shock, and corrected accelerations would overshoot there",
-        ("in.strong_shock", "in.sod", "in.blast", "in.tnt_slab"),
+        ("in.strong_shock", "in.sod", "in.blast"),
     ),
     Choice(
         lambda s: s.grains,
@@ -145,12 +159,26 @@ CHOICES = (
         ("in.taylor_bar", "in.billet"),
     ),
     Choice(
+        lambda s: s.loaded_slowly and s.alone and s.d == 1 and s.hub.domain.kin.hoops,
+        ("method(tlmpm, FLIP, Bernstein-quadratic, 1)",),
+        "a wall of an elastic tube or shell that is loaded slowly, by its radius alone",
+        "hoop stresses vary within cells",
+        ("in.lame", "in.shell"),
+    ),
+    Choice(
+        lambda s: s.loaded_slowly and s.alone and s.d < 3,
+        ("method(tlmpm, FLIP, quadratic-spline, 1)",),
+        "one elastic body that is held and loaded slowly",
+        "points stay in their cells, and stress varies within cells",
+        ("in.column", "in.cantilever"),
+    ),
+    Choice(
         lambda s: s.alone,
         ("method(tlmpm, PolyPIC, linear)", "scheme(usl)"),
         "one elastic body",
         "points stay in their cells, so a linear basis is second order, conserves energy and "
         "rotation, and visits points half as often",
-        ("in.energy_disk", "in.turns", "in.cantilever"),
+        ("in.energy_disk", "in.turns", "in.axis_aligned"),
     ),
     Choice(
         lambda s: s.rolls,
@@ -172,6 +200,13 @@ CHOICES = (
         "elastic bodies that slide on rigid ones",
         "friction is right within 1 %, also on leaning faces",
         ("in.slope_20", "in.slope_33", "in.slide"),
+    ),
+    Choice(
+        lambda s: s.led and s.grid == "ulmpm/contacts",
+        ("method(ulmpm/contacts, APIC, cubic-spline)",),
+        "elastic bodies that a moving rigid one presses",
+        "splines follow the surface more closely, and APIC damps vibrations",
+        ("in.hertz",),
     ),
     Choice(
         lambda s: s.grid == "ulmpm/contacts",

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.advice.basics import is_zero
-from karamelo_py.advice.bodies import fixes_at, yields
+from karamelo_py.advice.bodies import fixes_at, is_free, yields
 from karamelo_py.advice.choices import (
     ALTERNATIVES,
     BY_RULES,
@@ -46,6 +46,8 @@ NEUTRAL = (
 )
 
 CROSSED = 0.1  # number of cells through which stressed material may move
+TRANSITS = 10  # of waves through a body, below which loads are not slow
+SLOWLY = 0.4  # change of a load in a transit / range
 FAST = 0.005  # fraction of the wave speed above which impacts cause shocks
 
 
@@ -153,6 +155,42 @@ class Scouted(SceneFacts):
         soft = [body for body in self.bodies if not body.solid.rigid]
         times = (meetings(body.motion, boxes, body.solid.h) for body in soft)
         return any((time < self.duration).any() for time in times)
+
+    @property
+    def weighed(self) -> bool:
+        fixes = self.hub.fixes.values()
+        return any(fix.accelerates and not all(map(is_zero, fix.formulas)) for fix in fixes)
+
+    @property
+    def led(self) -> bool:
+        fixes = self.hub.fixes.values()
+        return any(fix.leads_points and not all(map(is_zero, fix.formulas)) for fix in fixes)
+
+    @property
+    def loaded_slowly(self) -> bool:
+        """Return whether bodies start at rest, are held, and loads change little in a transit.
+
+        A transit is the time that waves take along the longest side.
+        """
+        fixes = self.hub.fixes.values()
+        free = any(is_free(self, body) for body in self.bodies)
+        if free or self.fastest > 0 or any(f.presses or f.first_step_only for f in fixes):
+            return False
+        transit = max(motion.size for motion in self.motions) / self.waves
+        steps = self.duration / transit
+        if steps < TRANSITS:
+            return False
+        formulas = [f for fix in fixes for f in (*fix.formulas, *fix.components) if not is_zero(f)]
+        formulas = [f for f in formulas if "time" in f.names]
+        values, now = self.hub.values, self.hub.update.time
+        x = np.array([motion.centre for motion in self.motions])
+        loads = np.empty((min(int(steps), 100), len(formulas), len(x)))
+        for n, load in enumerate(loads):
+            values.set("time", now + n * transit)
+            for formula, of in zip(formulas, load, strict=True):
+                of[:] = formula.evaluate_points(values, x, x)
+        values.set("time", now)
+        return bool((abs(np.diff(loads, axis=0)).max(0) <= SLOWLY * np.ptp(loads, axis=0)).all())
 
     rubs = property(lambda s: any(fix.friction is not None for fix in s.hub.fixes.values()))
     # In plane stress and 1D, plastic flow does not constrain the volume of cells.
