@@ -203,7 +203,7 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.led and s.grid == "ulmpm/contacts",
-        ("method(ulmpm/contacts, APIC, cubic-spline)",),
+        ("method(ulmpm/contacts, APIC, quadratic-spline)",),
         "elastic bodies that a moving rigid one presses",
         "splines follow the surface more closely, and APIC damps vibrations",
         ("in.hertz",),
