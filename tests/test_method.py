@@ -158,6 +158,16 @@ RUBBER = "material(m, neo-hookean, 1000, 1e6, 0.3)"
 OTHER = "region(b2, block, 0.8, 1.2, 0.2, 0.6)\nsolid(other, region, b2, 2, m, 0.1)\n"
 FAST = "fix(v, initial_velocity_particles, g, 1e3, 0)"
 PAIR = f"{OTHER}group(g, particles, region, box, solid, body)\n{FAST}"
+PRESSED = f"""material(r, rigid, 1)
+{OTHER.replace("2, m", "2, r")}group(g, particles, region, b2, solid, other)
+fix(v, velocity_particles, g, -1, 0)
+log_modify(custom, step, ContactForce_body_x)
+"""
+HELD = """group(low, nodes, region, box, all)
+fix(hold, velocity_nodes, low, 0, 0)
+fix(weight, body_force, all, 0, -10*time)
+set_dt(0.01)
+"""
 DIAGONAL = PAIR.replace("1.2, 0.2, 0.6", "1.2, 0.8, 0.95").replace("1e3, 0", "1e3, 1e3")
 
 
@@ -194,6 +204,12 @@ def fluid(eos, strength="fluid, 0"):
          "scheme(quasi-static)\nset_dt(1)\ngroup(g, nodes, region, box, all)\n"
          "fix(press, velocity_nodes, g, 0, -1e-3)",
          "method(tlmpm, FLIP, Bernstein-quadratic, 1)"),
+        (RUBBER, HELD, "method(tlmpm, FLIP, quadratic-spline, 1)"),
+        (RUBBER, f"{HELD}scheme(quasi-static)\nset_dt(1)",
+         "method(tlmpm, FLIP, quadratic-spline, 1)"),
+        (RUBBER, HELD.replace("10*time", "sin(200*time)"),
+         "method(tlmpm, PolyPIC, linear); scheme(usl)"),
+        (RUBBER, PRESSED, "method(ulmpm/contacts, APIC, quadratic-spline)"),
         (RUBBER, f"{OTHER}fix(rub, contact/friction, body, other, 0.2)",
          "method(ulmpm/contacts, FLIP, cubic-spline, 0.99)"),
     ],

@@ -163,8 +163,10 @@ class Scouted(SceneFacts):
 
     @property
     def led(self) -> bool:
+        """Return whether a rigid solid moves as a fix prescribes."""
         fixes = self.hub.fixes.values()
-        return any(fix.leads_points and not all(map(is_zero, fix.formulas)) for fix in fixes)
+        led = any(fix.leads_points and not all(map(is_zero, fix.formulas)) for fix in fixes)
+        return led and len(self.soft) < len(self.hub.solids)
 
     @property
     def loaded_slowly(self) -> bool:
