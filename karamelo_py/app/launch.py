@@ -137,7 +137,7 @@ class Launcher:
             self.door.bind(self.name)
             self.door.listen(self.ranks)
             environment = {**OPEN_MPI, **PAGES, **os.environ, SOCKET: self.name}
-            # In a separate session, so that Ctrl-C is sent to this process only.
+            # Use a separate session, so that Ctrl-C is sent to this process only.
             self.process = subprocess.Popen(
                 self.command, env=environment, stdin=subprocess.DEVNULL, stdout=self.said,
                 stderr=self.said, start_new_session=True,

@@ -62,7 +62,7 @@ def _counted(array, i, step):
 def _largest(array, i, value):
     def codegen(builder, table, i, number):
         at = llvm.item_pointer(builder, array, table, (i,))
-        # Bits of non-negative floats have the order of the floats.
+        # Non-negative floats have the same order as their bits, read as integers.
         bits = builder.bitcast(number, I64)
         builder.atomic_rmw("umax", builder.bitcast(at, I64.as_pointer()), bits, "monotonic")
 

@@ -70,7 +70,7 @@ def _found_apart(job: Measurement) -> tuple[int, dict[str, Any]]:
         if job.ranks > 1:
             status = launch(job.ranks, words, module=MODULE)
         else:
-            # In a separate session, so that Ctrl-C is sent to this process only.
+            # Use a separate session, so that Ctrl-C is sent to this process only.
             with subprocess.Popen(
                 [*COMMAND, *words], stdin=subprocess.PIPE, start_new_session=True
             ) as process:

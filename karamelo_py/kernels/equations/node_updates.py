@@ -36,7 +36,7 @@ def unlimited(seen, n, mass, light):
 
 
 class WorkAtNodes(Field):
-    """Work at a node since the last energy check: on pore water, and of torques."""
+    """Work at a node since the last energy check: of loads on pore water, and of torques."""
 
 
 class SquaredMass(SummedField):

@@ -81,7 +81,7 @@ class JoinVelocity(NamedTuple):
 
 @node_task
 class JoinMean(NamedTuple):
-    """Gives all images of a node the sum of an average, before its division (F-bar)."""
+    """Gives all images of a node the sum for an average, not yet divided by the weight (F-bar)."""
 
     axis: Axis
 

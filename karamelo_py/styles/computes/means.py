@@ -262,7 +262,7 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Return integers that have the order of the floating-point numbers."""
+    """Return integers in the same order as the floating-point numbers."""
     bits = (numbers + 0.0).view(np.uint64)  # converts -0 to 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
