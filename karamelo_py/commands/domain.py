@@ -142,11 +142,11 @@ def boundary(
 
     In a periodic direction, bodies at opposite ends of the domain are in contact. The length of the
     domain must be a multiple of the cell size, and formulas that fixes evaluate at nodes should be
-    periodic. Points return to the domain every 10 steps; until then, dumps may show them outside.
-    Periodic directions need method ulmpm with a linear basis or splines, scheme musl, any transfer
-    except XPIC, and one process without a GPU. They cannot be combined with other styles of
-    boundary, axisymmetry, heat, contact of points, tools that end in a periodic direction, free
-    rigid bodies or pore_water.
+    periodic. Points return to the domain every 10 steps. Dumps may show them outside before, and
+    compute center_of_mass jumps when they return. Periodic directions need method ulmpm with a
+    linear basis or splines, scheme musl, any transfer except XPIC, and one process without a GPU.
+    They cannot be combined with other styles of boundary, axisymmetry, heat, contact of points,
+    tools that end in a periodic direction, free rigid bodies or pore_water.
 
     With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
     initial_velocity_particles), without F-bar. Momentum is conserved to round-off. The energy
