@@ -250,7 +250,7 @@ class AngularMomentum(Momentum):
     Parameters
     ----------
     cx, cy, cz
-        The centre.
+        Position of the centre c.
 
     Example
     -------

@@ -82,7 +82,7 @@ class EosFormula(NamedTuple):
         temperature T. Script variables are replaced by their present values; time and other varying
         quantities are an error.
     E
-        Initial internal energy.
+        Initial internal energy per initial volume.
     T
         Temperature in the formula, if neither the material nor its solid has one.
     Q1, Q2
