@@ -98,11 +98,11 @@ def dt_factor(hub: Hub, factor: Annotated[float, Positive]) -> None:
     Parameters
     ----------
     factor
-        Step / stable step. The default is 0.9, or 0.4 (0.2 with one point per cell) where a drifting body
-        would otherwise gain energy: with a linear basis in ulmpm, a FLIP coefficient above 0.99,
-        and scheme musl or usf. Until a point has moved a quarter of a cell, the default is 0.9, and
-        more with splines. A factor set here always refers to the stable step of moving bodies; a
-        run warns if it is unstable.
+        Step / stable step. The default is 0.9, or 0.4 (0.2 with one point per cell) where a
+        drifting body would otherwise gain energy: with a linear basis in ulmpm, a FLIP coefficient
+        above 0.99, and scheme musl or usf. Until a point has moved a quarter of a cell, the default
+        is 0.9, and more with splines. A factor set here always refers to the stable step of moving
+        bodies; a run warns if it is unstable.
 
     Example
     -------
