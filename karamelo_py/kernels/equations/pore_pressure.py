@@ -12,14 +12,13 @@ step has the same increment if, for each cell,
 
     V^2 / (sum V K / n) q / dt + G^T v + G'^T s = supply.
 
-The matrix, C / dt + G^T R G, is symmetric and positive definite. Each cell stores the entries of
-neighbours with lower numbers. Conjugate gradients are preconditioned by an incomplete Cholesky
-factorisation, in which the diagonal alone differs from the matrix and takes up most of the
-neglected entries (Gustafsson 1978).
+The matrix, C / dt + G^T R G, is symmetric and positive definite. Each cell stores the entries for
+lower neighbours. Conjugate gradients are preconditioned by an incomplete Cholesky factorisation,
+which changes only the diagonal: it adds most of the neglected entries (Gustafsson 1978).
 
 After Kularathna, Liang, Zhao, Chandra, Zhao & Soga 2021, "A semi-implicit material point method
-based on fractional-step method for saturated soil", with the pressure of the previous step in the
-first velocity, and drag at its new value in both.
+based on fractional-step method for saturated soil", but the first velocity includes the pressure of
+the previous step, and both use the new drag.
 """
 
 from math import nan
@@ -42,7 +41,7 @@ from karamelo_py.points.laws.pore_water import pore_stiffness
 
 ACCURACY = 1e-5  # residual / first residual
 MOST = 4  # iterations / number of unknowns, at most
-KEPT = 0.97  # part of the neglected entries in the diagonal of the preconditioner
+KEPT = 0.97  # part of the neglected entries that is added to the diagonal of the preconditioner
 LEAST = 0.25  # least diagonal of the preconditioner / diagonal of the matrix
 
 # Columns of `CellSums`: volume; its product with K / n; columns of the volume as a stress.
@@ -57,12 +56,12 @@ FN, N, SEEPS, CLOSED, SUM, STAYS = range(6)  # after 4 d columns
 
 
 def _count_below(d):
-    """Return the number of neighbours of a cell with lower numbers."""
+    """Return the number of neighbours whose number is lower than the cell's."""
     return (3**d - 1) // 2
 
 
 def _rank(way):
-    """Return the index of a direction, of -1, 0 and 1; below `_count_below` of lower numbers."""
+    """Return the index of a direction of -1, 0, 1 per axis; lower cells: below `_count_below`."""
     rank = 0
     for k in way:
         rank = 3 * rank + k + 1
@@ -92,7 +91,7 @@ class CellPressures(StepField):
 class NodeResponse(StepField):
     """Velocity v and seepage velocity s (d,), force P of increments (d,), dt / W (d,) or 0.
 
-    Then f n, n, dt f / m; 1 / V of closed nodes, else 0; sum of V q; what stays at a closed node.
+    Then f n, n, dt f / m; 1 / V of closed nodes, else 0; sum of V q; rate kept at a closed node.
     """
 
     shape = numbers(6, 4)
@@ -100,7 +99,7 @@ class NodeResponse(StepField):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "v", "relative velocity")
 def cell(pt):
-    """Return what a point gives to its cell, or () if dry."""
+    """Return the terms of a point in the sums of its cell, or () if dry."""
     seen = pores.pores(pt)
     if not len(seen):
         return ()
@@ -171,7 +170,7 @@ class Foresee(NamedTuple):
 
 
 class System(NamedTuple):
-    """Arrays of a solution; its type selects the kernel."""
+    """Arrays of the linear system; its type selects the kernel."""
 
     kin: arrays.Tag
     grids: Grid
@@ -215,7 +214,7 @@ def _below(kin, grid):
 
 
 def _row(system, c, slopes):
-    """Return the force (d,) at a corner of a unit increment in cell `c`."""
+    """Return the force (d,) at a corner due to a unit increment in cell `c`."""
     d, cells = system.kin.dimension, system.cells
     force = []
     for k in range(d):
@@ -234,7 +233,7 @@ def _grid_of(grids, n):
 
 
 def _outflow(system, c, corners):
-    """Return the rate of volume that leaves cell `c` by the velocities at its nodes."""
+    """Return the volume per time that leaves cell `c`, from the velocities at its nodes."""
     nodes, d = system.nodes, system.kin.dimension
     total, stays = 0.0, 0.0
     for _, offset, slopes in corners:
@@ -247,7 +246,7 @@ def _outflow(system, c, corners):
 
 @noinline
 def _begin(system):
-    """Set residuals and the compressibility of the water, the first part of the diagonal."""
+    """Set residuals, and the first part of the diagonal: the compressibility of the water."""
     pressures, cells = system.pressures, system.cells
     for r in range(1, 1 + system.spans[0, 0]):
         corners = _corners(system.kin, _grid_of(system.grids, system.spans[r, 0]))
@@ -287,7 +286,7 @@ def _entry(system, n, a, b):
 
 @noinline
 def _assemble(system):
-    """Add the responses of nodes to the matrix."""
+    """Add the responses of the nodes to the matrix."""
     pressures, below = system.pressures, _count_below(system.kin.dimension)
     for r in range(1, 1 + system.spans[0, 0]):
         corners = _corners(system.kin, _grid_of(system.grids, system.spans[r, 0]))
@@ -370,7 +369,7 @@ def _precondition(system):
 
 @noinline
 def _multiply(system, share):
-    """Update the direction and its product with the matrix; return the product of both."""
+    """Update the direction and its product with the matrix; return the scalar product of both."""
     pressures, count, result = system.pressures, _count_below(system.kin.dimension), 0.0
     for r in range(1, 1 + system.spans[0, 0]):
         below = _below(system.kin, _grid_of(system.grids, system.spans[r, 0]))
@@ -394,7 +393,7 @@ def _multiply(system, share):
 
 @noinline
 def _correct(system, length):
-    """Go along the direction; return the number of unknowns."""
+    """Correct increments along the direction; return the number of unknowns."""
     pressures, count = system.pressures, 0
     for r in range(1, 1 + system.spans[0, 0]):
         for c in range(system.spans[r, 0], system.spans[r, 1]):
@@ -450,7 +449,7 @@ def solve(s):
 
 @node_task
 class AddPressure(NamedTuple):
-    """Adds the increment to force and mean of the pressure; sets the forces for fixes."""
+    """Adds the increment to the force and the mean of the pressure; sets the forces for fixes."""
 
     rim: float
     surface: float
