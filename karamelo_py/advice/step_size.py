@@ -6,6 +6,7 @@ from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.run.lower.solved_pressure import is_wet, unsupported
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import (
+    courant_of,
     fastest_wave,
     keeping_share,
     own_step_of_waves,
@@ -127,7 +128,7 @@ def words_of_solution(simulation: Simulation, duration: float) -> str:
     refused = any(map(_is_refused, hub.fixes.values())) or any(unsupported(hub, ""))
     if not (fits and alone and isinstance(hub.update.scheme, MUSL)) or refused:
         return ""
-    courant = DEFAULT_SHARE * SemiImplicit.traits.courant[sparse(hub)]
+    courant = DEFAULT_SHARE * courant_of(hub, SemiImplicit)[sparse(hub)]
     dt = courant * float(simulation.control.step[0].spacing) / fastest_wave(simulation)
     return f"with scheme(semi-implicit), limited by the dry soil, about {duration / dt:.0f} steps"
 

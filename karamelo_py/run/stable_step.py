@@ -7,7 +7,7 @@ import numpy as np
 from karamelo_py.kernels.arrays import DT, Tag
 from karamelo_py.kernels.clock import STRIDE
 from karamelo_py.kernels.laws import law_on
-from karamelo_py.points.kinematics import total
+from karamelo_py.points.kinematics import Space, total
 from karamelo_py.points.laws import (
     Absent,
     can,
@@ -28,7 +28,7 @@ from karamelo_py.run.body_motion import motions
 from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.solid import Solid
-from karamelo_py.schemes.traits import DEFAULT_SHARE
+from karamelo_py.schemes.traits import DEFAULT_SHARE, SchemeTraits
 
 BOX_WEIGHT = 6.0  # weight of the common velocity, for domains that are boxes
 SLOWED = 1.2  # viscous / elastic wave speed above which viscosity limits the step
@@ -177,9 +177,27 @@ def corrected_share(hub: Hub) -> float:
     return method.basis.traits.corrected_share if method.frame.moves else CORRECTED_TOTAL
 
 
+def courant_of(hub: Hub, scheme: Tag) -> tuple[float, float]:
+    """Return the stable step / (h/c) of a scheme with two points per cell, and with one."""
+    traits: SchemeTraits = scheme.traits
+    of_dry = traits.courant_of_dry
+    return traits.courant if of_dry is None or _is_all_wet(hub) else of_dry
+
+
+def _is_all_wet(hub: Hub) -> bool:
+    """Return whether water at least as stiff as the soil fills all solids."""
+    kin = Space()
+    for solid in hub.solids.values():
+        law, fluid = solid.material.whole, solid.material.fluid
+        square = wave_speed_squared(law, kin, initial_state(law, kin, 1.0))
+        if fluid is None or fluid.stiffness * specific_volume(law) < square:
+            return False
+    return True
+
+
 def _courant_of_scheme(hub: Hub, *, longer: bool) -> float:
     scheme, method = hub.update.scheme, hub.update.method
-    two, one = scheme.traits.courant
+    two, one = courant_of(hub, scheme)
     if min(two, one) < 1:
         # Nodes between cell corners increase the highest frequency.
         nodes = 0.7 if method.basis.traits.nodes_per_cell > 1 else 1

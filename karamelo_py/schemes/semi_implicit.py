@@ -9,6 +9,7 @@ from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.table import NodeTask, any_node
 from karamelo_py.language.rules import Restrictions
 from karamelo_py.schemes.traits import SchemeTraits
+from karamelo_py.schemes.usl import USL
 
 
 class SemiImplicit(NamedTuple):
@@ -17,7 +18,8 @@ class SemiImplicit(NamedTuple):
     The soil is explicit, as in usl; drag and pressure of the water are implicit (Kularathna et al.
     2021). The pressure, one value per cell, is found by conjugate gradients. The stable step is 0.9
     h/c with the wave speed c of the dry soil, or 0.55 h/c with one point per cell: 20 times the
-    step of musl in water-saturated soil of 10 MPa.
+    step of musl in water-saturated soil of 10 MPa. If a solid has no water, or water with a K/n
+    below the modulus of the soil, it is that of usl.
 
     Waves of the water are damped. Consolidation, seepage, and loads that take longer than a wave of
     the dry soil needs through the ground have the same results as with musl. For consolidation over
@@ -41,6 +43,7 @@ class SemiImplicit(NamedTuple):
 
     traits = SchemeTraits(
         courant=(0.9, 0.55),
+        courant_of_dry=USL.traits.courant,
         damps=True,
         damping=lambda scheme: "the pore pressure of the end of the step",
         solves_pressure=True,

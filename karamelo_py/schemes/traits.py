@@ -23,6 +23,8 @@ class SchemeTraits(NamedTuple):
     inertia: bool = True
     # stable step in h/c with two points per cell and direction, and with one
     courant: tuple[float, float] = (1.0, 1.0)
+    # the same in scenes with solids that have no pore water, or softer water than soil
+    courant_of_dry: tuple[float, float] | None = None
     # Fractions of the stable step up to which a drifting body gains no energy, for 2 and 1 points
     # per cell, by basis: smooth gradients, gradient jumps, nodes within cells. None: any step.
     keeping: tuple[tuple[float, float], ...] | None = None
