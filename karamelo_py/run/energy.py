@@ -54,10 +54,14 @@ def unknown_work(hub: Hub) -> str:
 
 def unknown_heat(hub: Hub) -> bool:
     energies = any(diffuses_energy(solid.material.law) for solid in hub.solids.values())
-    return energies or warms_by_friction(hub) or any(
-        name in HEAT_STAGES and not isinstance(hook, CompiledHook)
-        for fix in hub.fixes.values()
-        for name, hook in fix.hooks().items()
+    return (
+        energies
+        or warms_by_friction(hub)
+        or any(
+            name in HEAT_STAGES and not isinstance(hook, CompiledHook)
+            for fix in hub.fixes.values()
+            for name, hook in fix.hooks().items()
+        )
     )
 
 

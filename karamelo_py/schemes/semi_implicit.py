@@ -19,7 +19,7 @@ class SemiImplicit(NamedTuple):
     2021). The pressure, one value per cell, is found by conjugate gradients. The stable step is 0.9
     h/c with the wave speed c of the dry soil, or 0.55 h/c with one point per cell: 20 times the
     step of musl in water-saturated soil of 10 MPa. If a solid has no water, or water with a K/n
-    below the modulus of the soil, it is that of usl.
+    below the modulus of the soil, it equals the step of usl.
 
     Waves of the water are damped. Consolidation, seepage, and loads that take longer than a wave of
     the dry soil needs through the ground have the same results as with musl. For consolidation over

@@ -67,8 +67,8 @@ def content(pt):
     volume = mass * laws.specific_volume(law) * laws.jacobian(law, pt.kin, state)
     T = laws.temperature(law, pt.kin, state)
     capacity = mass * laws.heat_capacity(law, pt.dt)
-    inverse_square = pt.w.grid.inv_h * pt.w.grid.inv_h * inverse_stretch_squared(
-        pt.w.frame, pt.kin, f, pt.dt
+    inverse_square = (
+        pt.w.grid.inv_h * pt.w.grid.inv_h * inverse_stretch_squared(pt.w.frame, pt.kin, f, pt.dt)
     )
     most = 1 / (real(4 * pt.kin.dimension, pt.dt) * pt.dt * inverse_square)
     conductance = volume * laws.conductivity_now(law, pt.kin, state, most)
