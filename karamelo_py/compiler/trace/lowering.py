@@ -39,6 +39,9 @@ def _is_of_values(one: type) -> bool:
     return not issubclass(one, others)
 
 
+_literal = functools.lru_cache(typed=True)(types.literal)  # makes a type for each call
+
+
 class Lowering:
     """Writes code with a builder; ``seen(thing)`` replaces globals."""
 
@@ -76,7 +79,7 @@ class Lowering:
         if isinstance(thing, _TRACED):
             return thing._kind
         if isinstance(thing, int):
-            return types.literal(thing)
+            return _literal(thing)
         if isinstance(thing, tuple):
             kinds = tuple([types.unliteral(self.kind_of(item)) for item in thing])
             return _tuple_type(kinds, type(thing) if hasattr(thing, "_fields") else None)

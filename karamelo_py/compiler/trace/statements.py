@@ -16,7 +16,7 @@ import operator
 import os
 import time
 import types as python
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -57,17 +57,19 @@ def _is_as_read(code: python.CodeType, text: str) -> bool:
     return code in codes_in(compile(text, code.co_filename, "exec", dont_inherit=True))
 
 
-@functools.cache
-def _functions_in(text: str) -> dict[tuple[str, int], list[ast.FunctionDef | ast.Lambda]]:
-    """List functions by name and first line, including decorators."""
-    functions: dict[tuple[str, int], list] = {}
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.FunctionDef):
-            first = min([node.lineno, *(d.lineno for d in node.decorator_list)])
-            functions.setdefault((node.name, first), []).append(node)
-        elif isinstance(node, ast.Lambda):
-            functions.setdefault(("<lambda>", node.lineno), []).append(node)
-    return functions
+_parsed = functools.cache(ast.parse)
+
+
+def _functions_at(line: int, within: ast.AST) -> Iterator[ast.FunctionDef | ast.Lambda]:
+    """Yield functions that begin at a line, which may be that of a decorator."""
+    for node in ast.iter_child_nodes(within):
+        if isinstance(node, ast.stmt | ast.expr):
+            begins = [node.lineno, *(d.lineno for d in vars(node).get("decorator_list", ()))]
+            if not min(begins) <= line <= (node.end_lineno or line):
+                continue
+            if min(begins) == line and isinstance(node, ast.FunctionDef | ast.Lambda):
+                yield node
+        yield from _functions_at(line, node)
 
 
 def _has(node: ast.expr, code: python.CodeType) -> bool:
@@ -81,17 +83,16 @@ def source_of(code: python.CodeType) -> list[ast.stmt]:
     text = "".join(linecache.getlines(code.co_filename))
     if not _is_as_read(code, text):
         raise Untraceable("its file has changed since Python read it: start again")
-    candidates = _functions_in(text).get((code.co_name, code.co_firstlineno), [])
-    if code.co_name == "<lambda>":  # a line may have several lambdas, or nested ones
-        candidates = sorted(
-            (n for n in candidates if _has(n.body, code)), key=lambda n: -n.body.col_offset
-        )
-    if not candidates:
+    candidates = [*_functions_at(code.co_firstlineno, _parsed(text))]
+    for node in candidates:
+        if isinstance(node, ast.FunctionDef) and node.name == code.co_name:
+            return node.body
+    # a line may have several lambdas, or nested ones
+    bodies = [n.body for n in candidates if isinstance(n, ast.Lambda) and _has(n.body, code)]
+    if code.co_name != "<lambda>" or not bodies:
         raise Untraceable("its text is unknown: write it to a file")
-    node = candidates[0]
-    if isinstance(node, ast.FunctionDef):
-        return node.body
-    return [ast.copy_location(ast.Return(node.body), node.body)]
+    body = max(bodies, key=lambda body: body.col_offset)
+    return [ast.copy_location(ast.Return(body), body)]
 
 
 class AstFunction:
