@@ -152,9 +152,26 @@ def _round(totals, digits, answer, first, count):
 
 
 @kernel
-def add_all(totals, row, terms):
-    for first in range(0, terms.size, MANY):
-        add_many(totals, row, terms[first:], min(MANY, terms.size - first))
+def _round_all(totals, values):
+    for k in range(values.size):
+        values[k] = rounded(totals[k])
+
+
+def values_of(totals: np.ndarray) -> np.ndarray:
+    """Round totals (k, LIMBS). A quantile has thousands, most of which are 0."""
+    values, some = np.zeros(len(totals)), totals.any(axis=1)
+    others = values[some]
+    _round_all(totals[some], others)
+    values[some] = others
+    return values
+
+
+@kernel
+def add_all(totals, terms):
+    """Add terms (k, n) to totals (k, LIMBS)."""
+    for k in range(terms.shape[0]):
+        for first in range(0, terms.shape[1], MANY):
+            add_many(totals, k, terms[k][first:], min(MANY, terms.shape[1] - first))
 
 
 @kernel

@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, m
 from karamelo_py.kernels.equations.internal_force import ContactLoss
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.export import export
-from karamelo_py.kernels.totals import CONTACT_LOSS, LIMBS, add_all, add_rows, rounded
+from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, values_of
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
@@ -93,11 +93,10 @@ class Fields(PointTable):
         limbs = np.zeros((1, LIMBS), np.int64)
         for block in self.setup.blocks:
             values = SUMMED[name](self.setup, block)
-            if values is not None and not (group is None or group.all):
-                values = values[group.has(block.points.id)]
             if values is not None:
-                add_all(limbs, 0, values)
-        return rounded(self.comm.allreduce(limbs)[0])
+                some = slice(None) if group is None or group.all else group.has(block.points.id)
+                add_all(limbs, values[None, some])
+        return float(values_of(self.comm.allreduce(limbs))[0])
 
     def lost_by_contact(self) -> float:
         """Return the energy that contact at points and nodes has dissipated since the start."""
@@ -142,20 +141,15 @@ class Fields(PointTable):
             if rows is not None:
                 add_rows(limbs, rows, terms)
                 continue
-            for k in range(count):
-                add_all(limbs, k, np.ascontiguousarray(terms[k], float))
-        totals = self.comm.allreduce(limbs)
-        # A quantile uses thousands of sums, most of which are 0.
-        return np.array([rounded(total) if total.any() else 0.0 for total in totals])
+            add_all(limbs, np.ascontiguousarray(terms, float))
+        return values_of(self.comm.allreduce(limbs))
 
     def summed(self, terms: np.ndarray) -> np.ndarray:
         """Sum terms (n,) or (n, k) over all processes, rounded once."""
         columns = terms.reshape(len(terms), int(np.prod(terms.shape[1:]))).T
         limbs = np.zeros((len(columns), LIMBS), np.int64)
-        for k, column in enumerate(columns):
-            add_all(limbs, k, np.ascontiguousarray(column))
-        of_all = sum(self.comm.everyone("a total", limbs))
-        return np.array([rounded(of) for of in of_all]).reshape(terms.shape[1:])
+        add_all(limbs, np.ascontiguousarray(columns))
+        return values_of(sum(self.comm.everyone("a total", limbs))).reshape(terms.shape[1:])
 
     def each(self, owner: Grouped, name: str, *arguments: object) -> list:
         results = (getattr(owner, name)(some, *arguments) for some in self.some(owner.group))

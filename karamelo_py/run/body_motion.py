@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from karamelo_py.kernels.totals import LIMBS, add_all, rounded
+from karamelo_py.kernels.totals import LIMBS, add_all, values_of
 from karamelo_py.run.boxes import unique
 from karamelo_py.run.state import SceneState
 
@@ -66,14 +66,13 @@ def motions(simulation: SceneState) -> list[BodyMotion]:
     for k, m, x, v in _pieces(simulation, d):
         xv = np.concatenate([x, v])
         terms = [m, *(m * a for a in xv), *(m * a * b for a, b in product(x, xv))]
-        for row, values in enumerate(terms):
-            add_all(limbs[k], row, values)
+        add_all(limbs[k], np.array(terms))
         ends[k] = np.maximum(ends[k], np.concatenate([xv.max(axis=1), -xv.min(axis=1)]))
     comm = simulation.comm
     limbs, ends = comm.allreduce(limbs), comm.allreduce_max(ends)
     bodies = []
     for k, (sums_of_solid, end) in enumerate(zip(limbs, ends, strict=True)):
-        mass, *sums = map(rounded, sums_of_solid)
+        mass, *sums = values_of(sums_of_solid).tolist()
         if not mass > 0:
             continue
         mean = np.array(sums[: 2 * d]) / mass
