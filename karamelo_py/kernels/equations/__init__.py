@@ -86,6 +86,7 @@ class NodalQuantity(NamedTuple):
     not_at_corners = ()
     records = ""  # node array to prefetch
     adds = False  # adds to present nodal values
+    masked = True  # whether loads are set to 0 in gaps of lanes
     also_reads = ()  # point fields besides `takes`
     takes = of_point()
     gives = ()
@@ -149,7 +150,6 @@ def affine_part(quantity, w, stencil, load):
 def _register(kind: Any) -> None:
     groups = [(array, (*sums,)) for array, sums in groupby(kind.gives, lambda one: one.into.array)]
     made, takes = namedtuple("Load", kind.takes), tuple(kind.takes.values())  # type: ignore[misc]
-    zero_in_gaps = kind.__module__.startswith(__name__)  # 0 for points without mass
     for take in takes:
         if not hasattr(take, "reads"):
             says = f"put @eq.reads(...) before {take.__name__}, with the fields of points it reads"
@@ -160,7 +160,7 @@ def _register(kind: Any) -> None:
     @load_of.on(kind)
     def load_of_point(quantity, pt):
         load = tuple([take(pt) for take in takes])
-        if not zero_in_gaps:
+        if kind.masked:
             load = nested_as(load, [of_present(pt.p, number) for number in flat(load)])
         return made(*load)
 
@@ -186,6 +186,12 @@ def _register(kind: Any) -> None:
         weighted = not isinstance(parts[0], Unweighted)
         at_first = [_at_first(w, stencil, *term) if weighted else term for term in parts]
         return node_array(w.nodes, array), sums[0].into.first(w.kin), weighted, *_joined(at_first)
+
+
+class ExtensiveQuantity(NodalQuantity):
+    """Base of quantities whose sums all have a factor that is 0 in gaps, such as `mass`."""
+
+    masked = False
 
 
 def node_array(nodes: Nodes, array: Any) -> Any:

@@ -77,7 +77,7 @@ def volumes(pt):
     return volume * pt.of(VolumeRatio)[0, pt.p], volume
 
 
-class Volumes(eq.NodalQuantity):
+class Volumes(eq.ExtensiveQuantity):
     says = "volumes to grid"
     takes = eq.of_point(volumes=volumes)
     gives = (eq.Sum(eq.whole(NodalMean), lambda pt, node: tuple([node.N * V for V in pt.volumes])),)
@@ -103,7 +103,7 @@ def minus_V_stress_beside(pt):
     return force_stress(pt.w.frame, pt.kin, nothing(pt.kin) - change * I, f)
 
 
-class AveragedForce(eq.NodalQuantity):
+class AveragedForce(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     says = "internal force of the averaged mean stress"
     adds = True

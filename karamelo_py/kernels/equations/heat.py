@@ -104,7 +104,7 @@ def mean_at(pt, node):
     return conductance * temperature_at(pt, node), conductance
 
 
-class HeatContent(eq.NodalQuantity):
+class HeatContent(eq.ExtensiveQuantity):
     """Scatters heat capacity, and heat extrapolated by gradients."""
 
     not_at_corners = ("anything",)
@@ -134,7 +134,7 @@ def flow_at(pt, node):
     return (total,)
 
 
-class HeatFlow(eq.NodalQuantity):
+class HeatFlow(eq.ExtensiveQuantity):
     not_at_corners = ("anything",)
     says = "heat flow"
     takes = eq.of_point(flow=flow, supply=supply)

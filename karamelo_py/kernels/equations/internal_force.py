@@ -124,7 +124,7 @@ def affine_force(pt, w):
     return at_point, tuple([inverse_d[0] * column for column in pt.minus_V_stress.columns()])
 
 
-class InternalForce(eq.NodalQuantity):
+class InternalForce(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     says = "internal force"
     takes = eq.of_point(minus_V_stress=minus_V_stress, force=force_on_point, mean=mean_stress)

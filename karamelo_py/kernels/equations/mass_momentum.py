@@ -46,7 +46,7 @@ def affine_momentum(pt, w):
     return (at_point, (pt.mass * c).columns()) if len(c) else ()
 
 
-class MassMomentum(eq.NodalQuantity):
+class MassMomentum(eq.ExtensiveQuantity):
     """Scatters mass and momentum; rigid points have separate sums."""
 
     not_at_corners = ("moments", "loss")
@@ -77,7 +77,7 @@ def moment_for_second_mapping(pt):
     return for_second_mapping(pt, eq.moment(pt))
 
 
-class MomentumAgain(eq.NodalQuantity):
+class MomentumAgain(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     records = "velocity"
     says = "momentum to grid"

@@ -262,7 +262,7 @@ PRESSURE = eq.NodeColumns(WaterSums, of_pressure, lambda kin: 2 * kin.dimension,
 OF_PORES = eq.of_point(pores=pores)
 
 
-class WaterMomentum(eq.NodalQuantity):
+class WaterMomentum(eq.ExtensiveQuantity):
     says = "water to grid"
     takes = OF_PORES
     gives = (
@@ -279,7 +279,7 @@ class WaterMomentum(eq.NodalQuantity):
     )
 
 
-class Drag(eq.NodalQuantity):
+class Drag(eq.ExtensiveQuantity):
     says = "drag to grid"
     takes = OF_PORES
     gives = (
@@ -291,7 +291,7 @@ class Drag(eq.NodalQuantity):
     )
 
 
-class PoreVolumes(eq.NodalQuantity):
+class PoreVolumes(eq.ExtensiveQuantity):
     says = "volumes of pores to grid"
     takes = OF_PORES
     gives = (
@@ -303,13 +303,13 @@ class PoreVolumes(eq.NodalQuantity):
     )
 
 
-class WaterForce(eq.NodalQuantity):
+class WaterForce(eq.ExtensiveQuantity):
     says = "pore pressure to grid"
     takes = OF_PORES
     gives = (eq.Sum(PRESSURE, _force_and_area_at, _affine_force_and_area),)
 
 
-class WaterMomentumAgain(eq.NodalQuantity):
+class WaterMomentumAgain(eq.ExtensiveQuantity):
     says = "momentum of the water to grid"
     takes = eq.of_point(water=water, water_v=water_v)
     gives = (

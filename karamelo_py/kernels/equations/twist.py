@@ -134,11 +134,7 @@ def momentum_around(pt, node):
     return (node.N * (mass / pt.radius * omega[0]),)
 
 
-def mass_times_radius(pt, node):
-    return (node.N * (pt.around.mass / pt.radius),)
-
-
-class RotationToNodes(eq.NodalQuantity):
+class RotationToNodes(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     says = "angular momentum to grid"
     takes = eq.of_point(around=rotation_after, radius=radius_after)
@@ -146,11 +142,13 @@ class RotationToNodes(eq.NodalQuantity):
         eq.Sum(INERTIA, lambda pt, node: (node.N * pt.around.mass,)),
         eq.Sum(MOMENT, angular_momentum),
         eq.Sum(eq.whole(MomentumAround), momentum_around),
-        eq.Sum(eq.whole(MassTimesRadius), mass_times_radius),
+        eq.Sum(
+            eq.whole(MassTimesRadius), lambda pt, node: (node.N * (pt.around.mass / pt.radius),)
+        ),
     )
 
 
-class RotationAgain(eq.NodalQuantity):
+class RotationAgain(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     says = "angular momentum to grid"
     takes = eq.of_point(around=rotation_again)
@@ -176,7 +174,7 @@ def torque_at(pt, node):
     return (at_node + node.N * pt.push[0] if len(pt.push) else at_node,)
 
 
-class Torque(eq.NodalQuantity):
+class Torque(eq.ExtensiveQuantity):
     not_at_corners = ("moments",)
     says = "torque"
     takes = eq.of_point(torque=torque, push=torque_of_force)

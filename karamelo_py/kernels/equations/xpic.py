@@ -34,7 +34,7 @@ def term(pt):
     return pt.load(TermOfSeries, pt.v)
 
 
-class SeriesBack(eq.NodalQuantity):
+class SeriesBack(eq.ExtensiveQuantity):
     says = "term of the series to the grid"
     takes = eq.of_point(mass=eq.mass, term=term)
     gives = (
