@@ -130,8 +130,9 @@ def _dispatch(arguments: list[str]) -> int:
     begins = [
         w for w in arguments if w[:1] == "-" != w[1:2] and w[1:].isalpha() and w not in options_of
     ]
-    if short := [w for w in begins if any(_extends(w, option) for option in options_of)]:
-        raise _surplus(arguments, short[:1], choice)
+    for word in begins:
+        if any(o.startswith(word) or (len(o) > 2 and word.startswith(o)) for o in options_of):
+            raise _surplus(arguments, [word], choice)
     try:
         options, surplus = parser.parse_known_args(arguments)
     except SystemExit:
@@ -200,10 +201,6 @@ def _values_below_zero(arguments: list[str], options: list[str]) -> list[str]:
         )
 
     return [f" {word}" if is_value(k) else word for k, word in enumerate(arguments)]
-
-
-def _extends(word: str, option: str) -> bool:
-    return option.startswith(word) or (len(option) > 2 and word.startswith(option))
 
 
 def _surplus(arguments: list[str], words: list[str], parser: CommandLine) -> ScriptError:

@@ -556,15 +556,11 @@ def without_whole(hooks):
     return arrays.with_items(hooks, whole=())
 
 
-def known_to_hooks(nodes):
-    """Return only the fields that the loop uses; further ones would need a compilation."""
-    return tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
-
-
 def hooked_nodes(s, target, kept):
     """Return nodes for node functions; `kept` is the FLIP coefficient."""
-    nodes = s.nodes
-    trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, known_to_hooks(nodes))
+    nodes = s.nodes  # with the fields that the loop uses; for others it would be compiled again
+    fields = tuple([one for one in nodes.fields if type(one) in (FrictionalHeat, RigidSums)])
+    trimmed = arrays.Nodes(nodes.sums, nodes.update, nodes.velocity, fields)
     return HookedNodes(target, planar(s.kin), s.grids, trimmed, s.ranges, kept)
 
 

@@ -82,10 +82,6 @@ def _add_forces(s, block, p):
             add_to(totals, turning + i, x[j] * force[k] - x[k] * force[j])
 
 
-def _impose_node(s, n):
-    _impose(_at_nodes(s), kick(s), s.control, n)
-
-
 @kernel
 def _begin_sums(s):
     carry(s.control.totals[WORK])
@@ -104,7 +100,7 @@ PUBLISH = Once(_begin_sums), each_point(_add_forces, Rigid), Once(_publish_sums)
 
 class RigidBodies(NamedTuple):
     node_fields = (RigidSums,)
-    rows = (each_node(_impose_node), *PUBLISH)
+    rows = (each_node(lambda s, n: _impose(_at_nodes(s), kick(s), s.control, n)), *PUBLISH)
     rows_before = rows_after = (each_node(lambda s, n: _impose_on_strain(_at_nodes(s), n)),)
     rows_work = ()
 

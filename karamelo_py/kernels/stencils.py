@@ -130,10 +130,6 @@ def in_block(w):
     return with_items(w, basis=InBlock(w.basis))
 
 
-def shows_corners(tasks, w):
-    return carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
-
-
 def gather_corners(tasks, w, stencil, totals):
     at = with_items(w, basis=AtCorners(w.basis))
     for c in range(support(at.basis, w.kin)):
@@ -183,7 +179,8 @@ def _gather_nodes_stencil(stencil, lanes, tasks, w, totals):
 @gather_nodes.on(CornerStencil)
 def _gather_nodes_corner_stencil(stencil, lanes, tasks, w, totals):
     by_corners = all_by_corners(tasks, w)
-    if by_corners and (isinstance(lanes, OneByOne) or shows_corners(tasks, w)):
+    moves = carried(w.basis, w.kin) > 0 and any(isinstance(task, Move) for task in tasks)
+    if by_corners and (isinstance(lanes, OneByOne) or moves):
         return gather_corners(tasks, w, stencil, totals)
     if not isinstance(lanes, OneByOne):
         block = block_of(w.kin, w.grid, stencil)

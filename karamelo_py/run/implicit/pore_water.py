@@ -89,7 +89,8 @@ class Seepage:
         for block, _ in self.wet:
             points, of = block.points, block.points.material
             per_point = {name: np.asarray(getattr(block.laws, name))[of] for name in NUMBERS}
-            law, records = block.laws._replace(law=None, **per_point), _laws_of(block)
+            law = block.laws._replace(law=None, **per_point)
+            records = [record(block.laws, k) for k in range(len(block.laws.n))]
             state = State(None, points.state[-2], points.state[-1])
             n = porosity(law, kin, state)
             mobility = n * n / drag_per_volume(law, kin, state)
@@ -267,10 +268,6 @@ class Seepage:
                 given = field(self.equations.s.nodes.fields, GivenFlux)[nodes]
                 some = given[np.isin(nodes, fix.nodes), int(fix.formulas[1].constant)]
                 fix.hub.values.set(f"{fix.id}_s", -float(some.sum()))
-
-
-def _laws_of(block: Block) -> list[Tag]:
-    return [record(block.laws, k) for k in range(len(block.laws.n))]
 
 
 def _modulus(law: Tag, kin: Tag) -> float:

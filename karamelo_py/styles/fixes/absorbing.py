@@ -33,7 +33,7 @@ class Support(Field):
 def absorb(mass, v, force, normal, support, values, dt):
     """Apply dashpots rho c A; only the component of `normal` (rho A) along the axis is used."""
     axis, along, across = values
-    weight = along_axis(normal, axis)
+    weight = total([where(axis == k, abs(area), 0) for k, area in enumerate(normal)])
     made = type(v)
     balance = made(*[where(a == a, a, -now) for a, now in zip(support, force, strict=True)])
     left = force + balance
@@ -41,10 +41,6 @@ def absorb(mass, v, force, normal, support, values, dt):
     damped = [dashpot(rates[k], mass, v[k], left[k], dt) for k in range(len(v))]
     reaction = balance + made(*damped)
     return force + reaction, balance, reaction
-
-
-def along_axis(normal, axis):
-    return total([where(axis == k, abs(area), 0) for k, area in enumerate(normal)])
 
 
 def dashpot(rate, mass, v, force, dt):
