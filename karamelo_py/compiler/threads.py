@@ -240,23 +240,29 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
     builder.call(function, [*numbers, failure_at(builder)])
 
 
-# Only the leader writes _STATE: it waits, leads, or has ended. Every index is processed once: 1. A
-# ticket contains the number of the loop and the indices left in a range. Indices are taken by
-# compare-and-swap of the ticket, so by one thread; tickets of different loops are never equal. 2.
-# The leader releases task, arguments and count before the tickets, and every swap continues that
-# release, so a thread that takes an index has acquired the words of its loop. 3. _DONE counts
-# indices that other threads have finished, and the leader remains in the loop until these and its
-# own are all. Meanwhile the words do not change, and by acquiring _DONE the leader sees all stores
-# of other threads. 4. The leader takes the remaining indices itself: it waits only for indices that
-# were taken, never for a thread that was preempted, woke late or left. Words, each in a separate
-# cache line:
+# --- teams ------------------------------------------------------------------------------------
+
+# Protocol. Thread 0, the leader, runs the kernel and publishes each parallel loop; other threads
+# serve. Only the leader writes _STATE. Each thread has a range of the indices of a loop, and a
+# ticket: the number of the loop, and how many indices of the range are left. A thread takes an
+# index by decreasing a ticket with compare-and-swap. This is correct because:
+# 1. Each index is processed once: of several swaps of a ticket one succeeds, and tickets of
+#    different loops differ.
+# 2. A thread that has taken an index sees the task, arguments and count of its loop. The leader
+#    writes them before it stores the tickets (release), and a swap acquires the ticket; swaps by
+#    other threads in between continue the release.
+# 3. A loop ends when the leader's indices and those in _DONE make up the count. Other threads add
+#    to _DONE after their work (release), and the leader acquires it, so it sees their results.
+# 4. The leader takes indices that are left itself. It waits only for indices that other threads
+#    have taken, never for a thread that sleeps or was preempted.
+# The words are in separate cache lines:
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
 _WAITS, _LEADS, _ENDED = range(3)  # in _STATE
-_SHORT = 8000  # pauses before a thread sleeps, about 0.3 ms, since other programs may need the core
-_APART, _LOOKS = 10, 64  # pauses between looks at another range; number of looks; together 30 us
-_PATIENCE = 11000  # pauses until a thread stops waiting for a leader
-_LEFT = (1 << 32) - 1  # mask of a ticket for the remaining indices; the upper bits are the loop
+_SHORT = 8000  # pauses (0.3 ms) before a waiting thread sleeps, so that others can use its core
+_APART, _LOOKS = 10, 64  # pauses between two looks at another range, number of looks (30 us in all)
+_PATIENCE = 11000  # pauses until a thread no longer waits for a leader
+_LEFT = (1 << 32) - 1  # bits of a ticket with the number of indices; the upper bits are the loop
 
 
 def new_team(threads: int) -> np.ndarray:

@@ -1,9 +1,10 @@
 """Contacts and joints between rigid bodies, solved together with all other loads.
 
-A link has a position, 3 x 6 matrices A and B, and the relative velocity r = A U_a - B U_b of two
-bodies at this position. Its impulse p acts on the first body and -p on the second, so that momentum
-and angular momentum are conserved to round-off. Impulses are stiff and implicit in the velocities
-at the end of the step (`SOFT` is the fraction of an approach that remains)::
+A link connects two bodies at a position. U_a and U_b are their velocities (v, omega), and r = A U_a
+- B U_b, with 3 x 6 matrices A and B, is their relative velocity there. The impulse p acts on the
+first body and -p on the second, so momentum and angular momentum are conserved to round-off. p
+depends on the velocities at the end of the step, like a stiff damper (`SOFT` is the fraction of an
+approach that remains)::
 
     contact:  p_n = max(-(n . r + g / dt), 0) / (SOFT w_n), p_t = -r_t / (SOFT w_t), at most mu p_n
     joint:    p_k = -(e_k . r + c_k / dt) / (SOFT w_k), for each direction e_k that it holds

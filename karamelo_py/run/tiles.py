@@ -38,16 +38,16 @@ from karamelo_py.scene.lattice import MAX_NODES, Lattice
 # into caches, large ones overlap less.
 TILES = {1: 64, 2: 24, 3: 8}
 NODES = {1: 64, 2: 8, 3: 8}
-LONGER = 16  # factor of length along rows in 3D with one point per cell, for more points per tile
-SHARES = 64  # parts with about equal numbers of points in a block, for threads
-# Boxes are allocated at the start if they have fewer rows than this number times the nodes: pages
-# take no memory until they are used.
+LONGER = 16  # in 3D with one point per cell, tiles are longer along rows, to have more points
+SHARES = 64  # sets of tiles in a block with about equal numbers of points, for threads
+# Boxes with fewer rows than this number times the nodes are allocated at the start: unused pages
+# take no memory.
 ALLOCATED_UP_TO = 8
 DIRECT_UP_TO = 2000  # points up to which clearing and summing boxes costs more than threads save
 PART = 2000  # points per part, for sorting by threads
 MOST_DRIFT = 1.0  # cells that points may move between sorts
-# With a smaller drift, boxes are smaller, and more neighbouring points have the same nodes. In 2D
-# this does not pay for the additional sorting.
+# With less drift, boxes are smaller and more neighbouring points have the same nodes. In 2D this
+# gains less than the additional sorting costs.
 LEAST_DRIFT = {1: MOST_DRIFT, 2: MOST_DRIFT, 3: 0.25}
 SORT_STEPS = 32  # intended number of steps between sorts
 # If points scatter directly to nodes, a larger drift only puts more nodes in use.
@@ -88,7 +88,7 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # For long tiles, reach is stored per row of a box, as a bar may spread at one end.
+        # A long tile has points that spread at one end: the nodes in use are stored per row.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0
         self.count = int(self.first[-1])

@@ -1,4 +1,4 @@
-"""The 3 x 3 nodes around a 2D domain, each with a sum over the domain's corners.
+"""The 3 x 3 nodes around a 2D domain, each with its sum over the corners, so visited once.
 
 In 3D, with 27 nodes and eight corners, this would cost more than it saves.
 """
@@ -29,10 +29,6 @@ class InBlock(NamedTuple):
     basis: NamedTuple
 
 
-def _hats(a):
-    return max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)
-
-
 def block_of(kin, grid, stencil):
     if kin.dimension > 2:
         return ()
@@ -45,7 +41,7 @@ def block_of(kin, grid, stencil):
         inside = inside & (min(*of_corners) >= 0) & (max(*of_corners) <= 2)
         holds = inside & holds
         first.append(number)
-        ahead.append([_hats(a) for a in of_corners])
+        ahead.append([(max(1 - a, 0), min(a, 2 - a), max(a - 1, 0)) for a in of_corners])
     hats = list(zip(*ahead, strict=True))
     weights = _spread_out(hats, stencil.weights)
     slopes = [_spread_out(hats, component) for component in zip(*stencil.gradients, strict=True)]

@@ -61,8 +61,9 @@ def _domain_parallel(basis, kin, location):
     k = weight / determinant({(e, i): edges[e][i] for e in range(d) for i in range(d)}, d)
     corners: list = []
     gradients: list = []
-    # With reciprocal vectors A . a = 1, A . b = 0 ..., N_c has the mean gradient (+-A +-B) / 4. In
-    # 3D, nine products with k before the sums are faster than twelve after them.
+    # In 2D, the mean gradient of N_c is (+-A +- B) / 4. A and B are the reciprocal vectors of the
+    # half edges a and b: A . a = B . b = 1, A . b = B . a = 0. In 3D, multiplying them by k before
+    # the sums takes nine products, and after the sums twelve.
     A = reciprocals(kin, edges, k if d == 3 else 1)
     for signs in cpdi.SQUARE if d == 2 else cpdi.CUBE:
         corner = signed(signs[0], x, signed(signs[0] * signs[1], edges[0], edges[1]))
