@@ -1,8 +1,10 @@
 """What the tests share: scripts run through the real command line, and read back."""
 
 import gc
+import itertools
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -116,6 +118,18 @@ def _checked(result: Result, status: int | None) -> Result:
     assert "Traceback" not in result.out + result.err
     assert status is None or result.status == status, result.err
     return result
+
+
+_numbers = itertools.count()
+
+
+@pytest.fixture
+def tmp_path(request, tmp_path_factory) -> Path:
+    """An empty folder; pytest's fixture searches the folders of all tests, for 2 ms each time."""
+    name = re.sub(r"\W", "_", request.node.name)[:30]
+    path = tmp_path_factory.getbasetemp() / f"{name}_{next(_numbers)}"
+    path.mkdir()
+    return path
 
 
 @pytest.fixture

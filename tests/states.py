@@ -35,9 +35,11 @@ def final_hub(
     return hub
 
 
-def final_columns(script: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
+def final_columns(
+    script: Path, names: Iterable[str], folder: Path | None = None
+) -> dict[str, np.ndarray]:
     """Columns of all points by id, in full precision; `work` and `balance` are the watch's."""
-    hub = final_hub(script)
+    hub = final_hub(script, folder=folder)
     energy = hub.simulation.control.energy[0]
     watched = {"work": energy.work, "balance": energy.balance}
     return {n: watched[n] if n in watched else hub.fields.particle(n) for n in names}

@@ -213,8 +213,8 @@ PLATE = """
     solid(plate, region, box, 2, m, 0.25, 0)
     group(plate, particles, region, box, solid, plate)
     fix(v, initial_velocity_particles, plate, 0.3*(x - 1), -0.1*(y - 1))
-    restart(5, state.*.h5)
-    run(10)
+    restart(2, state.*.h5)
+    run(5)
 """
 
 
@@ -229,7 +229,7 @@ def test_threads_and_restarts_have_the_same_bits(state_interpreted):
 def test_a_plate_has_the_mass_of_its_thickness(run_interpreted):
     """With 16 x 16 points of a plate of 1 x 1 x 0.1: m vx^2/2 + m vy^2/2."""
     record = "compute(Ek, kinetic_energy, plate)\n    log_modify(custom, Ek)"
-    log = run_interpreted(PLATE.replace("restart(5, state.*.h5)", record)).log
+    log = run_interpreted(PLATE.replace("restart(2, state.*.h5)", record)).log
     square = np.mean(((np.arange(8) + 0.5) / 8 - 0.5) ** 2)
     assert log["Ek"][0] == pytest.approx(0.5 * 100 * (0.09 + 0.01) * square, rel=1e-9)
 

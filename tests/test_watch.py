@@ -432,7 +432,7 @@ def test_the_end_of_a_run_tells_its_energy_at_one_time(run_interpreted):
     fix(v, initial_velocity_particles, all, 0.1*(x - 2))
     compute(E, energy_balance, all)
     log_modify(custom, step, E_drift)
-    run(200)
+    run(100)
     """
     done = run_interpreted(script)
     assert 0.25 < max(done.log.E_drift) < 0.35
@@ -449,8 +449,8 @@ def test_energy_that_contact_takes_is_no_spurious_loss(run_interpreted, transfer
     region(left, block, 8, 12)
     region(right, block, 12.1, 16.1)
     material(m, linear, 1, 1, 0)
-    solid(left, region, left, 2, m, 1)
-    solid(right, region, right, 2, m, 1)
+    solid(left, region, left, 1, m, 1)
+    solid(right, region, right, 1, m, 1)
     group(left, particles, region, left, solid, left)
     group(right, particles, region, right, solid, right)
     fix(v1, initial_velocity_particles, left, 0.01)
@@ -503,7 +503,7 @@ def balance(run_interpreted, fix, dt=0.004):
     text = block(
         2, "region(end, block, 0.55, 1, INF, INF)", "group(grip, particles, region, end, all)",
         *["fix(v, initial_velocity_particles, all, -0.5, 0)"] * ("velocity" not in fix),
-        f"fix(F, {fix})", f"set_dt({dt})", "run_time(0.3)", size=(0.3, 0.1),
+        f"fix(F, {fix})", f"set_dt({dt})", "run_time(0.2)", size=(0.3, 0.1),
     ).replace("method(ulmpm", "method(tlmpm")  # fmt: skip
     result = run_interpreted(text)
     assert "is not monitored" not in result.out
