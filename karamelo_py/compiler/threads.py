@@ -240,8 +240,6 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
     builder.call(function, [*numbers, failure_at(builder)])
 
 
-# --- teams ------------------------------------------------------------------------------------
-
 # Protocol. Thread 0, the leader, runs the kernel and publishes each parallel loop; other threads
 # serve. Only the leader writes _STATE. Each thread has a range of the indices of a loop, and a
 # ticket: the number of the loop, and how many indices of the range are left. A thread takes an
