@@ -61,7 +61,7 @@ _parsed = functools.cache(ast.parse)
 
 
 def _functions_at(line: int, within: ast.AST) -> Iterator[ast.FunctionDef | ast.Lambda]:
-    """Yield functions that begin at a line, which may be that of a decorator."""
+    """Yield functions that begin at a line; decorators are part of them."""
     for node in ast.iter_child_nodes(within):
         if isinstance(node, ast.stmt | ast.expr):
             begins = [node.lineno, *(d.lineno for d in vars(node).get("decorator_list", ()))]

@@ -108,7 +108,7 @@ def cell(pt):
     return (V, V * pore_stiffness(law, pt.kin, state), *flat(seen.area.columns()))
 
 
-class SumsOfCells(eq.NodalQuantity):
+class SumsOfCells(eq.ExtensiveQuantity):
     says = "volumes of cells"
     takes = eq.of_point(cell=cell)
     gives = (
