@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, m
 from karamelo_py.kernels.equations.internal_force import ContactLoss
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.export import export
-from karamelo_py.kernels.totals import LIMBS, add_all, add_rows, values_of
+from karamelo_py.kernels.totals import CONTACT_LOSS, LIMBS, add_all, add_rows, values_of
 from karamelo_py.language.arguments import Argument
 from karamelo_py.language.scene import Scene
 from karamelo_py.output import node_columns, point_table
@@ -101,7 +101,7 @@ class Fields(PointTable):
     def lost_by_contact(self) -> float:
         """Return the energy that contact at points and nodes has dissipated since the start."""
         at_nodes = self.comm.allreduce(self.setup.control.totals[CONTACT_LOSS].copy())
-        return self.total("contact loss") + rounded(at_nodes)
+        return self.total("contact loss") + float(values_of(at_nodes[None])[0])
 
     def rows_of(self, group: PointGroup | None) -> Iterator[tuple[Block, np.ndarray]]:
         for block in self.setup.blocks:
