@@ -143,7 +143,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# A step, and the rows before the first. With `more`, a fused step leaves sums for the next.
+# Take a step, or the rows before the first. With `more`, a fused step leaves sums for the next.
 step, begin = _taking(rows_of), _taking(first_rows)
 
 

@@ -234,7 +234,7 @@ def histories(
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     """Return a mask (n,) of rows with increasing time.
 
-    A stopped run ends with an earlier good state. One that went back has discarded rows.
+    A stopped run ends with an earlier good state. In a run that went back, some rows are invalid.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)

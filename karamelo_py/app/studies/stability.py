@@ -456,7 +456,7 @@ def explore(
     A grid of cells about `stride` apart is run first. Cells between two runs of the same class, in
     a row or column, get that class. Between runs of different classes, the middle cell is run,
     longest gaps first; along an edge between classes, at least one cell in three is run. Islands
-    between runs are missed. Along an axis of words (`apart`), nothing is inferred. At least `width`
+    between runs are missed. Along an axis of words (`apart`), every value is run. At least `width`
     cells are run at once.
     """
     classes: list[Hashable] = []
