@@ -14,7 +14,8 @@ step has the same increment if, for each cell,
 
 The matrix, C / dt + G^T R G, is symmetric and positive definite. Each cell stores the entries for
 lower neighbours. Conjugate gradients are preconditioned by an incomplete Cholesky factorisation,
-which changes only the diagonal: it adds most of the neglected entries (Gustafsson 1978).
+which changes only the diagonal: it adds most of the neglected entries (Gustafsson 1978), and all
+positive ones, which make the factorisation useless in 3D otherwise.
 
 After Kularathna, Liang, Zhao, Chandra, Zhao & Soga 2021, "A semi-implicit material point method
 based on fractional-step method for saturated soil", but the first velocity includes the pressure of
@@ -316,20 +317,21 @@ def _factor(system):
                 entry = pressures[c, LOWER + k]
                 if entry < 0:
                     pressures[c + below[k], SCRATCH] += entry
+                elif entry > 0:
+                    pressures[c, INVERSE] += entry
+                    pressures[c + below[k], INVERSE] += entry
     for r in range(1, 1 + system.spans[0, 0]):
         below = _below(system.kin, _grid_of(system.grids, system.spans[r, 0]))
         for c in range(system.spans[r, 0], system.spans[r, 1]):
             if system.cells[c, VOLUME] > 0:
-                whole = pressures[c, DIAGONAL]
+                whole = pressures[c, DIAGONAL] + pressures[c, INVERSE]
                 left = whole
                 for k in range(count):
                     entry = pressures[c, LOWER + k]
-                    if entry != 0:
+                    if entry < 0:
                         other = c + below[k]
-                        lost = entry * entry
-                        if entry < 0:
-                            lost += KEPT * entry * (pressures[other, SCRATCH] - entry)
-                        left -= lost * pressures[other, INVERSE]
+                        lost = entry + KEPT * (pressures[other, SCRATCH] - entry)
+                        left -= entry * lost * pressures[other, INVERSE]
                 if left < LEAST * whole:
                     left = whole
                 pressures[c, INVERSE] = 1 / left
@@ -346,7 +348,7 @@ def _precondition(system):
                 rest = pressures[c, RESIDUAL]
                 for k in range(count):
                     entry = pressures[c, LOWER + k]
-                    if entry != 0:
+                    if entry < 0:
                         rest -= entry * pressures[c + below[k], AHEAD]
                 pressures[c, AHEAD] = rest * pressures[c, INVERSE]
                 pressures[c, SCRATCH] = 0.0
@@ -362,7 +364,7 @@ def _precondition(system):
                 result += ahead * pressures[c, RESIDUAL]
                 for k in range(count):
                     entry = pressures[c, LOWER + k]
-                    if entry != 0:
+                    if entry < 0:
                         pressures[c + below[k], SCRATCH] += entry * ahead
     return result
 
