@@ -261,9 +261,11 @@ class Picture:
         """Reserve space for the widest labels, so that nothing moves between pictures."""
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
-        for _ in range(2):  # twice, since the aspect ratio moves the axes
-            self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")
+        if engine := self.figure.get_layout_engine():
+            for _ in range(2):  # twice, since the aspect ratio moves the axes
+                engine.execute(self.figure)
+            self.figure.set_layout_engine("none")
+        self.figure.draw_without_rendering()
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes

@@ -191,7 +191,8 @@ def _vibrates(strength, scene):
             K_over_G = bulk_modulus(law.eos, 1.0, initial_energy(law.eos, 1.0), ()) / strength.G
             most = 1 / least - 1 / 3 if least > 0 else inf
             if K_over_G > most:
-                return {"nu": _poisson(K_over_G), "most": _poisson(most), "psi": _angle(f)}
+                psi = ceil(degrees(asin(min(ENOUGH * f, 1))))
+                return {"nu": _poisson(K_over_G), "most": _poisson(most), "psi": psi}
     return None
 
 
@@ -200,10 +201,6 @@ def _averages_splines(strength, scene):
     smooth = not (scene.hats or scene.simulation.implicit)
     averaged = scene.hub.update.anti_locking and smooth
     return averaged and f > 0 and not little_dilatancy(strength)
-
-
-def _angle(f):
-    return ceil(degrees(asin(min(ENOUGH * f, 1))))
 
 
 def _poisson(K_over_G):
