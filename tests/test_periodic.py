@@ -293,6 +293,48 @@ SCENE = """
 USUAL = {"head": "method(ulmpm, FLIP, linear, 1)", "directions": ", x", "water": ""}
 
 
+SATURATED = """
+    method(ulmpm, FLIP, linear, 1)
+    dimension({domain})
+    {periodic}
+    region(layer, block, {body})
+    material(clay, linear, 1590, 1e7, 0)
+    pore_water(clay, n=0.4, permeability=1e-2)
+    solid(clay, region, layer, 2, clay, 0.25, 0)
+    region(base, block, {base})
+    region(top, block, {top})
+    group(base, nodes, region, base, all)
+    group(top, nodes, region, top, all)
+    fix(base, velocity_nodes, base, {held})
+    fix(weight, body_force, all, {weight})
+    fix(drain, pore_pressure, top, 0)
+    compute(p, probe, all, pore_pressure, {foot})
+    log_modify(custom, step, dt, p, base_{up}, drain_s)
+    set_output(1)
+    run(4)
+"""
+
+
+def test_a_saturated_layer_is_a_column(run_interpreted):
+    """It falls on its base and drains, half a metre of it as the same column in 1D."""
+    column = {"domain": "1, 0, 1.25, 0.25", "periodic": "", "body": "0, 1", "base": "-INF, 0",
+              "top": "1, INF", "held": "0", "weight": "-9.81", "foot": "x=0",
+              "up": "x"}  # fmt: skip
+    layer = {
+        "domain": "2, 0, 0.5, 0, 1.25, 0.25", "periodic": "boundary(periodic, x)",
+        "body": "0, 0.5, 0, 1", "base": "-INF, INF, -INF, 0", "top": "-INF, INF, 1, INF",
+        "held": "NULL, 0", "weight": "0, -9.81", "foot": "x=0.25, y=0", "up": "y",
+    }  # fmt: skip
+    one, two = (
+        run_interpreted(SATURATED.format(**words), folder=f"{words['up']}").log
+        for words in (column, layer)
+    )
+    assert one["p"][-1] > 1e3
+    np.testing.assert_allclose(two["p"], one["p"], rtol=1e-9)
+    np.testing.assert_allclose(2 * two["base_y"], one["base_x"], rtol=1e-9)
+    np.testing.assert_allclose(2 * two["drain_s"], one["drain_s"], rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize("head", REFUSED)
 def test_what_has_no_periodic_directions_is_refused_by_name(run_interpreted, head):
     err = run_interpreted(SCENE.format(**USUAL | {"head": head}), status=1).err
@@ -302,7 +344,11 @@ def test_what_has_no_periodic_directions_is_refused_by_name(run_interpreted, hea
 MISTAKES = [
     ({"directions": ""}, (), "no direction is named"),
     ({"directions": ", z"}, (), "no such direction"),
-    ({"water": "pore_water(m, n=0.4, permeability=1)"}, (), "does not support pore_water"),
+    (
+        {"water": "pore_water(m, n=0.4, permeability=1)", "directions": ", x, y, shear=1"},
+        (),
+        "does not support pore_water",
+    ),
     ({"directions": ", x, shear=1"}, (), "a sheared cell is periodic in x and y"),
     ({}, ("--gpu",), "does not support --gpu"),
     (

@@ -391,6 +391,21 @@ def test_forces_on_points_leave_the_water_its_weight(run_interpreted):
     assert plain == loaded and plain["p_wy"] != 0
 
 
+def test_water_falls_with_its_soil(run_interpreted):
+    """Free fall: no pressure, and no flux through open nodes."""
+    tail = """
+        fix(weight, body_force, all, 0, -9.81)
+        fix(drain, pore_pressure, all, 0)
+        compute(p, probe, all, pore_pressure)
+        log_modify(custom, step, drain_s, p)
+        set_output(1)
+        run(3)
+    """
+    log = run_interpreted(SCENE.format(**USUAL | {"tail": tail})).log
+    assert np.abs(log["p"]).max() < 1e-3
+    assert np.abs(log["drain_s"]).max() < 1e-9
+
+
 @pytest.mark.parametrize("head", REFUSED)
 def test_what_has_no_pore_water_is_refused_by_name(run_interpreted, head):
     err = run_interpreted(SCENE.format(**USUAL | {"head": head}), status=1).err
@@ -488,6 +503,37 @@ def test_the_density_of_saturated_soil_is_doubted(run_interpreted):
     saturated = SCENE.format(**USUAL).replace("1590", "1990")
     assert "3.3 times as dense as water" in run_interpreted(saturated).err
     assert "as dense as water" not in run_interpreted(SCENE.format(**USUAL)).err
+
+
+def test_an_undrained_column_fails_at_its_stability_number(run_script):
+    """Weight over strength: 3.776 (Pastor, Thai & Francescato 2000) to 3.83 (Chen 1975)."""
+    moved = {}
+    for S in ("3.6", "4.4"):
+        words = "-var", "a", "2", "-var", "N", "8", "-var", "T", "0.3", "-var", "S", S
+        log = run_script(INPUTS / "in.wet_column", *words).log
+        moved[S] = log["runout"][-1] - log["runout"][0]
+    assert moved["3.6"] < 0.03  # elastic
+    assert moved["4.4"] > 0.08
+
+
+@pytest.mark.full
+def test_an_undrained_column_runs_out_as_without_water(run_script):
+    """The twin has the undrained strength and stiffness, and averaged volume changes."""
+    script = (INPUTS / "in.wet_column").read_text("utf-8")
+    twin = script
+    for old, new in (
+        ("dimension(", "anti_volumetric_locking(true)\ndimension("),
+        ("linear, 1600, K)", "linear, 2000, K + 2e6/0.4)"),
+        ("mohr-coulomb, G, 0, phi, 0)", "mohr-coulomb, G, c, 0, 0)"),
+        ("fix(rest", "p = 2000*g*(H - y0)\nfix(rest"),
+        ("-p0, -p0, -p0", "-p, -p, -p"),
+    ):
+        assert old in twin
+        twin = twin.replace(old, new)
+    twin = re.sub(r"^(pore_water|fix\(water).*", "", twin, flags=re.M)
+    runout = [last(run_script(one, "-var", "N", "20"))["runout"] for one in (script, twin)]
+    assert runout[1] == pytest.approx(1.42, abs=0.02)
+    assert runout[0] / runout[1] == pytest.approx(1, abs=0.04)
 
 
 @pytest.mark.full

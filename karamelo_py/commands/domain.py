@@ -146,11 +146,11 @@ def boundary(
     compute center_of_mass jumps when they return. Periodic directions need method ulmpm with a
     linear basis or splines, scheme musl, any transfer except XPIC, and one process without a GPU.
     They cannot be combined with other styles of boundary, axisymmetry, heat, contact of points,
-    tools that end in a periodic direction, free rigid bodies or pore_water.
+    tools that end in a periodic direction or free rigid bodies.
 
     With `shear`, bodies should fill the domain and start with the mean velocity vx = `shear` y (fix
-    initial_velocity_particles), without F-bar. Momentum is conserved to round-off. The energy
-    balance is not monitored.
+    initial_velocity_particles), without F-bar or pore_water. Momentum is conserved to round-off.
+    The energy balance is not monitored.
 
     In tlmpm and tlcpdi, the command has no effect: the separate grids of solids have no edge.
 

@@ -115,6 +115,10 @@ class SummedField(StepField):
     summed = True
 
 
+class FieldMappedAgain(SummedField):
+    """A nodal field that moved points add to, together with the momentum that is mapped again."""
+
+
 def name_of(kind: type) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 

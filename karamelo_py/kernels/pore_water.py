@@ -12,7 +12,7 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import AtNodes, Company, NodeTask, Once, companies
+from karamelo_py.kernels.table import AtNodes, BeforeLoads, Company, NodeTask, Once, companies
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -42,17 +42,23 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s))
 
 
-OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.WaterForce()
+OF_MASS = Company(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
+OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
+BEFORE_LOADS = Company(before=(NodeTask(pores.SplitMomentum()),))
 OF_MOVE = Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))
 COMPANIES = (
-    (MassMomentum, Company(then=(pores.WaterMomentum(),))),
+    (MassMomentum, OF_MASS),
+    (BeforeLoads, BEFORE_LOADS),
     (InternalForce, Company(then=OF_FORCE)),
-    (MomentumAgain, Company(then=(pores.WaterMomentumAgain(),))),
+    (
+        MomentumAgain,
+        Company(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
+    ),
     (NodalUpdate, Company(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, OF_MOVE),
     (Strain, Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
-SLOW_COMPANIES = COMPANIES[:1]
+SLOW_COMPANIES = ((MassMomentum, Company(then=(pores.WaterMomentum(),))),)
 
 
 class Water(NamedTuple):
@@ -89,7 +95,8 @@ SOLVE = (
     NodeTask(pressures.AddPressure, make=_add_pressure),
 )
 COMPANIES_OF_SOLUTION = (
-    (MassMomentum, Company(then=(pores.WaterMomentum(),))),
+    (MassMomentum, OF_MASS),
+    (BeforeLoads, BEFORE_LOADS),
     (InternalForce, Company(then=(*OF_FORCE, pressures.SumsOfCells()))),
     (NodalUpdate, Company(before=SOLVE)),
     (Move, OF_MOVE),

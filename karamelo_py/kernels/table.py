@@ -293,6 +293,7 @@ class Company(NamedTuple):
     """Rows and tasks that accompany a task or quantity in a scene (`Setup.company`)."""
 
     before: tuple = ()  # rows before it
+    instead: Any = None  # replaces it
     first: tuple = ()  # in the same pass, before it
     then: tuple = ()  # in the same pass, after it
 
@@ -307,6 +308,10 @@ def companies(tag: Any) -> tuple:
     return ()
 
 
+class BeforeLoads(NamedTuple):
+    """A key of `companies` for rows before the forces of fixes."""
+
+
 def company_of(tag: type, s: Setup) -> Company:
     for kind, company in companies.find((type(s.company),))(s.company):
         if kind in tag.__mro__:
@@ -318,7 +323,8 @@ def _joined(tags: tuple, s: Setup) -> tuple:
     joined: tuple = ()
     for tag in tags:
         company = company_of(type(tag), s)
-        joined = (*joined, *company.first, tag, *company.then)
+        instead = tag if company.instead is None else company.instead
+        joined = (*joined, *company.first, instead, *company.then)
     return joined
 
 
@@ -503,6 +509,7 @@ WORK_OF_LOADS = WorkOfLoads()
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 CONTACT_WORK = SceneTask(lambda s: (*s.bodies.rows_work, *s.contact.rows_work))
+BEFORE_LOADS = SceneTask(lambda s: company_of(BeforeLoads, s).before)
 CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
 SERIES = SceneTask(sum_series, "series of XPIC")
@@ -528,6 +535,7 @@ UPDATE = (
     FRICTION,
     LOSS,
     HEAT,
+    BEFORE_LOADS,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),
     AXIS,
     SceneTask(update_velocity, nodes.NodalUpdate.says),

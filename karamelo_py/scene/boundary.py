@@ -14,12 +14,12 @@ from karamelo_py.script.errors import Mark, ScriptError
 PERIODIC = Restrictions(
     "periodic", "no boundary(periodic)",
     only={"method": ("ulmpm",), "scheme": ("musl",), "basis": HATS_AND_SPLINES, "kinematics": FLAT},
-    without=("heat", "series", "delete", "reflect", "ranks", "gpu", "pore_water", "rigid_body"),
+    without=("heat", "series", "delete", "reflect", "ranks", "gpu", "rigid_body"),
     but={"ending tools": "a plane, or a region without ends in periodic directions: "
          "region(ground, block, -INF, INF, -INF, 0)"},
 )  # fmt: skip
 SHEARED = Restrictions(
-    "sheared", "boundary(periodic) without shear",
+    "sheared", "boundary(periodic) without shear", without=("pore_water",),
     but={"F-bar": "quadratic-spline, which locks less"},
 )  # fmt: skip
 WALLS = {

@@ -21,6 +21,10 @@ class VolumeRatio(StepField):
     start = 1.0
 
 
+class VolumeCorrection(StepField):
+    """Relative volume that another equation adds to the strain of this step."""
+
+
 class NodalMean(SummedField):
     """Weighted sum and weights at a node, then the mean (volume ratios, temperatures)."""
 
@@ -150,6 +154,14 @@ def averaged(pt, dl, ratio):
     _, _, f = pt.law_state_F
     trial = pt.of(VolumeRatio)[0, pt.p]
     return scaled_increment(pt.w.frame, pt.kin, dl, f, ratio[0] / trial)
+
+
+def corrected(pt, dl, f):
+    """Scale `dl` by a point's `VolumeCorrection`, if there is one."""
+    for more in pt.load(VolumeCorrection, (pt.dt,)):
+        share = more / len(dl.axes)
+        dl = (1 + share) * dl + share * (I if pt.w.frame.moves else f)
+    return dl
 
 
 @node_task

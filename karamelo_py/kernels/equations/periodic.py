@@ -8,7 +8,7 @@ from math import inf
 from typing import NamedTuple
 
 from karamelo_py.compiler import index
-from karamelo_py.compiler.fields import StepField, SummedField, field
+from karamelo_py.compiler.fields import FieldMappedAgain, StepField, SummedField, field
 from karamelo_py.kernels.arrays import TIMESTEP
 from karamelo_py.kernels.equations.fbar import NodalMean, NodalStress
 from karamelo_py.kernels.equations.node_updates import node_task
@@ -77,6 +77,9 @@ class JoinVelocity(NamedTuple):
     def at_node(task, kin, nodes, n, dt):
         if _is_lowest(task.axis, nodes, n):
             _join(task.axis, nodes, nodes.velocity, n)
+            for one in nodes.fields:
+                if isinstance(one, FieldMappedAgain):
+                    _join(task.axis, nodes, one.array, n)
 
 
 @node_task

@@ -157,7 +157,10 @@ class Foresee(NamedTuple):
             on_water, force, v, w = forces[k]
             held = nodes.velocity[n, k]
             new = held if held == held else v + dt * force / drag.whole
-            w = drag.left * w + drag.taken * (dt * on_water * per_mass - (new - v))
+            beyond = v - held if held == held else real(0, dt)  # as in `DragWater`
+            change = real(0, dt) if held == held else new - v
+            w += drag.left * beyond
+            w = drag.left * w + drag.taken * (dt * on_water * per_mass - change)
             out[n, V_ * d + k] = new
             out[n, S_ * d + k] = share * w
             out[n, MOBILE * d + k] = real(0, dt) if held == held else dt / drag.whole

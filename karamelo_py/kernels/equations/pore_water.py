@@ -9,8 +9,12 @@ nodes that are not open.
 
 The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
 linear basis at the cell centre (one pressure rate per cell), otherwise at the points. With splines,
-pressure in the null space of the grid would grow. Therefore R (1 - S)^2 p is subtracted from p in
-each step, where R = 1/20 and S maps p to the nodes and back; this changes pore volumes only.
+volume strains e in the null space of the grid would grow. Therefore R (1 - S)^2 e is subtracted
+from e in each step, in soil and pores, where R = 1/20 and S maps e to the nodes and back.
+
+Velocities of nodes are means by the mass of soil and water, relative velocities of the water by its
+mass. Hence undrained points have no flux, also if their water contents differ, and the momentum of
+the mixture is conserved.
 
 Drag D is integrated exactly for constant acceleration in the step: with b = dt D / m and f = (1 -
 exp(-b)) / b, the relative velocity w becomes w exp(-b) + (dt f_w / m - dv_s) f. A node then moves
@@ -24,6 +28,7 @@ from typing import NamedTuple
 from karamelo_py.compiler import real, where
 from karamelo_py.compiler.fields import (
     Field,
+    FieldMappedAgain,
     StepField,
     SummedField,
     field,
@@ -38,7 +43,9 @@ from karamelo_py.compiler.fields import (
 from karamelo_py.compiler.tuples import count_in
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
+from karamelo_py.kernels.equations.fbar import VolumeCorrection
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
+from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
 from karamelo_py.kernels.equations.strain import increment
 from karamelo_py.kernels.records import put_at, row
@@ -73,9 +80,10 @@ class RelativeVelocity(Field):
         return isinstance(law, Saturated)
 
 
-class UnseenPressure(Field):
-    """Pressure minus its projection (to the nodes and back), one step earlier (splines)."""
+class VolumeStrain(Field):
+    """Volume strain, and one step earlier its part that nodes do not see (splines)."""
 
+    shape = pair
     needed = RelativeVelocity.needed
 
 
@@ -91,35 +99,42 @@ def of_pressure(kin):
     return of_volumes(kin) + 4
 
 
+def of_unseen(kin):
+    return 6 if kin.dimension == 2 else of_pressure(kin) + 2 * kin.dimension
+
+
 class WaterSums(SummedField):
     """Nodal sums of water and pores.
 
-    Mass, momentum and force of the water, as in `Nodes.sums`, with a column for the drag; volume,
-    volume of pores, volume times pressure, the unseen part of this product; force of the pressure
-    (d,) and outward area (d,).
+    Mass, relative momentum and force of the water, as in `Nodes.sums`, with a column for the drag
+    and, in 2D, for volume times unseen strain; volume, volume of pores, volume times pressure,
+    volume times strain; force of the pressure (d,) and outward area (d,).
     """
 
-    shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension)
+    shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension + (kin.dimension != 2))
 
 
-class WaterAgain(SummedField):
+class WaterAgain(FieldMappedAgain):
     """Water's momentum mapped again after the move."""
 
     shape = vector
 
 
 class WaterUpdate(StepField):
-    """w* after the update, w* - w, the mass of the soil, exp(-b) and f."""
+    """w* after the update, w* - w, the mass of the soil, exp(-b) and f.
 
-    shape = numbers(3, 2)
+    After the update, exp(-b), and the velocity of points minus the velocity of a fix that holds the
+    soil of the node (d,), replace the last three.
+    """
+
+    shape = numbers(4, 2)
 
 
 class Flux(Field):
-    """Mass flux (d,) per unit area, an outflow, two pressures, another outflow.
+    """Mass flux (d,) per unit area, an outflow, two strains, another outflow.
 
     The first outflow (per unit volume) is computed for closed nodes and does not leave the points;
-    the last (a mass flow rate) leaves through open nodes. The pressures are the mean at the node,
-    and the mean of the part that nodes do not see.
+    the last (a mass flow rate) leaves through open nodes. The strains are means of `VolumeStrain`.
     """
 
     shape = numbers(4, 1)
@@ -142,7 +157,7 @@ class GivenFlux(StepField):
     shape = numbers(2, 2)
 
 
-POINT_FIELDS = RelativeVelocity, UnseenPressure, WorkOfForces
+POINT_FIELDS = RelativeVelocity, VolumeStrain, VolumeCorrection, WorkOfForces
 NODE_FIELDS = (
     WaterSums, WaterAgain, WaterUpdate, Flux, GivenPressure, WorkAtNodes,
 )  # fmt: skip
@@ -178,23 +193,29 @@ def water(pt):
     return (volume * water_content(law, pt.kin, state),)
 
 
-@eq.reads("v", "relative velocity")
-def water_v(pt):
-    return pt.v + pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
+@eq.reads("relative velocity")
+def water_w(pt):
+    return pt.load(RelativeVelocity, pt.v) if _is_wet(pt) else ()
+
+
+@eq.reads("mass", "state", "material")
+def mixture_mass(pt):
+    return sum(water(pt), eq.mass(pt))
 
 
 class WetPoint(NamedTuple):
     m: arrays.Number  # mass of the water
-    v: tuple  # velocity of the water
+    w: tuple  # velocity of the water relative to the soil
     drag: arrays.Number  # force per unit relative velocity
-    volumes: tuple  # of point and pores; their products with the pressure and its unseen part
+    volumes: tuple  # of point and pores; products with pressure and (splines) strain
+    unseen: tuple  # product of volume and unseen strain (splines)
     p: arrays.Number
     area: tuple  # volume times the unit tensor, in the frame of the gradients
 
 
 @eq.reads(
     "mass", "state", "material", "deformation gradient", "v", "relative velocity",
-    "unseen pressure",
+    "volume strain",
 )  # fmt: skip
 def pores(pt):
     """Return a point's contribution to `WaterSums`, or () if it is dry."""
@@ -204,12 +225,12 @@ def pores(pt):
     kin, J = pt.kin, laws.jacobian(law, pt.kin, state)
     V0 = eq.mass(pt) * laws.specific_volume(law)
     V, n, p = V0 * J, porosity(law, kin, state), pore_pressure(law, kin, state)
-    unseen = () if isinstance(pt.w.basis, Linear) else (V * pt.of(UnseenPressure)[0, pt.p],)
+    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V, V))
     area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
     drag = V * drag_at(law.permeability, law, n)
-    return WetPoint(
-        V0 * water_content(law, kin, state), water_v(pt), drag, (V, V * n, V * p, *unseen), p, area
-    )
+    strain, unseen = _times(V, strains[:1]), _times(V, strains[1:])
+    content, volumes = V0 * water_content(law, kin, state), (V, V * n, V * p, *strain)
+    return WetPoint(content, water_w(pt), drag, volumes, unseen, p, area)
 
 
 class OfWater(NamedTuple):
@@ -258,8 +279,20 @@ MOMENTUM = eq.MOMENTUM._replace(
 )
 DRAG = eq.NodeColumns(WaterSums, of_drag, scalar, lambda kin: of_drag(kin) + 1)
 VOLUMES = eq.NodeColumns(WaterSums, of_volumes, lambda kin: 4, of_pressure)
-PRESSURE = eq.NodeColumns(WaterSums, of_pressure, lambda kin: 2 * kin.dimension, WaterSums.shape)
+PRESSURE = eq.NodeColumns(
+    WaterSums, of_pressure, lambda kin: 2 * kin.dimension,
+    lambda kin: of_pressure(kin) + 2 * kin.dimension,
+)  # fmt: skip
+UNSEEN = eq.NodeColumns(WaterSums, of_unseen, scalar, lambda kin: of_unseen(kin) + 1)
 OF_PORES = eq.of_point(pores=pores)
+
+
+class MixtureMomentum(MassMomentum):
+    takes = eq.of_point(**{**MassMomentum.takes, "mass": mixture_mass})
+
+
+class MixtureMomentumAgain(MomentumAgain):
+    takes = eq.of_point(**{**MomentumAgain.takes, "mass": mixture_mass})
 
 
 class WaterMomentum(eq.ExtensiveQuantity):
@@ -274,7 +307,7 @@ class WaterMomentum(eq.ExtensiveQuantity):
         eq.Sum(
             MOMENTUM,
             lambda pt, node: _momentum(*pt.pores[:2], node) if len(pt.pores) else (),
-            lambda pt, w: (pt.pores.m * pt.pores.v, ()) if len(pt.pores) else (),
+            lambda pt, w: (pt.pores.m * pt.pores.w, ()) if len(pt.pores) else (),
         ),
     )
 
@@ -303,6 +336,18 @@ class PoreVolumes(eq.ExtensiveQuantity):
     )
 
 
+class UnseenStrain(eq.ExtensiveQuantity):
+    says = "unseen strain to grid"
+    takes = OF_PORES
+    gives = (
+        eq.Sum(
+            UNSEEN,
+            lambda pt, node: _times(node.N, pt.pores.unseen) if len(pt.pores) else (),
+            lambda pt, w: (pt.pores.unseen, ()) if len(pt.pores) and len(pt.pores.unseen) else (),
+        ),
+    )
+
+
 class WaterForce(eq.ExtensiveQuantity):
     says = "pore pressure to grid"
     takes = OF_PORES
@@ -311,12 +356,12 @@ class WaterForce(eq.ExtensiveQuantity):
 
 class WaterMomentumAgain(eq.ExtensiveQuantity):
     says = "momentum of the water to grid"
-    takes = eq.of_point(water=water, water_v=water_v)
+    takes = eq.of_point(water=water, w=water_w)
     gives = (
         eq.Sum(
             eq.whole(WaterAgain),
-            lambda pt, node: _momentum(*pt.water, pt.water_v, node) if len(pt.water) else (),
-            lambda pt, w: (pt.water[0] * pt.water_v, ()) if len(pt.water) else (),
+            lambda pt, node: _momentum(*pt.water, pt.w, node) if len(pt.water) else (),
+            lambda pt, w: (pt.water[0] * pt.w, ()) if len(pt.water) else (),
         ),
     )
 
@@ -346,11 +391,9 @@ def close_if_dry(nodes, kin, n):
     prescribed, sums = field(nodes.fields, GivenPressure), field(nodes.fields, WaterSums)
     of_V, of_area = of_volumes(kin), of_pressure(kin) + kin.dimension
     if prescribed[n, 1] == 1 and sums[n, of_V + 2] <= prescribed[n, 0] * sums[n, of_V]:
-        m, m_s, across = sums[n, arrays.MASS], nodes.sums[n, arrays.MASS], real(0, sums[n, 0])
+        across = real(0, sums[n, 0])
         for k in range(kin.dimension):
-            of_momentum = arrays.of_momentum(kin) + k
-            w = sums[n, of_momentum] / m - nodes.sums[n, of_momentum] / m_s
-            across += w * sums[n, of_area + k]
+            across += sums[n, arrays.of_momentum(kin) + k] * sums[n, of_area + k]
         if across <= 0:
             prescribed[n, 0] = nan
 
@@ -446,7 +489,7 @@ def forces_at(task, kin, nodes, n, dt):
         carried = along * water[n, of_P + d + k]
         on_water = water[n, of_force] - carried + by_pressure
         v = nodes.sums[n, of_momentum] * per_soil
-        w = water[n, of_momentum] * per_mass - v
+        w = water[n, of_momentum] * per_mass
         rest = nodes.sums[n, of_force] + carried + water[n, of_P + k] - by_pressure
         forces.append((on_water, rest + (1 - taken) * on_water + D * taken * w, v, w))
     return DragAt(m_s, left, taken, m_s + m * (1 - taken)), forces
@@ -468,6 +511,24 @@ def share_forces(task, kin, nodes, n, dt):
 
 
 @node_task
+class SplitMomentum(NamedTuple):
+    """Subtracts mass and momentum of the water from the sums of a node."""
+
+    says = "momentum of the soil"
+    goes_through = ("sums", "water sums")
+
+    def at_node(task, kin, nodes, n, dt):
+        if not is_wet_node(nodes, kin, n):
+            return
+        both = nodes.sums[n, arrays.MASS]
+        soil = both - field(nodes.fields, WaterSums)[n, arrays.MASS]
+        fraction = soil / both
+        nodes.sums[n, arrays.MASS] = soil
+        for k in range(kin.dimension):
+            nodes.sums[n, arrays.of_momentum(kin) + k] *= fraction
+
+
+@node_task
 class ShareForces(NamedTuple):
     """Sets the force on the water and, for fixes, a node's mass and force with dragged water."""
 
@@ -485,7 +546,7 @@ class ShareForces(NamedTuple):
 
 @node_task
 class DragWater(NamedTuple):
-    """Updates the relative velocity with the soil's velocity change; resets mass to the soil's."""
+    """Updates the relative velocity with the soil's velocity change; resets the mass."""
 
     says = "drag"
     goes_through = ("sums", "update", "water sums", "water update")
@@ -497,17 +558,22 @@ class DragWater(NamedTuple):
             return
         water = field(nodes.fields, WaterSums)
         m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
-        per_mass, fraction = 1 / water[n, arrays.MASS], m_s / nodes.sums[n, arrays.MASS]
+        both = m_s + water[n, arrays.MASS]
+        per_mass, per_whole = 1 / water[n, arrays.MASS], 1 / nodes.sums[n, arrays.MASS]
+        out[n, 2 * d] = left
         for k in range(d):
             of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
             dv = nodes.update[n, arrays.of_change(kin) + k]
-            w = water[n, of_momentum] * per_mass - (nodes.update[n, k] - dv)
+            # Water next to a fix that holds the soil slips past it unless drag holds it, too.
+            beyond = nodes.sums[n, of_momentum] * per_whole - (nodes.update[n, k] - dv)
+            w = water[n, of_momentum] * per_mass + left * beyond
             new = left * w + taken * (dt * water[n, of_force] * per_mass - dv)
             out[n, k] = new
             out[n, d + k] = new - w
+            out[n, 2 * d + 1 + k] = beyond
             water[n, of_force] = 0
-            nodes.sums[n, of_momentum] *= fraction
-        nodes.sums[n, arrays.MASS] = m_s
+            nodes.sums[n, of_momentum] *= both * per_whole
+        nodes.sums[n, arrays.MASS] = both
 
 
 def _make_flux(task, kin, nodes, n, dt):
@@ -525,8 +591,10 @@ def _make_flux(task, kin, nodes, n, dt):
     per_mass, per_volume = 1 / m, 1 / V
     for k in range(d):
         if task.of_step:
-            again[n, k] = m * (nodes.velocity[n, k] + out[n, k])
-        j = (again[n, k] - m * nodes.velocity[n, k]) * per_volume
+            again[n, k] = m * out[n, k]
+        else:
+            again[n, k] += m * out[n, 2 * d] * out[n, 2 * d + 1 + k]
+        j = again[n, k] * per_volume
         flux[n, k] = j
         across += j * water[n, of_area + k]
     drained = is_open(nodes, n)
@@ -537,20 +605,17 @@ def _make_flux(task, kin, nodes, n, dt):
     supply = _mass_given(nodes, kin, n)
     stays = across + supply if closed else supply
     leaves = across + supply if drained else real(0, dt)
-    means = water[n, of_V + 2] * per_volume, water[n, of_V + 3] * per_volume
+    means = water[n, of_V + 3] * per_volume, water[n, of_unseen(kin)] * per_volume
     put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
     # With the mean relative velocity in the step, the remaining work is the work of weight
     # minus the work of drag, and the work of pressure on water that enters or leaves.
     work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
     for k in range(d):
-        of_momentum = arrays.of_momentum(kin) + k
-        v, dv = nodes.velocity[n, k], nodes.update[n, arrays.of_change(kin) + k]
-        # a fix that holds the soil prescribes its velocity throughout
-        held = not task.of_step and nodes.update[n, k] == v
-        before = v if held else nodes.update[n, k] - dv
-        w = 0.5 * ((water[n, of_momentum] + again[n, k]) * per_mass - before - v)
-        dv += out[n, d + k]
-        work += w * (m * dv - dt * pushed[k])
+        beyond = out[n, 2 * d + 1 + k]
+        dragged = beyond if task.of_step else out[n, 2 * d] * beyond
+        w = 0.5 * ((water[n, arrays.of_momentum(kin) + k] + again[n, k]) * per_mass + dragged)
+        dv = nodes.update[n, arrays.of_change(kin) + k] + out[n, d + k]
+        work += (w + beyond - dragged) * m * dv - w * dt * pushed[k]
     field(nodes.fields, WorkAtNodes)[n, 0] += work
 
 
@@ -626,7 +691,7 @@ class Seep(eq.Task):
 
     says = "inflow and outflow of water"
     reads = ("x", "state", "material", "deformation gradient", "v", "relative velocity")
-    writes = ("state", "relative velocity", "unseen pressure")
+    writes = ("state", "relative velocity", "volume strain")
 
     def empty(task, w, x):
         none, tensor = real(0, x[0]), zero(w.kin, x[0])
@@ -665,9 +730,12 @@ class Seep(eq.Task):
         pores = old.pores * grown + (1 - law.n) * (grown - 1)
         if len(means):
             mean, again = means
-            factor = real(SMOOTHING, mean) / law.K
-            pores = pores * (1 + factor * (pt.of(UnseenPressure)[0, pt.p] - again))
-            store(pt.of(UnseenPressure), pt.p, (pore_pressure(law, kin, old) - mean,))
+            strain, unseen = pt.load(VolumeStrain, (mean, mean))
+            change = real(SMOOTHING, mean) * (again - unseen)
+            pores = pores + change * (pores + (1 - law.n))
+            store(pt.of(VolumeCorrection), pt.p, (change,))
+            later = strain + (1 + strain) * (grown * (1 + change) - 1)
+            store(pt.of(VolumeStrain), pt.p, (later, strain - mean))
         new = old._replace(content=content, pores=pores)
         store_from(pt.w.points.state, pt.p, count_in(old.skeleton), new)
         v = pt.v

@@ -41,6 +41,7 @@ class Strain(Task):
             dl = frames.of_places_before(w.frame, w.kin, dl)
         dl = fbar.averaged(pt, dl, ratio)
         law, old, f = pt.law_state_F
+        dl = fbar.corrected(pt, dl, f)
         growth = frames.spatial_increment(w.frame, w.kin, dl, f)
         load_step = task.of_load_step and laws.by_rates(law)
         strained = large(growth) if load_step else growth  # domains grow by the complete gradient
