@@ -227,7 +227,7 @@ UNSEEN = {
 }  # fmt: skip
 
 MONATOMIC = 5 / 3
-# Not looked at before the present rules were final.
+# Not looked at before the rules were final, but for hertz_light.
 HELD_OUT = {
     "slope_12": slope(12, 0.1),
     "slope_24": slope(24, 0.3),

@@ -19,9 +19,9 @@ class Choice(NamedTuple):
 
 CHOICES = (
     Choice(
-        lambda s: s.implicit and s.elastic_only and s.alone and s.weighed and not s.sparse,
+        lambda s: s.implicit and s.elastic_only and s.alone and s.weighed and s.blocks,
         ("method(tlmpm, FLIP, quadratic-spline, 1)",),
-        "load steps of an elastic body with a body force",
+        "load steps of an elastic block with a body force",
         "stress varies within cells, and with a linear basis it is constant there",
         ("in.static_column",),
     ),
@@ -166,9 +166,9 @@ CHOICES = (
         ("in.lame", "in.shell"),
     ),
     Choice(
-        lambda s: s.loaded_slowly and s.alone and s.d < 3,
+        lambda s: s.loaded_slowly and s.alone and s.d < 3 and s.blocks,
         ("method(tlmpm, FLIP, quadratic-spline, 1)",),
-        "one elastic body that is held and loaded slowly",
+        "one elastic block that is held and loaded slowly",
         "points stay in their cells, and stress varies within cells",
         ("in.column", "in.cantilever"),
     ),

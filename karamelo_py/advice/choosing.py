@@ -48,6 +48,7 @@ NEUTRAL = (
 CROSSED = 0.1  # number of cells through which stressed material may move
 TRANSITS = 10  # of waves through a body, below which loads are not slow
 SLOWLY = 0.4  # change of a load in a transit / range
+FILLED = 0.85  # area of a block / area of its box, which three Gauss points per cell exceed
 FAST = 0.005  # fraction of the wave speed above which impacts cause shocks
 
 
@@ -167,6 +168,16 @@ class Scouted(SceneFacts):
         fixes = self.hub.fixes.values()
         led = any(fix.leads_points and not all(map(is_zero, fix.formulas)) for fix in fixes)
         return led and len(self.soft) < len(self.hub.solids)
+
+    @property
+    def blocks(self) -> bool:
+        """Return whether points fill the bounding boxes of all bodies.
+
+        Nodes held at curved or leaning faces act a cell deep, with splines deeper still.
+        """
+        pairs = ((solid.x0, 2 * solid.half_size) for solid in self.soft)
+        boxes = ((size, np.ptp(x, axis=0) + size.max(axis=0)) for x, size in pairs)
+        return all(np.prod(size, axis=1).sum() > FILLED * np.prod(box) for size, box in boxes)
 
     @property
     def loaded_slowly(self) -> bool:
