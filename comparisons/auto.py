@@ -49,7 +49,10 @@ LONGEST = 40  # seconds of processor time for a run
 
 
 class Scene(NamedTuple):
-    """A script with an exact answer, `sizes` of its `variable`, and the error of a run."""
+    """A script with an exact answer, `sizes` of its `variable`, and the error of a run.
+
+    `points` per cell and direction replace those of the script.
+    """
 
     script: str
     error: Callable[[Result], float]
@@ -57,6 +60,7 @@ class Scene(NamedTuple):
     variable: str = "refine"
     domain: str = "R4"
     more: tuple = ()  # names and values of variables
+    points: int | None = None
 
 
 def last(name: str, over: str = "", exact: float | None = None) -> Callable[[Result], float]:
@@ -300,6 +304,10 @@ def script_of(scene: Scene, lines: str, total: bool) -> str:
         own = r"^(anti_volumetric_locking|precision|scheme|dt_factor|set_dt)\(.*\n"
     text = re.sub(own, "", text, flags=re.M)
     lines = lines.format(domain=scene.domain)
+    if scene.points is not None:
+        text = re.sub(r"^(ppc +=) \d", rf"\1 {scene.points}", text, flags=re.M)
+        of_solids = r"^(solid\(\w+, region, \w+), \d,"
+        text = re.sub(of_solids, rf"\1, {scene.points},", text, flags=re.M)
     if "(ulmpm/contacts" in text:  # its fixes need the fields of solids
         lines = lines.replace("(ulmpm,", "(ulmpm/contacts,")
     if "thermo-mechanical" in text and "auto" not in lines:

@@ -6,9 +6,10 @@ with corrected accelerations, PolyPIC, usl and AFLIP. Cost is visited nodes
 picture is FOLDER/seconds.png.
 """
 
+import re
 import sys
 from collections.abc import Iterable, Sequence
-from math import exp, inf, isfinite
+from math import exp, inf, isfinite, log
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,8 @@ TITLES = {
     "slope_27": "Block on a slope of 27 degrees", "sod": "Shock tube", "slosh": "Sloshing tank",
     "taylor_green": "Taylor-Green vortices", "plates": "Plate impact", "cantilever": "Cantilever",
 }  # fmt: skip
+# 0.9 h/c: boxes of elastic material are stable up to h/c
+LONG_STEPS = "method(tlmpm, PolyPIC, linear)\nscheme(usl, start=half)\ndt_factor(1.38)"
 AFTER = {
     "APIC quadratic corrected": "method(ulmpm, APIC, quadratic-spline, mass=corrected)",
     "APIC cubic corrected": "method(ulmpm, APIC, cubic-spline, mass=corrected)",
@@ -37,7 +40,15 @@ AFTER = {
     "AFLIP cubic corrected": "method(ulmpm, AFLIP, cubic-spline, 1, mass=corrected)",
     "MLS quadratic corrected": "method(ulmpm, MLS, quadratic-spline, mass=corrected)",
     "tlmpm PolyPIC usl": "method(tlmpm, PolyPIC, linear)\nscheme(usl)",
-}
+    "tlmpm PolyPIC long steps, 1 point": LONG_STEPS,
+    "tlmpm PolyPIC long steps, 2 points": LONG_STEPS,
+    "APIC quadratic usl, 2 points": (
+        "method(ulmpm, APIC, quadratic-spline)\nscheme(usl, start=half)"),
+    "AFLIP quadratic usl": "method(ulmpm, AFLIP, quadratic-spline, 1)\nscheme(usl)",
+    "AFLIP quadratic F-bar": (
+        "method(ulmpm, AFLIP, quadratic-spline, 0.95)\nanti_volumetric_locking(true)"),
+    "AFLIP cubic": "method(ulmpm, AFLIP, cubic-spline, 0.9)",
+}  # fmt: skip
 # Visited nodes and errors that others published, or a study of their method found.
 PUBLISHED = {
     "axis_aligned": {
@@ -52,8 +63,24 @@ Lines = Iterable[Sequence[dict]]  # the runs of each set-up, from coarse to fine
 
 
 def words_of(setup: str) -> str:
-    """Return the arguments of the method and scheme of a set-up."""
-    return SETUPS[setup][7:-1].replace(")\nscheme(", ", ").replace(", {domain}", "")
+    """Return the arguments of the commands of a set-up."""
+    lines = SETUPS[setup].replace(", {domain}", "").split("\n")
+    words = [re.sub(r"^(method|scheme)\((.*)\)$", r"\2", line) for line in lines]
+    return ", ".join(words + re.findall(r", (\d points?)$", setup))
+
+
+def runs_of(name: str, setup: str, folder: Path, most: float = inf) -> list[dict]:
+    """Run a set-up in all sizes; then, up to a cost of `most`, with cells of half the size."""
+    points = re.findall(r", (\d) points?$", setup)
+    scene = SCENES[name]._replace(points=int(points[0]) if points else None)
+    runs = [run(scene, name, setup, n, folder) for n in SIZES[name]]
+    size, (before, last) = float(SIZES[name][-1]), (one["cost"] for one in runs[-2:])
+    growth = (last / before) ** (log(2) / log(size / float(SIZES[name][-2])))
+    while last * growth <= most < inf:
+        size *= 2
+        runs.append(run(scene, name, setup, f"{size:g}", folder))
+        last = runs[-1]["cost"]
+    return runs
 
 
 def drawn(runs: Sequence[dict], cost: str) -> list[tuple[float, float]]:
@@ -93,12 +120,14 @@ def main() -> None:
     gains = []
     print("| scene | before | now | error before over now | auto over the least |")
     print("|---|---|---|---|---|")
-    for axes, (name, sizes) in zip(panels.flat, SIZES.items(), strict=True):
-        found = {s: [run(SCENES[name], name, s, n, folder) for n in sizes] for s in SETUPS}
+    for axes, name in zip(panels.flat, SIZES, strict=True):
+        found = {s: runs_of(name, s, folder) for s in SETUPS if s not in AFTER}
+        most = max(one["cost"] for runs in found.values() for one in runs if one["cost"] > 0)
+        found |= {s: runs_of(name, s, folder, most) for s in SETUPS if s != "auto"}
         for k, (setup, runs) in enumerate(found.items()):
             good = drawn(runs, cost)
             new = setup in AFTER
-            line = {"color": plt.cm.tab20(k), "lw": 1.6 if new else 0.9, "ls": "-" if new else ":"}
+            line = {"color": plt.cm.tab20(k % 20), "lw": 1.6 if new else 0.9, "ls": "-" if new else ":"}
             if setup == "auto":
                 line = {"color": "k", "marker": "*", "ms": 11, "ls": "", "zorder": 9}
             axes.loglog(
