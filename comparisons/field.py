@@ -1,9 +1,9 @@
 """python -m comparisons.field FOLDER: error against cost of every set-up, over twelve scenes.
 
 Draws docs/_static/field.png and prints the least error at equal cost: of ten usual set-ups, and
-with corrected accelerations, PolyPIC, usl and AFLIP. Cost is visited nodes
-(:mod:`comparisons.auto`), or with ``-seconds`` the processor time of the steps, and then the
-picture is FOLDER/seconds.png.
+with corrected accelerations, PolyPIC, usl, AFLIP, F-bar, long steps and fewer points. Cost is
+visited nodes (:mod:`comparisons.auto`), or with ``-seconds`` the processor time of the steps, and
+then the picture is FOLDER/seconds.png.
 """
 
 import re
@@ -127,7 +127,11 @@ def main() -> None:
         for k, (setup, runs) in enumerate(found.items()):
             good = drawn(runs, cost)
             new = setup in AFTER
-            line = {"color": plt.cm.tab20(k % 20), "lw": 1.6 if new else 0.9, "ls": "-" if new else ":"}
+            line = {
+                "color": plt.cm.tab20(k % 20),
+                "lw": 1.6 if new else 0.9,
+                "ls": "-" if new else ":",
+            }
             if setup == "auto":
                 line = {"color": "k", "marker": "*", "ms": 11, "ls": "", "zorder": 9}
             axes.loglog(
