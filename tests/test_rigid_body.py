@@ -303,6 +303,15 @@ def test_a_wheel_on_a_slope(run_script, mu, far):
     assert log.w_fy == pytest.approx(-log.touch_y)
 
 
+def test_a_box_that_friction_holds_does_not_creep(run_script):
+    """On the slope of in.rolling, tan(20 degrees) = 0.36 < 0.5; viscous friction creeps."""
+    text = (INPUTS / "in.rolling").read_text("utf-8")
+    text = text.replace("cylinder, 0.6, 0.3 + R, R)", "block, 0.3, 0.9, 0.3, 0.9)")
+    log = run_script(text.replace("all, 0.1)", "all, 0.3)")).log
+    before, after = (log.w_x[(log.Time > t) & (log.Time < t + 0.2)].mean() for t in (0.8, 1))
+    assert after == pytest.approx(before, abs=0.01 * 0.1)  # of a cell
+
+
 @pytest.mark.parametrize(
     ("refine", "draught", "end"), [(0.5, 0.05, 2), pytest.param(1, 0.01, 8, marks=pytest.mark.full)]
 )

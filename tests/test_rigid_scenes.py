@@ -78,14 +78,35 @@ def test_the_energy_of_a_ball_and_grains_closes(run_script):
 
 
 @pytest.mark.parametrize(
-    ("refine", "mu"), [(0.75, 0), *(pytest.param(1, mu, marks=FULL) for mu in (0, 1))]
+    ("refine", "mu", "within"),
+    [
+        (0.75, 0, 0.05),
+        *(pytest.param(*one, marks=FULL) for one in ((1, 0, 0.05), (1, 1, 0.19), (2, 1, 0.09))),
+    ],
 )
-def test_a_t_bar_in_clay(run_script, refine, mu):
-    """6 + pi if smooth, 4 sqrt(2) + 2 pi if rough (Randolph & Houlsby 1984)."""
+def test_a_t_bar_in_clay(run_script, refine, mu, within):
+    """6 + pi if smooth, 4 sqrt(2) + 2 pi if rough (Randolph & Houlsby 1984).
+
+    Clay that sticks to a bar shears half a cell away from it: an error of the first order.
+    """
     words = ("-var", "refine", f"{refine}", "-var", "mu", f"{mu}", "-var", "far", "0.15")
     exact = 4 * np.sqrt(2) + 2 * np.pi if mu else 6 + np.pi
     log = run_script(INPUTS / "in.penetrometer", *words).log
-    assert late(log, "N", 0.6) == pytest.approx(exact, rel=0.07 if mu else 0.05)
+    assert late(log, "N", 0.6) == pytest.approx(exact, rel=within)
+
+
+@pytest.mark.parametrize(
+    ("refine", "stiff", "far", "within"),
+    [
+        (1, 50, 1.5, 0.1),
+        *(pytest.param(*one, marks=FULL) for one in ((2, 50, 2, 0.05), (1, 100, 2, 0.12))),
+    ],
+)
+def test_a_cone_in_clay(run_script, refine, stiff, far, within):
+    """Teh & Houlsby 1991; other solutions differ from theirs by 10 to 15 %."""
+    words = ("-var", "refine", f"{refine}", "-var", "Ir", f"{stiff}", "-var", "far", f"{far}")
+    log = run_script(INPUTS / "in.cone", *words).log
+    assert late(log, "N", 0.7) == pytest.approx(log.law[-1], rel=within)
 
 
 @pytest.mark.parametrize(
@@ -130,13 +151,18 @@ def test_a_projectile_goes_through_a_plate(run_script, refine):
     assert remains[1] == pytest.approx(part * np.sqrt(350**2 - limit), rel=0.05)
 
 
-def test_a_wheel_in_sand(run_script):
-    """Ding et al. 2011, smooth wheel: 15 N, 5.3 N m and 17.5 mm at a slip of 0.6."""
-    words = ("-var", "slip", "0.6", "-var", "T", "0.9")
+@pytest.mark.parametrize(
+    ("slip", "pull", "torque"),
+    [(0.1, 11, 3), *(pytest.param(*one, marks=FULL) for one in ((0.3, 15, 4.8), (0.6, 15, 5.3)))],
+)
+def test_a_wheel_in_sand(run_script, slip, pull, torque):
+    """Ding et al. 2011, smooth wheel. Friction that creeps gives 2 N at a slip of 0.1."""
+    words = ("-var", "slip", f"{slip}", "-var", "T", "0.9")
     result = run_script(INPUTS / "in.wheel", *words)
-    assert late(result.log, "torque", 0.6) == pytest.approx(5.3, rel=0.1)
-    assert late(result.log, "pull", 0.6) == pytest.approx(15, rel=0.25)
-    assert late(result.log, "sinkage", 0.9) == pytest.approx(17.5e-3, rel=0.3)
+    assert late(result.log, "torque", 0.6) == pytest.approx(torque, rel=0.25)
+    assert late(result.log, "pull", 0.6) == pytest.approx(pull, rel=0.25)
+    if slip == 0.6:
+        assert late(result.log, "sinkage", 0.9) == pytest.approx(17.5e-3, rel=0.3)
     assert late(result.log, "load", 0.6) == pytest.approx(80, rel=0.02)
     assert abs(closing(result)) < 0.5 and "warning" not in result.err
 

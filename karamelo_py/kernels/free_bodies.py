@@ -1,5 +1,6 @@
 """Contact of freely moving rigid bodies, and the rows that they add to a step."""
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +17,14 @@ from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
 from karamelo_py.kernels.views import location_at, state_at, volume_of
 from karamelo_py.points.basis import entry, locate, support
-from karamelo_py.points.bodies import face, radius
+from karamelo_py.points.bodies import NEW, face, radius
 from karamelo_py.points.grid import node_position
 from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
 SOFT = 0.1  # fraction of penetration removed per step
+# spring force (3), mean load, unused friction, step of the last touch, position in the body (3)
+GRIP = 9
 DEEP = 0.125  # penetration in cells above which the spring hardens, for heavy bodies on few points
 
 _call = caller_of(CALL)
@@ -33,6 +36,7 @@ class TouchingSurface(NamedTuple):
     shape: arrays.Tag
     members: np.ndarray  # (N,) bool by id
     clear: np.ndarray  # (N,) by id: distance within which there is no face
+    grip: np.ndarray  # (N, GRIP) by id; (0, GRIP) without friction
     mu: float
     slot: int  # slot of the force on points
     torque: int  # slot of the torque, or 0
@@ -140,7 +144,50 @@ def _list_point(body, surface, s, block, p):
     share = SOFT * dt * times.kick / (times.contact_dt * times.contact_kick)
     contact.share = min(deep * deep * share, 1.0)
     contact.most, contact.face = 0.0, face(kin, volume, x)
+    contact.number = number
+    for c in range(3):
+        contact.local[c] = local[c]
+    _recall(surface.grip, s.control, state, contact)
     return True
+
+
+@noinline
+def _recall(grip, control, state, contact):
+    """Set what friction remembers of a point that touched in the last step."""
+    contact.usual = contact.spare = 0.0
+    for c in range(3):
+        contact.hold[c] = 0.0
+    step, number = control.values[arrays.TIMESTEP], contact.number
+    if number >= len(grip) or grip[number, 5] != step or not step > 0:
+        return
+    memory, times, at, along = grip[number], control.step[0], contact.local, 0.0
+    contact.usual, contact.spare = times.kick * memory[3], times.kick * (1 - NEW) * memory[4]
+    stiff = SOFT * times.kick / (times.contact_dt * times.contact_kick)
+    slid = motion.from_start(state, (memory[6] - at[0], memory[7] - at[1], memory[8] - at[2]))
+    for c in range(3):  # by positions, as velocities are noisy
+        contact.hold[c] = times.kick / contact.mass * memory[c] + stiff * slid[c]
+        along += contact.normal[c] * contact.hold[c]
+    for c in range(3):
+        contact.hold[c] -= along * contact.normal[c]
+
+
+@noinline
+def _retain(grip, control, contact):
+    """Update what friction remembers of a point, as `points.bodies.rub` does."""
+    if contact.number >= len(grip) or not contact.gap < 0:
+        return
+    memory, kick = grip[contact.number], control.step[0].kick
+    mean = contact.usual + NEW * (contact.push - contact.usual)
+    bound, square = contact.mu * max(mean, contact.push), 0.0
+    for c in range(3):
+        memory[c], memory[6 + c] = contact.mass / kick * contact.hold[c], contact.local[c]
+        square += memory[c] ** 2
+    size = sqrt(square) * kick
+    for c in range(3):
+        memory[c] *= bound / size if size > bound else 1.0
+    unused = contact.spare + contact.mu * contact.push - contact.rub * contact.speed
+    memory[3], memory[4] = mean / kick, max(unused, 0.0) / kick
+    memory[5] = control.values[arrays.TIMESTEP] + 1
 
 
 @noinline
@@ -256,7 +303,9 @@ def _list_nodes(body, s):
         closing = closing_part(contact, a, b) if lasts else 1.0
         one.gap = closing * max(body.pairs.gaps[q], 0.0)
         one.mass, one.mu, one.share = nodes.sums[m, arrays.MASS], contact.friction[a, b], 1.0
-        one.most = 0.0
+        one.most = one.usual = one.spare = 0.0
+        for c in range(3):
+            one.hold[c] = 0.0
         body.count[0] += 1
 
 
@@ -357,6 +406,10 @@ def _part(s):
         else:
             for number, block in enumerate(s.blocks):
                 _give_to_points(body, s, block, number, True)
+            for surface in body.surfaces:
+                for i in range(body.count[0]):
+                    if body.contacts[i].slot == surface.slot:
+                        _retain(surface.grip, s.control, body.contacts[i])
         before = motion.work_of(body)
         motion.finish_step(body, s.control, s.kin.dimension)
         add_to(s.control.totals, CONTACT_LOSS, before + motion.work_of(body))

@@ -57,7 +57,7 @@ LINK = np.dtype([
     ("constant", *_NUMBER),  # impulse along the first direction
     ("impulse", *_VECTOR), ("hit", *_VECTOR),  # impulse on the first body; part due to collisions
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
-    ("most", *_NUMBER),  # friction bound
+    ("bound", *_NUMBER), ("most", *_NUMBER),  # largest friction; prescribed bound
     ("slot", np.int64), ("torque", np.int64),  # indices of published force, torque; torque 0: none
     ("sign", *_NUMBER),  # 1 if they act on the first body, -1 if on the second
 ])  # fmt: skip
@@ -433,7 +433,8 @@ def _set_impulse(links, link, u, bounded):
     for k in range(3):
         link.slip[k] -= along * link.ways[0, k]
         square += link.slip[k] ** 2
-    link.speed, link.rub, most = sqrt(square), 0.0, link.most if bounded else link.mu * link.push
+    link.bound = link.mu * link.push
+    link.speed, link.rub, most = sqrt(square), 0.0, link.most if bounded else link.bound
     if link.push > 0 and square > 0:
         link.rub = min(link.stiff[1], most / link.speed)
     for k in range(3):

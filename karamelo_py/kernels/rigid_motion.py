@@ -5,11 +5,13 @@ of the rigid body, and a gap g. With the rigid body's velocity U = (V, w) at the
 its velocity at x is A U = V + w x (x - X), and the impulse has a closed form::
 
     p_n = s m max(n . (A U - v*) - g / dt, 0)
-    p_t = m (A U - v*)_t, but at most mu p_n
+    p_t = m (A U - v* + h)_t, but at most mu p_n
 
 Newton's method solves the body's equations, at most six: M (U - U*) + sum A^T p = 0. As the impulse
 is implicit, it does not limit the step. Contact at points has s = 0.1 (dt / dt0)^2, where dt0 is
-the unshortened step: an implicit spring of constant stiffness. Contact at nodes has s = 1.
+the unshortened step: an implicit spring of constant stiffness. The slip stretches another such
+spring, which gives m h; without it, points that carry a load would creep (`points.bodies.rub`).
+Contact at nodes has s = 1, h = 0.
 
 Forces act for the time `kick`, and the body moves for dt. At constant angular momentum it rotates
 about one principal axis after another, x/2 y/2 z y/2 x/2 (McLachlan 1993; Touma & Wisdom 1994,
@@ -54,11 +56,15 @@ CONTACT = np.dtype([
     ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
     ("mass", *_NUMBER), ("v", *_VECTOR),  # mass and velocity of the other body
     ("mu", *_NUMBER), ("share", *_NUMBER),  # s
+    ("hold", *_VECTOR), ("local", *_VECTOR),  # h; position in the body's initial frame
+    ("usual", *_NUMBER), ("spare", *_NUMBER),  # mean impulse; unused friction of earlier steps
     ("impulse", *_VECTOR),
     # values of the last iteration:
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
-    ("most", *_NUMBER),  # friction bound
-    ("block", np.int64), ("point", np.int64), ("slot", np.int64),  # of a point and its force
+    ("bound", *_NUMBER), ("lean", *_NUMBER),  # largest friction, and its derivative by the push
+    ("most", *_NUMBER),  # prescribed bound
+    ("block", np.int64), ("point", np.int64), ("number", np.int64),  # of a point, and its id
+    ("slot", np.int64),  # of its force
     ("torque", np.int64),  # slot, or 0
     ("area", np.int64), ("face", *_NUMBER),  # slot of the area of contact; area of the point
 ])  # fmt: skip
@@ -257,6 +263,13 @@ def velocity_there(body, u, k):
 
 
 @noinline
+def _bound(c):
+    """Return the largest friction impulse, and its derivative by the normal impulse."""
+    usual, spare = c.mu * max(c.usual, c.push), c.spare + c.mu * c.push
+    return min(usual, spare), c.mu if spare < usual or c.push > c.usual else 0.0
+
+
+@noinline
 def _set_impulse(body, u, i, dt, bounded):
     """Set the impulse of contact `i` at the velocities `u`.
 
@@ -271,10 +284,11 @@ def _set_impulse(body, u, i, dt, bounded):
         along += normal[k] * slip[k]
     c.push = c.share * c.mass * max(along - c.gap / dt, 0.0)
     for k in range(3):
-        slip[k] -= along * normal[k]
+        slip[k] += c.hold[k] - along * normal[k]
         square += slip[k] ** 2
-    c.speed, c.rub, most = sqrt(square), 0.0, c.most if bounded else c.mu * c.push
-    if c.push > 0 and square > 0:
+    c.bound, c.lean = _bound(c)
+    c.speed, c.rub, most = sqrt(square), 0.0, c.most if bounded else c.bound
+    if most > 0 and square > 0:
         c.rub = min(c.mass, most / c.speed)
     for k in range(3):
         c.impulse[k] = c.push * normal[k] + c.rub * slip[k]
@@ -304,10 +318,10 @@ def residual(body, dt, u, rest, bounded):
 def add_slope(body, i, bounded):
     """Add A^T (dp/dr) A of contact `i` to the slope; its impulse is known."""
     c, A, J = body.contacts[i], body.solution.lever, body.solution.slope
-    if not c.push > 0:
+    if not (c.push > 0 or c.rub > 0):
         return
     set_lever(body, c.at)
-    stiff, slips = c.share * c.mass, 0.0 < c.rub < c.mass
+    stiff, slips = c.share * c.mass if c.push > 0 else 0.0, 0.0 < c.rub < c.mass
     for k in range(3):
         for j in range(3):
             along = c.normal[k] * c.normal[j]
@@ -315,7 +329,7 @@ def add_slope(body, i, bounded):
             if slips:
                 way = c.slip[k] / c.speed
                 slope -= c.rub * way * c.slip[j] / c.speed
-                slope += 0.0 if bounded else c.mu * stiff * way * c.normal[j]
+                slope += 0.0 if bounded else c.lean * stiff * way * c.normal[j]
             for a in range(A.shape[1]):  # loops compile faster than 36 terms
                 for b in range(A.shape[1]):
                     J[a, b] += slope * A[k, a] * A[j, b]
@@ -390,9 +404,8 @@ def bounds_are_settled(contacts, count):
     change = largest = 0.0
     for i in range(count):
         c = contacts[i]
-        bound = c.mu * c.push
-        change, largest = max(change, abs(bound - c.most)), max(largest, bound)
-        c.most = bound
+        change, largest = max(change, abs(c.bound - c.most)), max(largest, c.bound)
+        c.most = c.bound
     return change <= 1e-10 * largest
 
 

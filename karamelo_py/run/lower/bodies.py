@@ -60,6 +60,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
             touch.region.outline(),
             touch.group.has(np.arange(count)) & soft,
             np.zeros(count),
+            touch.grip_of(count),
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
             int(hub.values.torques[hub.values.slot(f"{touch.id}_x")]),

@@ -7,6 +7,7 @@ import numpy as np
 
 from karamelo_py.kernels import rigid_motion as kernel
 from karamelo_py.kernels.equations import RigidSums
+from karamelo_py.kernels.free_bodies import GRIP
 from karamelo_py.language.arguments import NULL
 from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.language.signature import Argument, NonNegative, Positive
@@ -450,14 +451,14 @@ class ContactRigidBody(Fix):
     contact impulse acts on the nodes around the point, and on the body at the point. It is the
     impulse of a spring of stiffness 0.1 m/dt^2, computed implicitly with the velocity of the body
     at the end of the step; the spring hardens above a penetration of 1/8 of a cell. Friction stops
-    the slip, with at most mu times the normal impulse. Nodes held by fix velocity_nodes are not
+    the slip, with at most mu times the normal impulse, and the slip stretches a spring of the same
+    stiffness, so that points under load do not creep. Nodes held by fix velocity_nodes are not
     moved.
 
     The fix is for ulmpm and tlmpm. A wheel rolls on its radius plus half a point, so its
     acceleration on a slope is 3.6 % too large with a radius of 3 cells (2 % in 3D). Use
-    ulmpm/contacts for liquids, and for bodies that slide or are held by friction: the acceleration
-    of a sliding box is 0.04 % too large there, but 5 % too small with this fix, and a box at rest
-    creeps by 0.04 cells in 500 steps.
+    ulmpm/contacts for liquids, and for bodies that slide: the acceleration of a sliding box is
+    0.04 % too large there, but 4 % too small with this fix.
 
     See Also
     --------
@@ -467,6 +468,7 @@ class ContactRigidBody(Fix):
     published = ("x", "y", "z", "area")
     for_method = exerts = presses = True
     by_sizes = True
+    remembers = ("memory",)
 
     def __init__(
         self,
@@ -480,6 +482,7 @@ class ContactRigidBody(Fix):
         super().__init__(hub, group)
         judge_friction(hub, mu)
         self.mu, self.touches, surface = mu, solid, region or solid.region
+        self.grip = np.zeros((0, GRIP))
         if group.touches(solid) and not group.all:
             message = f"the group has points of the body '{solid.id}'"
             raise ScriptError(message, argument="group", expected="points of other solids")
@@ -507,6 +510,24 @@ class ContactRigidBody(Fix):
                     mark=self.mark,
                     command="fix contact/rigid_body",
                 )
+
+    def grip_of(self, count: int) -> np.ndarray:
+        """Return what friction remembers of `count` points, by id; nothing without friction."""
+        if self.mu > 0 and len(self.grip) != count:
+            before, self.grip = self.grip[:count], np.zeros((count, GRIP))
+            self.grip[: len(before)] = before
+        return self.grip
+
+    @property
+    def memory(self) -> np.ndarray:
+        return self.grip
+
+    @memory.setter
+    def memory(self, grip: np.ndarray) -> None:
+        if grip.shape == self.grip.shape:
+            self.grip[:] = grip  # a run may hold the array
+        else:
+            self.grip = grip.copy()
 
     def behind(self, points: PointTable) -> tuple[int, float]:
         """Return the number of points that begin inside the body, and the largest depth."""
