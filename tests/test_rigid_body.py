@@ -3,6 +3,7 @@
 import re
 from math import cos, pi, radians, sin
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import meshio
 import numpy as np
@@ -11,6 +12,7 @@ from conftest import INPUTS
 from going_on import goes_on, same_files, with_files
 from meshed import cube_surface, write
 
+from karamelo_py.compiler import kernel
 from karamelo_py.kernels import rigid_motion as motion
 
 pytestmark = pytest.mark.xdist_group("rigid body")
@@ -73,6 +75,45 @@ def test_a_free_top_conserves_energy_and_angular_momentum(run_interpreted):
     assert np.ptp(log.b_wx) > 0.5
     assert np.array(momentum) == pytest.approx(np.tile(momentum[0], (31, 1)), abs=1e-6)
     assert np.ptp(energy) < 5e-3 * energy[0]
+
+
+class Top(NamedTuple):
+    constants: np.recarray
+    state: np.recarray
+    solution: motion.Solution
+
+
+@kernel
+def turn(top, dt, count, middles):
+    """Rotate freely; store the middle of least and largest energy in each `count` steps."""
+    state = top.state[0]
+    for k in range(middles.size):
+        least, most = np.inf, 0.0
+        for _ in range(count):
+            motion.move(top, dt, 3, False)
+            energy = 0.0
+            for c in range(3):
+                energy += 0.5 * state.spin[c] * state.momentum[c]
+            least, most = min(least, energy), max(most, energy)
+        middles[k] = 0.5 * (least + most)
+
+
+def test_a_top_conserves_energy_over_1e5_revolutions():
+    """Energy of Euler's equations, sum L_i^2 / 2 I_i, about the middle axis; no drift."""
+    moments, spin = np.array([3.0, 4.0, 5.0]), np.array([1, 3, 0.5])
+    exact, errors = moments @ spin**2 / 2, []
+    for steps, revolutions in ((12, 10_000), (24, 500)):
+        top = Top(
+            motion.records(motion.CONSTANTS), motion.records(motion.STATE), motion.new_solution()
+        )
+        top.constants.inertia, top.constants.axes = moments, np.eye(3)
+        top.state.momentum, top.state.q = moments * spin, (1, 0, 0, 0)
+        motion.set_matrix(top.state[0])
+        middles = np.zeros(10)
+        turn(top, 2 * pi / (steps * np.linalg.norm(spin)), steps * revolutions, middles)
+        errors.append(np.abs(middles / exact - 1).max())
+        assert np.ptp(middles) < 1e-6 * exact
+    assert errors[0] < 5e-3 and errors[1] < errors[0] / 3
 
 
 @pytest.mark.parametrize("d", [1, 2, 3])
