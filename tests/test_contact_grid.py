@@ -2,6 +2,7 @@
 
 from itertools import product
 from textwrap import dedent
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from selection import few, parameters
 from states import final_state, same_bits
 
 from comparisons.results import read_dump
+from karamelo_py.kernels.contact import Bodies, closing_part
+from karamelo_py.points.kinematics import Axisymmetric, PlaneStrain
 
 H = 0.1
 
@@ -446,6 +449,19 @@ BOX = """
     set_output(time(0.1))
     run_time(2)
 """
+
+
+@pytest.mark.parametrize(("kin", "x"), [(PlaneStrain, 3.0), (Axisymmetric, 3.0)])
+@pytest.mark.parametrize(("filled", "part"), [(0.9, 0.01), (1.1, 0.0)])
+def test_a_liquid_closes_a_gap_only_where_there_is_one(kin, x, filled, part):
+    """A wall fills half of the cells around a node, and water the rest, or less."""
+    h, room = 0.5, 0.5**2 * (x if kin().hoops else 1)
+    contact = SimpleNamespace(
+        stride=1, per_mass=np.array([1e-4, 1e-3]) / h, fluid=(False, True), memory=(1, 100)
+    )
+    mass = np.array([[0.5 * room * 1e4], [(filled - 0.5) * room * 1e3]])
+    bodies = Bodies(contact, kin(), SimpleNamespace(sums=mass))
+    assert closing_part(bodies, (0, 1), (x, 0.0), h) == part
 
 
 @pytest.mark.xdist_group("contact")

@@ -14,7 +14,9 @@ grid axes, as normals tilt where faces end. Any positive gap means that convex b
 
 In liquids and granular materials some points lie closer to a wall than their mean suggests, so each
 apparent gap would let them sink in. Such bodies may leave a wall, but not approach it for 100 steps
-after a contact; liquids close 1 % of a gap per step, whatever the step. (Faster, water would sink
+after a contact; liquids close 1 % of a gap per step, whatever the step, where the points do not
+fill the cells. (In full cells, water would sink into thin walls by 48 % of a cell in 16 000 steps,
+not 16 %, with APIC and a linear basis; with FLIP 1 it sinks by up to 46 %. Faster, it would sink
 half a cell into an inclined thin wall, measured over 20 000 steps; slower, it would stay away from
 a floating box, with 8 % less draught. The force on a Hertzian disk would be 4 % too small.) Only
 faces towards the other body count, so walls may be one cell thick.
@@ -61,6 +63,7 @@ from karamelo_py.points.kinematics import dot, vector, zero_vector
 SCATTER = 0.003  # scatter of a plane face
 EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
+FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which shapeless bodies approach a wall slowly
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
@@ -438,8 +441,16 @@ def _last_contact(bodies, pair):
 
 
 @noinline
-def closing_part(contact, a, b):
-    """Return the part of a gap that may close in a step while a contact is remembered."""
+def closing_part(bodies, pair, x, h):
+    """Return the part of a gap that may close in a step while a contact is remembered.
+
+    There is a gap in a liquid only where the points do not fill the cells around the nodes.
+    """
+    (contact, kin, nodes), (n, m) = bodies, pair
+    a, b = n // contact.stride, m // contact.stride
+    filled = contact.per_mass[a] * nodes.sums[n, MASS] + contact.per_mass[b] * nodes.sums[m, MASS]
+    if filled > FULL * (h * x[0] if kin.hoops else h):
+        return 0.0
     return max(contact.fluid[a] / contact.memory[a], contact.fluid[b] / contact.memory[b])
 
 
@@ -458,7 +469,7 @@ def _excess_of(bodies, pair, where):
         last = _last_contact(bodies, pair)
         # With three bodies, a pair may have touched earlier in this step.
         if last > 0 and last >= where.step - memory:
-            closing = closing_part(contact, pair.n // contact.stride, pair.m // contact.stride)
+            closing = closing_part(bodies, (pair.n, pair.m), where.x, where.h)
     for direction in _directions(bodies, pair):
         length = sqrt(dot(direction, direction))
         if length > 0:

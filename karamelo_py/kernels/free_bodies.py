@@ -300,8 +300,8 @@ def _list_nodes(body, s):
         last = abs(contact.touched[n, b] if a < b else contact.touched[m, a])
         memory = max(contact.memory[a], contact.memory[b])
         lasts = last > 0 and last >= step - memory
-        closing = closing_part(contact, a, b) if lasts else 1.0
-        one.gap = closing * max(body.pairs.gaps[q], 0.0)
+        closing = closing_part(Bodies(contact, s.kin, nodes), (n, m), x, s.grids.h[0])
+        one.gap = (closing if lasts else 1.0) * max(body.pairs.gaps[q], 0.0)
         one.mass, one.mu, one.share = nodes.sums[m, arrays.MASS], contact.friction[a, b], 1.0
         one.most = one.usual = one.spare = 0.0
         for c in range(3):

@@ -89,7 +89,8 @@ class ULMPMContacts(Method):
 
     Walls one cell thick contain liquids and granular materials, even if they have corners, are
     inclined or move: points of sand penetrated fixed walls by at most 10 % of a cell in 1e5 steps,
-    gel by 15 %, and water by 28 % in 2e4 steps (moving walls 34 %). For 100 steps after contact at
+    gel by 15 %, and water in 2e4 steps by 5 % (FLIP 0.99), 16 % (APIC), 20 to 27 % (moving walls)
+    and 30 to 46 % (FLIP 1, which retains noise). For 100 steps after contact at
     a node, sand there does not approach the wall, and liquids close 1 % of a gap per step.
 
     The two solids at a node have a common normal, so momentum is conserved. It is computed from the
