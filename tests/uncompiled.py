@@ -9,7 +9,6 @@ import contextlib
 import ctypes
 import functools
 import gc
-import inspect
 import io
 import json
 import math
@@ -20,7 +19,6 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 MOST_PLACES = 1000  # whose stencils are kept
 
@@ -153,56 +151,13 @@ def quick_records() -> None:
     np.record.__getattribute__, np.record.__setattr__ = field, put_field
 
 
-def quick_functions(algebra: ModuleType, kind: type) -> None:
-    """Put plain functions for the point functions (`kind`) into all modules: 7 % of a scene.
-
-    They select by classes as point functions do. Those that run on all numbers are made of the
-    point functions themselves.
-    """
-    caches: list[dict] = []
-    point_functions: dict[Callable, Any] = {}
-    register, on_numbers = kind.on, algebra.on_numbers
-
-    def on(one, *classes: type) -> Callable:
-        for cache in caches:
-            cache.clear()
-        return register(one, *classes)
-
-    def plain(one) -> Callable:
-        chosen: dict = {}
-        caches.append(chosen)
-
-        def find(*arguments):
-            classes = tuple([a.__class__ for a in arguments[: one.tags]])
-            found = one.find(classes) or one  # which raises the error
-            chosen[classes if one.tags > 1 else classes[0]] = found
-            return found
-
-        names = [*inspect.signature(one.__wrapped__).parameters]
-        words, key = ", ".join(names), ", ".join(f"{name}.__class__" for name in names[: one.tags])
-        scope = {"chosen": chosen, "find": find}
-        exec(
-            f"def call({words}):\n"
-            f"    try:\n        found = chosen[{key}]\n"
-            f"    except KeyError:\n        found = find({words})\n"
-            f"    return found({words})\n",
-            scope,
-        )
-        call = functools.update_wrapper(scope["call"], one)
-        call.on, call.find, call.defined = one.on, one.find, one.defined
-        point_functions[call] = one
-        return call
-
-    kind.on = on
-    algebra.on_numbers = lambda function: on_numbers(point_functions.get(function, function))
-    made: dict = {}
-    for name, module in list(sys.modules.items()):
-        for word, thing in list(vars(module).items()) if name.startswith("karamelo_py.") else ():
-            if thing is on_numbers:
-                setattr(module, word, algebra.on_numbers)
-            if isinstance(thing, kind):
-                made[thing] = made[thing] if thing in made else plain(thing)
-                setattr(module, word, made[thing])
+def chosen_at_once(function, *arguments):
+    """Call a point function as plain Python, as `PointFunction` does, but faster for one class."""
+    if function.tags == 1:
+        chosen = function._nearest.get((arguments[0].__class__,))
+        if chosen is not None:
+            return chosen(*arguments)
+    return function._plain(*arguments)
 
 
 def quick_totals(totals: ModuleType) -> None:
@@ -269,7 +224,6 @@ def quick_slopes(slopes: ModuleType) -> None:
 def quicken() -> None:
     """Import the program, and let it interpret scenes faster, with the same numbers."""
     from karamelo_py.compiler import slopes
-    from karamelo_py.compiler.trace import algebra
     from karamelo_py.compiler.trace.functions import PointFunction
     from karamelo_py.kernels import totals
     from karamelo_py.points.basis import product
@@ -283,7 +237,7 @@ def quicken() -> None:
     from karamelo_py.app import cli
     from karamelo_py.run import loop  # noqa: F401
 
-    quick_functions(algebra, PointFunction)
+    PointFunction.__call__ = chosen_at_once
     quick_records()
     cli._parser = functools.cache(cli._parser)  # a third of what a tiny scene takes
     gc.freeze()  # scenes make many objects, among which alone cycles have to be looked for
