@@ -684,14 +684,11 @@ def _forget_changes(bodies, place):
 
 @noinline
 def _begin_to_count(bodies, control, place):
-    contact, nodes = bodies.contact, bodies.nodes
-    last, impulse = 0, field(nodes.fields, ContactImpulse)
+    contact, last = bodies.contact, 0
     for i in range(place.count):
         n = _node(contact, place.node, i)
         for j in range(i + 1, place.count):
             last = max(last, abs(contact.touched[n, contact.meeting[j]]))
-        for k in range(len(bodies.kin.Unknown._fields)):
-            impulse[n, k] = 0
     if last > 0 and last == int(control.values[TIMESTEP]):
         _count_strain(bodies, control, place)
     else:
@@ -707,6 +704,15 @@ def touch_node(bodies, grids, control, n):
         _begin_to_count(bodies, control, Together(node, count))
         h, step = record(grids, n // contact.stride).h, int(control.values[TIMESTEP]) + 1
         _touch_place(bodies, control, count, Where(node, x, h, control.values[DT], step))
+
+
+@noinline
+def _forget_contact(kin, nodes, n):
+    impulse, change = field(nodes.fields, ContactImpulse), field(nodes.fields, StrainingChange)
+    for k in range(len(kin.Unknown._fields)):
+        impulse[n, k] = 0
+    for k in range(0 if nodes.sums[n, MASS] > 0 else kin.dimension):
+        change[n, k] = 0
 
 
 @noinline
@@ -751,6 +757,7 @@ def _bodies(s):
 
 SeparateFields.rows = (  # type: ignore[attr-defined]
     Once(_begin_forces),
+    each_node(lambda s, n: _forget_contact(s.kin, s.nodes, n)),
     each_node(lambda s, n: _keep_rigid(s.contact, s.kin, s.nodes, n)),
     each_node(lambda s, n: touch_node(_bodies(s), s.grids, s.control, n)),
     Once(_publish_forces),
