@@ -512,8 +512,8 @@ def test_an_undrained_column_fails_at_its_stability_number(run_script):
         words = "-var", "a", "2", "-var", "N", "8", "-var", "T", "0.3", "-var", "S", S
         log = run_script(INPUTS / "in.wet_column", *words).log
         moved[S] = log["runout"][-1] - log["runout"][0]
-    assert moved["3.6"] < 0.03  # elastic
-    assert moved["4.4"] > 0.08
+    assert moved["3.6"] < 0.05  # elastic
+    assert moved["4.4"] > 0.15
 
 
 @pytest.mark.full
@@ -533,7 +533,7 @@ def test_an_undrained_column_runs_out_as_without_water(run_script):
     twin = re.sub(r"^(pore_water|fix\(water).*", "", twin, flags=re.M)
     runout = [last(run_script(one, "-var", "N", "20"))["runout"] for one in (script, twin)]
     assert runout[1] == pytest.approx(1.42, abs=0.02)
-    assert runout[0] / runout[1] == pytest.approx(1, abs=0.04)
+    assert runout[0] / runout[1] == pytest.approx(1, abs=0.05)
 
 
 @pytest.mark.full
@@ -571,7 +571,8 @@ def test_a_drained_column_runs_out_as_dry_sand_does(run_script):
         log_modify(custom, step, runout)
         run_time(0.6)
     """
-    assert abs(last(run_script(script))["runout"] / 1.2 - 1) < 0.1
+    # The losses of FLIP take 5 to 15 % (docs/howto/soil-and-water.md).
+    assert abs(last(run_script(script))["runout"] / 1.2 - 1) < 0.15
 
 
 STEP = """

@@ -9,8 +9,9 @@ nodes that are not open.
 
 The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
 linear basis at the cell centre (one pressure rate per cell), otherwise at the points. With splines,
-volume strains e in the null space of the grid would grow. Therefore R (1 - S)^2 e is subtracted
-from e in each step, in soil and pores, where R = 1/20 and S maps e to the nodes and back.
+volume strains e and pressures p in the null space of the grid would grow. Therefore in each step R
+(1 - S)^2 e is subtracted from e, in soil and pores, and R (1 - S)^2 p from p, in pores only, where
+R = 1/20 and S maps to the nodes and back.
 
 Velocities of nodes are means by the mass of soil and water, relative velocities of the water by its
 mass. Hence undrained points have no flux, also if their water contents differ, and the momentum of
@@ -81,9 +82,9 @@ class RelativeVelocity(Field):
 
 
 class VolumeStrain(Field):
-    """Volume strain, and one step earlier its part that nodes do not see (splines)."""
+    """Volume strain, and one step earlier unseen strain and pressure (splines)."""
 
-    shape = pair
+    shape = numbers(3, 0)
     needed = RelativeVelocity.needed
 
 
@@ -107,11 +108,11 @@ class WaterSums(SummedField):
     """Nodal sums of water and pores.
 
     Mass, relative momentum and force of the water, as in `Nodes.sums`, with a column for the drag
-    and, in 2D, for volume times unseen strain; volume, volume of pores, volume times pressure,
-    volume times strain; force of the pressure (d,) and outward area (d,).
+    and, in 2D, for volume times unseen strain and pressure; volume, volume of pores, volume times
+    pressure, volume times strain; force of the pressure (d,) and outward area (d,).
     """
 
-    shape = staticmethod(lambda kin: of_pressure(kin) + 2 * kin.dimension + (kin.dimension != 2))
+    shape = staticmethod(lambda kin: max(of_unseen(kin) + 2, of_pressure(kin) + 2 * kin.dimension))
 
 
 class WaterAgain(FieldMappedAgain):
@@ -131,13 +132,14 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux (d,) per unit area, an outflow, two strains, another outflow.
+    """Mass flux (d,) per unit area, an outflow, four means, another outflow.
 
     The first outflow (per unit volume) is computed for closed nodes and does not leave the points;
-    the last (a mass flow rate) leaves through open nodes. The strains are means of `VolumeStrain`.
+    the last (a mass flow rate) leaves through open nodes. The means are of strain, unseen
+    strain, pressure and unseen pressure.
     """
 
-    shape = numbers(4, 1)
+    shape = numbers(6, 1)
 
 
 class GivenPressure(StepField):
@@ -208,7 +210,7 @@ class WetPoint(NamedTuple):
     w: tuple  # velocity of the water relative to the soil
     drag: arrays.Number  # force per unit relative velocity
     volumes: tuple  # of point and pores; products with pressure and (splines) strain
-    unseen: tuple  # product of volume and unseen strain (splines)
+    unseen: tuple  # products of volume and unseen strain and pressure (splines)
     p: arrays.Number
     area: tuple  # volume times the unit tensor, in the frame of the gradients
 
@@ -225,7 +227,7 @@ def pores(pt):
     kin, J = pt.kin, laws.jacobian(law, pt.kin, state)
     V0 = eq.mass(pt) * laws.specific_volume(law)
     V, n, p = V0 * J, porosity(law, kin, state), pore_pressure(law, kin, state)
-    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V, V))
+    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V, V, V))
     area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
     drag = V * drag_at(law.permeability, law, n)
     strain, unseen = _times(V, strains[:1]), _times(V, strains[1:])
@@ -283,7 +285,7 @@ PRESSURE = eq.NodeColumns(
     WaterSums, of_pressure, lambda kin: 2 * kin.dimension,
     lambda kin: of_pressure(kin) + 2 * kin.dimension,
 )  # fmt: skip
-UNSEEN = eq.NodeColumns(WaterSums, of_unseen, scalar, lambda kin: of_unseen(kin) + 1)
+UNSEEN = eq.NodeColumns(WaterSums, of_unseen, lambda kin: 2, lambda kin: of_unseen(kin) + 2)
 OF_PORES = eq.of_point(pores=pores)
 
 
@@ -337,7 +339,7 @@ class PoreVolumes(eq.ExtensiveQuantity):
 
 
 class UnseenStrain(eq.ExtensiveQuantity):
-    says = "unseen strain to grid"
+    says = "unseen strain and pressure to grid"
     takes = OF_PORES
     gives = (
         eq.Sum(
@@ -580,7 +582,7 @@ def _make_flux(task, kin, nodes, n, dt):
     flux, d = field(nodes.fields, Flux), kin.dimension
     across = real(0, dt)
     if not is_wet_node(nodes, kin, n):
-        put_at(flux, n, 0, (0,) * (d + 4))
+        put_at(flux, n, 0, (0,) * (d + 6))
         if field(nodes.fields, GivenFlux) is not None:
             put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
         return
@@ -605,7 +607,8 @@ def _make_flux(task, kin, nodes, n, dt):
     supply = _mass_given(nodes, kin, n)
     stays = across + supply if closed else supply
     leaves = across + supply if drained else real(0, dt)
-    means = water[n, of_V + 3] * per_volume, water[n, of_unseen(kin)] * per_volume
+    columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
+    means = [water[n, column] * per_volume for column in columns]
     put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
     # With the mean relative velocity in the step, the remaining work is the work of weight
     # minus the work of drag, and the work of pressure on water that enters or leaves.
@@ -698,7 +701,7 @@ class Seep(eq.Task):
         spread = none if w.frame.moves else tensor
         if isinstance(w.basis, Linear):
             return spread, none, (), tensor
-        return spread, none, (none, none), ()  # `Strain` gathers the gradient
+        return spread, none, (none,) * 4, ()  # `Strain` gathers the gradient
 
     def gathered(task, node, total):
         if not isinstance(node.w.laws, Saturated):
@@ -729,13 +732,15 @@ class Seep(eq.Task):
         grown = det(I + spatial_increment(frame, kin, increment(pt.dt, gradient), f))
         pores = old.pores * grown + (1 - law.n) * (grown - 1)
         if len(means):
-            mean, again = means
-            strain, unseen = pt.load(VolumeStrain, (mean, mean))
+            mean, again, p, p_again = means
+            strain, unseen, p_unseen = pt.load(VolumeStrain, (mean, mean, mean))
             change = real(SMOOTHING, mean) * (again - unseen)
             pores = pores + change * (pores + (1 - law.n))
+            pores = pores * (1 + real(SMOOTHING, mean) / law.K * (p_unseen - p_again))
             store(pt.of(VolumeCorrection), pt.p, (change,))
             later = strain + (1 + strain) * (grown * (1 + change) - 1)
-            store(pt.of(VolumeStrain), pt.p, (later, strain - mean))
+            p_unseen = pore_pressure(law, kin, old) - p
+            store(pt.of(VolumeStrain), pt.p, (later, strain - mean, p_unseen))
         new = old._replace(content=content, pores=pores)
         store_from(pt.w.points.state, pt.p, count_in(old.skeleton), new)
         v = pt.v

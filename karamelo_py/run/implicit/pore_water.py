@@ -259,7 +259,7 @@ class Seepage:
         nodes = self.equations.nodes
         left = self.density * np.where(self.open, -self.rest, self.seeps) / self.dt
         flux = field(self.equations.s.nodes.fields, Flux)
-        flux[nodes, self.d + 3] = left
+        flux[nodes, self.d + 5] = left
         for fix in fixes:
             if Flux in fix.node_fields:
                 leaves = float(left[np.isin(nodes, fix.nodes)].sum())
