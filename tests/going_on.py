@@ -65,7 +65,8 @@ def goes_on(run, script: str, *, files: int = 1) -> Path:
 
 
 RUBBING = bars(
-    0.0, "fix(rub, contact/friction, a, b, 0.3)", "log_modify(custom, step, rub_x, va_x)",
+    0.0, "fix(rub, contact/friction, a, b, 0.3)", "compute(lost, contact_loss, all)",
+    "log_modify(custom, step, rub_x, va_x, lost)",
     "fix(slide, initial_velocity_particles, b, -0.1, 0.3)", "run(4)", d=2, scheme="usavg", v=2,
 )  # fmt: skip
 TOOLS = (
@@ -316,6 +317,9 @@ SERIAL = {  # scenes that one process takes
     "clay": block(2, *SWAYS, size=SIZE).replace(
         "rubber, linear, 2, 100, 0.3", "rubber, cam-clay, 2, 40, 1, 0.1, 0.02, 1"
     ),
+    "pressure solved for": block(2, *WATER, scheme="semi-implicit", size=SIZE)
+    .replace("\nsolid(", WET, 1)
+    .replace("ulmpm", "tlmpm"),
     "rigid body that moves freely": block(2, *FREE, size=SIZE),
     "rigid bodies that meet": block(2, *LINKED, size=SIZE),
     "points that go": block(2, "fix(e, erosion, all, x > 0.55, every=2)", *SWAYS, size=SIZE),

@@ -237,7 +237,7 @@ def test_threads_that_are_not_there_are_told_of_the_option(run_interpreted):
         ("sweep in.abxyaa -var n=1", "expected: the name of a script\n"),
         ("in.a -treads 1", "hint: did you mean --threads?"),
         ("in.a -speed 1", "hint: -var speed 1 sets a variable"),
-        ("advise in.a -accuracy e -targt 1", "hint: -targt: did you mean '-target'?"),
+        ("advise in.a -accuracy e -targt 1", "hint: did you mean -target?"),
         ("view p.dump --slice 1", "hint: did you mean --only?"),
         ("help hepl", "hint: did you mean 'help'?"),
         ("view q.*.txt", "no file matches q.*.txt"),

@@ -183,13 +183,13 @@ def test_values_are_published_in_one_array_that_stays():
     array = values.array
     assert values.names() == ["time", "timestep", "dt"]
     values.publish_vector("F")
-    assert [values.slot(f"F_{s}") for s in "xyzs"] == [3, 4, 5, 6]
+    assert [values.slot(f"F_{s}") for s in "xyzs"] == [4, 5, 6, 7]  # slot 3 has no name
     assert values.names()[3:] == ["F_x", "F_y", "F_z", "F_s", "F"]
-    assert values.publish("F_s", 2.0) == 6
-    assert array[6] == values.get("F_s") == 2.0
+    assert values.publish("F_s", 2.0) == 7
+    assert array[7] == values.get("F_s") == 2.0
     values.publish_vector("F", ("x", "s"))
     assert values.names()[3:] == ["F_x", "F_s"]
-    assert (values.slot("F_x"), values.slot("F_s")) == (3, 6)
+    assert (values.slot("F_x"), values.slot("F_s")) == (4, 7)
     with pytest.raises(ScriptError, match=str(CAPACITY)):
         for k in range(CAPACITY):
             values.publish(f"v{k}")

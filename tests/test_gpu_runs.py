@@ -205,14 +205,15 @@ fix(air, convection_particles, a, 2, 293)
 """
 
 
-EXPLICIT = [
+ON_GPUS = [
     scheme
     for scheme in registry.names("scheme")
-    if not registry.find("scheme", scheme).traits.implicit
+    if not (traits := registry.find("scheme", scheme).traits).restrictions
+    or "gpu" not in traits.restrictions.without
 ]
 
 
-@pytest.mark.parametrize("scheme", EXPLICIT)
+@pytest.mark.parametrize("scheme", ON_GPUS)
 @pytest.mark.parametrize("heat", few([False, True], True))
 def test_all_published_values_are_those_of_the_processor(run_interpreted, scheme, heat):
     more = ", hot_s, laser_s, air_s" if heat else ""

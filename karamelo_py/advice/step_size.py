@@ -14,7 +14,6 @@ from karamelo_py.run.stable_step import (
     sparse,
 )
 from karamelo_py.scene.modify import Fix
-from karamelo_py.schemes.musl import MUSL
 from karamelo_py.schemes.semi_implicit import SemiImplicit
 from karamelo_py.schemes.traits import DEFAULT_SHARE
 
@@ -121,12 +120,14 @@ def words_of_share(simulation: Simulation) -> str:
 
 
 def words_of_solution(simulation: Simulation, duration: float) -> str:
-    """Return the steps of semi-implicit for a scene of musl that it supports, or ""."""
+    """Return the steps of semi-implicit for an explicit scene that it supports, or ""."""
     hub, method = simulation.hub, simulation.hub.update.method
     fits = method.basis_name == "linear" and not method.frame.moves and is_wet(hub)
+    traits = hub.update.scheme.traits
+    explicit = not traits.implicit and not traits.solves_pressure
     alone = hub.settings.engine == "processor" and hub.settings.comm.size == 1
     refused = any(map(_is_refused, hub.fixes.values())) or any(unsupported(hub, ""))
-    if not (fits and alone and isinstance(hub.update.scheme, MUSL)) or refused:
+    if not (fits and alone and explicit) or refused:
         return ""
     courant = DEFAULT_SHARE * courant_of(hub, SemiImplicit)[sparse(hub)]
     dt = courant * float(simulation.control.step[0].spacing) / fastest_wave(simulation)
