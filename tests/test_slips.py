@@ -42,7 +42,7 @@ OF = "material(rubber, eos-strength, e, s"
         ([], "material(rubber, linear, 7800, 2.1e11, -0.6)", "Poisson's ratio is -0.6",
          "from 0 to 0.5, unless"),
         ([], "material(rubber, linear, 2.1e11, 7800, 0.3)",
-         "waves of it move at 0.000224, since its density 2.1e+11", "before the modulus"),
+         "its waves move at 0.000224, since its density 2.1e+11", "before the modulus"),
         ([], "eos(e, linear, 8000, 160e9)\nstrength(s, plastic, 80e9, 4e8, 5e12)",
          "flow stress at a plastic strain of 1 is 5e+12, above its modulus", "in the units of"),
         ([], "eos(e, linear, 8000, 160e9)\n"

@@ -161,7 +161,7 @@ CHOICES = (
     Choice(
         lambda s: s.loaded_slowly and s.alone and s.d == 1 and s.hub.domain.kin.hoops,
         ("method(tlmpm, FLIP, Bernstein-quadratic, 1)",),
-        "a wall of an elastic tube or shell that is loaded slowly, by its radius alone",
+        "elastic tube or shell in one dimension, loaded slowly",
         "hoop stresses vary within cells",
         ("in.lame", "in.shell"),
     ),
@@ -204,7 +204,7 @@ CHOICES = (
     Choice(
         lambda s: s.led and s.grid == "ulmpm/contacts",
         ("method(ulmpm/contacts, APIC, quadratic-spline)",),
-        "elastic bodies that a moving rigid one presses",
+        "elastic bodies pressed by a moving rigid body",
         "splines follow the surface more closely, and APIC damps vibrations",
         ("in.hertz",),
     ),

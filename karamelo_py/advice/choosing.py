@@ -173,7 +173,7 @@ class Scouted(SceneFacts):
     def blocks(self) -> bool:
         """Return whether points fill the bounding boxes of all bodies.
 
-        Nodes held at curved or leaning faces act a cell deep, with splines deeper still.
+        Held nodes act up to a cell inside curved or inclined faces, with splines further.
         """
         pairs = ((solid.x0, 2 * solid.half_size) for solid in self.soft)
         boxes = ((size, np.ptp(x, axis=0) + size.max(axis=0)) for x, size in pairs)

@@ -21,7 +21,7 @@ DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warning
 ABSURD = 10.0  # path in one step, in cells, above which a smaller step would not help
 LOOSE = 1.5  # largest point spacing of an unstrained solid, in cells
 LEFT = 0.02  # tolerated stress across a thin body / largest stress
-APART = "no other point of it within a cell"
+APART = "no other point of this solid within a cell"
 
 
 def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") -> Trouble:

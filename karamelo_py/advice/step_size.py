@@ -120,7 +120,7 @@ def words_of_share(simulation: Simulation) -> str:
 
 
 def words_of_solution(simulation: Simulation, duration: float) -> str:
-    """Return the steps of semi-implicit for an explicit scene that it supports, or ""."""
+    """Return how many steps semi-implicit would take, or "" if it does not support the scene."""
     hub, method = simulation.hub, simulation.hub.update.method
     fits = method.basis_name == "linear" and not method.frame.moves and is_wet(hub)
     traits = hub.update.scheme.traits

@@ -220,8 +220,8 @@ def region(
 
     Notes
     -----
-    A region includes its surface. With ``exterior`` as last argument, block, cylinder and sphere
-    include everything outside the shape.
+    A region includes its surface. With ``exterior`` as the last argument, block, cylinder and
+    sphere include everything outside the shape.
 
     See Also
     --------

@@ -100,7 +100,7 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    # (3,) int64: numbers of occupied tiles, of parts of the points, of parts for other processes
+    # (3,) int64: how many occupied tiles, parts of the points, and parts for other processes
     count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits

@@ -13,13 +13,14 @@ positions of each body's points (`karamelo_py.points.basis.surface`), along the 
 grid axes, as normals tilt where faces end. Any positive gap means that convex bodies are apart.
 
 In liquids and granular materials some points lie closer to a wall than their mean suggests, so each
-apparent gap would let them sink in. Such bodies may leave a wall, but not approach it for 100 steps
-after a contact; liquids close 1 % of a gap per step, whatever the step, where the points do not
-fill the cells. (In full cells, water would sink into thin walls by 48 % of a cell in 16 000 steps,
-not 16 %, with APIC and a linear basis; with FLIP 1 it sinks by up to 46 %. Faster, it would sink
-half a cell into an inclined thin wall, measured over 20 000 steps; slower, it would stay away from
-a floating box, with 8 % less draught. The force on a Hertzian disk would be 4 % too small.) Only
-faces towards the other body count, so walls may be one cell thick.
+apparent gap would let them sink in. For 100 steps after a contact such bodies may leave a wall, but
+not approach it. Liquids are an exception: where the points do not fill the cells, they close 1 % of
+a gap per step, whatever the step size. (If water closed gaps in full cells, too, with APIC and a
+linear basis it would sink into thin walls by 48 % of a cell in 16 000 steps, not 16 %; with FLIP 1
+it sinks by up to 46 %. At higher rates it sinks half a cell into an inclined thin wall in 20 000
+steps; at lower rates a gap remains around a floating box. With such a rule for solids, a Hertzian
+disk has 4 % too little force.) Only faces towards the other body count, so walls may be one cell
+thick.
 """
 
 from math import sqrt
@@ -244,8 +245,8 @@ def _normal(bodies, n, other):
 
     The sums of m grad N of neighbouring nodes are averaged with weights 1/4, 1/2, 1/4 along each
     axis. This is accurate to 2 degrees on a plane face. The sum of a single node has errors of tens
-    of degrees while inclined rows of points pass it. Nodes whose sum points along `other`, the
-    other body's normal, are omitted, so that only one face of a thin wall counts.
+    of degrees while inclined rows of points pass it. A node is omitted if its sum has the direction
+    of `other`, the other body's normal: only one face of a thin wall counts.
 
     The length of the normal is its weight relative to the other body's: it increases with surface
     and decreases with scatter. (With the larger sum, as in Lemiale, Nairn & Hurmane 2010, the
@@ -456,7 +457,7 @@ def closing_part(bodies, pair, x, h):
 
 @noinline
 def _excess_of(bodies, pair, where):
-    """Return how much faster a pair approaches than closes the gap in this step, or 0."""
+    """Return by how much the approach velocity exceeds (gap that may close) / dt, or 0."""
     contact, size = bodies.contact, sqrt(dot(pair.outward, pair.outward))
     if not size > 0:
         return 0.0
@@ -661,7 +662,7 @@ def _count_impulses(bodies, control, place, now):
 
 @noinline
 def _count_strain(bodies, control, place):
-    """Count half of the work of stress that contact takes by its change of the straining velocity.
+    """Count half of the stress work that is lost as contact changes the straining velocity.
 
     Stress does work with the mean of the straining velocities before and after the forces.
     """

@@ -153,7 +153,7 @@ def _list_point(body, surface, s, block, p):
 
 @noinline
 def _recall(grip, control, state, contact):
-    """Set what friction remembers of a point that touched in the last step."""
+    """Set the friction state of a point that touched in the last step."""
     contact.usual = contact.spare = 0.0
     for c in range(3):
         contact.hold[c] = 0.0
@@ -173,7 +173,7 @@ def _recall(grip, control, state, contact):
 
 @noinline
 def _retain(grip, control, contact):
-    """Update what friction remembers of a point, as `points.bodies.rub` does."""
+    """Update the friction state of a point, as `points.bodies.rub` does."""
     if contact.number >= len(grip) or not contact.gap < 0:
         return
     memory, kick = grip[contact.number], control.step[0].kick

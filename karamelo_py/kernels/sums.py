@@ -24,7 +24,7 @@ def columns_of(quantities: tuple, kin: NamedTuple) -> list[tuple[Any, int, int]]
 
 
 def columns_in_turn(quantities: tuple, kin: Tag, present: list) -> list[tuple[Any, int, bool]]:
-    """List columns of quantities in arrays that are present; those that add come last."""
+    """List the columns of quantities in present arrays; quantities that add come last."""
     turns = sorted(quantities, key=adds)
     sums = [(one.into, adds(quantity)) for quantity in turns for one in type(quantity).gives]
     return [

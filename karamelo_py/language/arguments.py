@@ -118,7 +118,7 @@ class Argument:
                 message = f"{name} = {argument.text} is not a number"
                 if name in seeds:
                     message = f"{name} is a variable of the formula"
-                raise ScriptError(message, mark=argument.mark, expected="a number by another name")
+                raise ScriptError(message, mark=argument.mark, expected="another name for it")
         script.variables = interpreter.variables | numbers
         script.variables |= {name: Expression.seed(name) for name in seeds}
         try:

@@ -71,7 +71,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
 
 def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
-    """Merge small pieces into the nearest larger ones of adjacent boxes; they become 0."""
+    """Merge small pieces into the nearest larger ones of adjacent boxes, and set them to 0."""
     small = np.flatnonzero(pieces.fraction < LEAST)
     middle = pieces.middle[small]
     d = middle.shape[1]
@@ -183,7 +183,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
 
 
 def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return fraction (n,) and centroid (d, n) of a unit cube where mean + slopes (x - 1/2) > 0."""
+    """Return volume (n,) and centroid (d, n) of mean + slopes (x - 1/2) > 0 in a unit cube."""
     m = np.abs(slopes)
     steep = m > SLOPE * np.maximum(m.max(axis=0), np.abs(mean))
     fraction, middle = (mean > 0).astype(float), np.full(slopes.shape, 0.5)

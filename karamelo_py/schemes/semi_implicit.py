@@ -18,12 +18,12 @@ class SemiImplicit(NamedTuple):
     The soil is explicit, as in usl; drag and pressure of the water are implicit (Kularathna et al.
     2021). The pressure, one value per cell, is found by conjugate gradients. The stable step is 0.9
     h/c with the wave speed c of the dry soil, or 0.55 h/c with one point per cell: 20 times the
-    step of musl in water-saturated soil of 10 MPa. If a solid has no water, or water with a K/n
-    below the modulus of the soil, it equals the step of usl.
+    step of musl in water-saturated soil of 10 MPa. The limit of usl applies if a solid has no
+    water, or water with a K/n below the modulus of the soil.
 
-    Waves of the water are damped. Consolidation, seepage, and loads that take longer than a wave of
-    the dry soil needs through the ground have the same results as with musl. For consolidation over
-    days or years, use quasi-static.
+    Waves in the water are damped. Results are the same as with musl for consolidation, seepage, and
+    loads that take longer than a wave in the dry soil takes to cross the ground. For consolidation
+    over days or years, use quasi-static.
 
     Example
     -------
@@ -32,9 +32,9 @@ class SemiImplicit(NamedTuple):
     Notes
     -----
     It needs a material with pore_water, method tlmpm, FLIP or PIC and linear. Nodes of fix
-    seepage_face remain open or closed for a step, by the pressure at its beginning. Bounds and
-    friction of velocity_nodes, local_damping, absorbing, ground_motion, velocity_particles on soil,
-    ``--ranks`` and ``--gpu`` are not supported.
+    seepage_face remain open or closed for a step, by the pressure at its beginning. Not supported:
+    bounds and friction in velocity_nodes; fixes local_damping, absorbing and ground_motion;
+    velocity_particles on soil; ``--ranks`` and ``--gpu``.
 
     See Also
     --------

@@ -20,7 +20,7 @@ UNIFORM = 1 << 16
 CONSTANT, GLOBAL, POINT = 0, 1, 2
 # Expand the number that is `operand` below the top of the stack to a row.
 SPREAD = 3
-# Pop the top into the stored row `operand`; push this row.
+# Pop the top of the stack into the stored row `operand`; push the stored row `operand`.
 KEEP, KEPT = 150, 151
 
 

@@ -249,7 +249,7 @@ def _side_by_side(at: _Stop) -> Mistake:
         end = start + number.end()
         expected = "a number has one point at most"
         if "." in (number[1] or ""):
-            expected = "a whole number as the exponent; x^y is any power"
+            expected = "a whole number after e; for other powers write x^y"
         return Mistake(f"'{code[start:end]}' is not a number", start, end, expected)
     if touching and at.kind == "NAME":
         if re.fullmatch(r"[eEdD]\d*", here):

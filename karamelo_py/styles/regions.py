@@ -76,7 +76,7 @@ class BlockRegion(Primitive):
     bounds
         In 1D ``xlo, xhi``; in 2D ``xlo, xhi, ylo, yhi``; in 3D ``xlo, xhi, ylo, yhi, zlo, zhi``.
         Each is a number, or ``INF`` (or ``EDGE``) for the edge of the domain. Equal numbers make a
-        plane, a line or a point, for groups of nodes. With ``exterior`` as last argument:
+        plane, a line or a point, for groups of nodes. With ``exterior`` as the last argument:
         everything outside.
 
     Example
@@ -114,7 +114,7 @@ class Cylinder(Primitive):
     shape
         In 2D ``xc, yc, R``: centre and radius. In 3D ``axis, c1, c2, R, lo, hi``: the word x, y or
         z, the centre in the other directions (in the order x, y, z), the radius, and the ends,
-        which may be ``INF`` (or ``EDGE``). With ``exterior`` as last argument: everything outside.
+        which may be ``INF`` (or ``EDGE``). ``exterior`` as the last argument: everything outside.
 
     Example
     -------
@@ -165,7 +165,7 @@ class Sphere(Primitive):
     ----------
     shape
         Centre and radius: in 1D ``x, R``; in 2D ``x, y, R``; in 3D ``x, y, z, R``. With
-        ``exterior`` as last argument: everything outside.
+        ``exterior`` as the last argument: everything outside.
 
     Example
     -------
@@ -200,8 +200,8 @@ class Plane(Primitive):
     ----------
     plane
         A position on the plane, and a normal of any length that points into the region: in 2D ``x,
-        y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. With ``exterior`` as last argument, the other
-        side is selected.
+        y, nx, ny``; in 3D ``x, y, z, nx, ny, nz``. With ``exterior`` as the last argument, the
+        other side is selected.
 
     Example
     -------

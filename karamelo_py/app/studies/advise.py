@@ -480,9 +480,7 @@ def sureness(adviser: Adviser, best: Candidate) -> str:
     if high > adviser.target:
         near = adviser.target**2 < best.error * high
         word = "uncertain" if near else "likely"
-    return (
-        f"{word}: expected {numbers}; by its orders the error lies between {low:.3g} and {high:.3g}"
-    )
+    return f"{word}: expected {numbers}; its orders give an error from {low:.3g} to {high:.3g}"
 
 
 def _nothing(adviser: Adviser) -> int:

@@ -94,10 +94,10 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 
 
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
-    """Return magnitudes of errors without reductions by chance.
+    """Return error magnitudes, raised where they are small by chance.
 
-    Each is at least the error of every finer run, and at least (change from the previous run) /
-    (r^p - 1), with the refinement r and the order p = `highest` + 0.5.
+    Each is at least as large as the error of every finer run, and at least (change from the
+    previous run) / (r^p - 1), with the refinement r and the order p = `highest` + 0.5.
     """
     values = np.asarray(values, float)
     size = np.abs(values)

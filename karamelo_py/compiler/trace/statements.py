@@ -148,7 +148,7 @@ def _bound(
 
 
 def _shape(thing: Any, *within: Callable) -> Any:
-    """Replace values by types; `within` are functions whose closures are being read."""
+    """Replace values by their types. `within`: the functions whose closures are being read."""
     if isinstance(thing, values.Value | values.HeldValue):
         return thing._kind._code
     if isinstance(thing, dict):

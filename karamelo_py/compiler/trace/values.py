@@ -17,7 +17,7 @@ from karamelo_py.compiler.trace.session import session
 
 
 class Untraceable(BaseException):
-    """A function cannot be compiled; functions must not catch this."""
+    """A function cannot be compiled. Traced functions must not catch this exception."""
 
 
 def words(kind: types.Type) -> str:

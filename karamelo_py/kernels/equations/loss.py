@@ -29,7 +29,7 @@ from karamelo_py.points.transfers.xpic import Reflected, Series
 
 OnePoint = namedtuple("OnePoint", "mass v moment")  # for `transfers.nodal_momentum`
 # A point with more than this fraction (per dimension) of the mass of its nodes loses its moment.
-# With one point per cell, at nodes, it is 0.594 with quadratic splines, less with other bases.
+# With one point per cell, at a node, the fraction is 0.594 with quadratic splines, else less.
 ALONE = 0.6
 
 

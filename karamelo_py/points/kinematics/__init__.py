@@ -552,8 +552,8 @@ def stretch(f):
 
     2D: U = (C + |det F| I) / sqrt(tr C + 2 |det F|) (Hoger & Carlson 1984, J. Elasticity 14). 3D: U
     = (C + i2 I)^-1 (i1 C + i3 I) with the invariants of U, i1^2 = tr C + 2 i2 and i2^2 = c2 + 2 i1
-    i3. Newton's method for i1 starts from the upper bound sqrt(3 tr C), from which i1 differs in
-    second order of the strains.
+    i3. Newton's method for i1 starts from the upper bound sqrt(3 tr C), which exceeds i1 by a term
+    of second order in the strains.
     """
     if f.kin.dimension == 3:
         return stretch_in_space(f)

@@ -73,8 +73,8 @@ class JohnsonCookDamage(NamedTuple):
     Notes
     -----
     The failure strain is (d1 + d2 exp(d3 t)) (1 + d4 ln(rate/epsdot0)) (1 + d5 T*) with T* = (T -
-    Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate, the
-    third without a temperature. w (dump column damage_init) is the sum of plastic strain
+    Tr) / (Tm - Tr) (Johnson & Cook 1985). The second factor is 1 up to the reference rate. The
+    third is 1 without a temperature. w (dump column damage_init) is the sum of plastic strain
     increments / failure strain. Beyond w = 1, D (dump column damage) is 10 (w - 1), up to 1. There
     is no failure for t below -3. d1 may be negative; failure strains are at least 1e-6.
 

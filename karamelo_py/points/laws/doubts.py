@@ -42,7 +42,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)
     if 0 < squared < SLOW**2 < density**2 * SLOW**2:
         yield (
-            f"waves of it move at {sqrt(squared):.3g}, since its density {density:.3g} is "
+            f"its waves move at {sqrt(squared):.3g}, since its density {density:.3g} is "
             f"{1 / squared:.2g} times its modulus {squared * density:.3g}",
             "the density comes before the modulus",
         )

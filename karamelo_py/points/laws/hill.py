@@ -185,8 +185,8 @@ class Hill(NamedTuple):
         R-values (R0, R45, R90): strain across / strain through a sheet that is pulled at 0, 45 and
         90 degrees to axis 1, the rolling direction; axis 3 is through the sheet.
     yields
-        Instead of R: yield stresses (r11, r22, r33, r12, r13, r23) divided by the reference stress,
-        in shear by the reference stress / sqrt(3). All are 1 for an isotropic body.
+        Instead of R: yield stresses (r11, r22, r33) / reference stress and shear yield stresses
+        (r12, r13, r23) / (reference stress / sqrt(3)). All are 1 for an isotropic body.
     axes
         As for orthotropic; the elastic material also rotates with them.
 

@@ -67,7 +67,7 @@ class HyperelasticFormula(OfInvariants, Fields):
         Heat capacity per unit mass, conductivity and coefficient of linear expansion of a material
         with a temperature, as for neo-hookean.
     T
-        Temperature for checking the formula; also the initial one, unless the solid sets one.
+        Initial temperature, unless the solid sets one; also used for checking the formula.
 
     Example
     -------

@@ -41,7 +41,7 @@ class Mullins(NamedTuple):
     m
         Energy per unit volume that scales the softening.
     beta
-        Growth of that scale with the largest energy so far.
+        Increase of m per unit of the largest energy so far.
 
     Example
     -------

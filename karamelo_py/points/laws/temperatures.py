@@ -59,7 +59,7 @@ class PlasticWork(NamedTuple):
     alpha
         Pressure per kelvin: 3 K times the linear expansion coefficient, with the bulk modulus K.
     T0
-        Temperature without thermal pressure, and initial one unless the solid sets it.
+        Temperature without thermal pressure; the initial temperature unless the solid sets one.
     Tm
         Melting temperature, above which there is no heating.
 

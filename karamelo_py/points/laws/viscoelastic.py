@@ -144,8 +144,8 @@ class Viscoelastic(NamedTuple):
     tau
         Relaxation time of each term.
     wlf
-        C1, C2, Tr: in a material with a temperature T, relaxation times are multiplied by a, with
-        log10 a = -C1 (T - Tr)/(C2 + T - Tr) (Williams, Landel & Ferry 1955).
+        C1, C2, Tr: in a material with a temperature T, relaxation times are multiplied by 10^(-C1
+        (T - Tr)/(C2 + T - Tr)) (Williams, Landel & Ferry 1955).
 
     Example
     -------

@@ -110,7 +110,7 @@ def gradient_weight(transfer, node):
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Return True, constant when compiled, if `gradient_weight` is N_I D^-1 (X_I - x)."""
+    """Return True (a compile-time constant) if `gradient_weight` is N_I D^-1 (X_I - x)."""
     return False
 
 

@@ -35,8 +35,8 @@ class XPIC(NamedTuple):
     S maps nodes to points, and S+ maps points to nodes, weighted by mass. A low order m removes
     null-space noise and retains what the grid resolves (Hammerquist & Nairn 2017, "A new method for
     material point method particle updates that reduces noise and enhances stability", eq. 24). The
-    nodes sum w_0 = S+ v, w_k = w_(k-1) - S+ S w_(k-1). Each order costs one more pass over the
-    points per step.
+    sum w_0 + w_1 + ... is taken at the nodes, with w_0 = S+ v and w_k = w_(k-1) - S+ S w_(k-1).
+    Each order costs one more pass over the points per step.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def outer_faces(parts: list[MeshElements]) -> np.ndarray:
     """Return outer faces (m, d, d), oriented outwards; in 1D in pairs, the lower end first.
 
     Quadrilaterals are split along the diagonal through their lowest-numbered node, so that
-    neighbouring elements split a common face alike.
+    neighbouring elements split their common face in the same way.
     """
     triangles: list[np.ndarray] = []
     for elements in parts:

@@ -171,8 +171,8 @@ class Particle(OfPoints, LammpsDump):
     """Write the material points in LAMMPS text format, which OVITO opens.
 
     Each row begins with the point's number (``id``, constant during the run) and the number of its
-    solid (``type``, from 1). Positions are always written. The header has the step and, as ``ITEM:
-    TIME``, the time. The column ``element`` is the name of the solid, OVITO's particle type.
+    solid (``type``, from 1). Positions are always written. The header contains the step, and the
+    time as ``ITEM: TIME``. The column ``element`` is the name of the solid, OVITO's particle type.
 
     Example
     -------

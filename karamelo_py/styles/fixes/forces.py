@@ -423,7 +423,7 @@ def _is_borne(law: Any, mean: float) -> bool:
 
 
 def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
-    """Return bodies of which at least 10 % of the points cannot sustain their tension."""
+    """Return bodies in which at least 10 % of the points cannot sustain their tension."""
     cases = []
     normal = fix.formulas[:3]
     for solid in scene.hub.solids.values():

@@ -512,7 +512,7 @@ class ContactRigidBody(Fix):
                 )
 
     def grip_of(self, count: int) -> np.ndarray:
-        """Return what friction remembers of `count` points, by id; nothing without friction."""
+        """Return the friction state of `count` points, by id; empty without friction."""
         if self.mu > 0 and len(self.grip) != count:
             before, self.grip = self.grip[:count], np.zeros((count, GRIP))
             self.grip[: len(before)] = before

@@ -311,8 +311,9 @@ class JwlConstants(NamedTuple):
     -----
     p = F (A (1 - w/(R1 V)) exp(-R1 V) + B (1 - w/(R2 V)) exp(-R2 V) + w E/V) with V = rho0/rho and
     the energy E per initial volume, dE = -p dV (Lee, Hornig & Kury 1968; Dobratz & Crawford 1985
-    for constants). From the time of fix detonation the burnt fraction F of a point grows from 0 to
-    1 while the front moves 1.5 cells (programmed burn, Wilkins 1964). Viscous work heats them.
+    for constants). From the time of fix detonation, F, the burnt fraction of a point, grows to 1
+    while the front moves 1.5 cells (programmed burn, Wilkins 1964). Viscous work heats the
+    products.
 
     The strain energy, E - E0, decreases as the products do work. Fix initial_stress has no effect.
 

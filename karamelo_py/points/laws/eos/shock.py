@@ -43,7 +43,7 @@ class ShockConstants(NamedTuple):
     Q1, Q2
         Coefficients of artificial viscosity, quadratic and linear; 0 and 0 for none.
     tension
-        Tension at which the material spalls (0: no tension). Default: only the formula limits it.
+        Tension at which the material spalls (0: no tension). Default: the limit of the formula.
 
     Example
     -------

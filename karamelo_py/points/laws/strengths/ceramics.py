@@ -44,7 +44,7 @@ class JohnsonHolmquist2(NamedTuple):
     C
         Rate coefficient; 0 for none.
     epsdot0
-        Reference strain rate; may be 0 if C is.
+        Reference strain rate; it may be 0 if C is 0.
     T
         Largest tension, as a pressure.
     HEL
@@ -126,7 +126,7 @@ class Concrete(NamedTuple):
     C
         Rate coefficient; 0 for none.
     epsdot0
-        Reference strain rate; may be 0 if C is.
+        Reference strain rate; it may be 0 if C is 0.
     fc
         Uniaxial compressive strength.
     T

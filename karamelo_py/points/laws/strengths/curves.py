@@ -50,7 +50,7 @@ class Tabulated(NamedTuple):
     -----
     Beyond the last point of the curve the flow stress is constant. The curve may fall by less than
     3 G per unit of plastic strain. ``strength(steel, tabulated, 80e9, curve.txt)`` reads a file.
-    Each step solves for the plastic strain with the flow stress at its end.
+    Each step solves for the plastic strain at the flow stress of the end of the step.
 
     See Also
     --------

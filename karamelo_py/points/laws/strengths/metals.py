@@ -36,7 +36,7 @@ class JohnsonCookConstants(NamedTuple):
     B, n
         Hardening: the flow stress increases by B ep^n, where ep is the equivalent plastic strain.
     epsdot0
-        Reference plastic strain rate; may be 0 if C is.
+        Reference plastic strain rate; it may be 0 if C is 0.
     C
         Rate coefficient; 0 for none.
     m
@@ -53,9 +53,9 @@ class JohnsonCookConstants(NamedTuple):
     Notes
     -----
     Y = (A + B ep^n) (1 + C ln(rate/epsdot0)) (1 - T*^m), T* = (T - Tr)/(Tm - Tr) (Johnson & Cook
-    1983). The second factor is 1 up to the reference rate, the third without a temperature. In each
-    step, the plastic strain is found for the flow stress at the end of the step, with the mean rate
-    in the step and the temperature at its beginning; the solution is unique for any step size.
+    1983). The second factor is 1 up to the reference rate. The third is 1 without a temperature. In
+    each step, the plastic strain is found for the flow stress at the end of the step, with the mean
+    rate in the step and the temperature at its beginning; the solution is unique for any step size.
 
     See Also
     --------
@@ -285,7 +285,7 @@ class ZerilliArmstrong(NamedTuple):
     -----
     Y = C0 + (C1 + C2 sqrt(ep)) exp(-C3 T + C4 T ln(rate/epsdot0)) + C5 ep^n (Zerilli & Armstrong
     1987). C2 is 0 for bcc metals, C1 and C5 are 0 for fcc metals. At rest the strength is C0 + C5
-    ep^n. Each step finds the plastic strain for the flow stress at its end and its mean rate.
+    ep^n. The plastic strain of a step uses the final flow stress and mean rate.
 
     See Also
     --------

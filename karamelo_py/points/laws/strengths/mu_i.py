@@ -87,7 +87,7 @@ known_failure(
     "their pressure, and thus friction, varies from 0 to twice the right value (flow down a "
     "plane, any cell size)",
     cure="method(ulmpm, AFLIP, cubic-spline, 0.9) and anti_volumetric_locking(true): pressures "
-    "within 5 %, speeds 7 % too low on the floor (APIC and TPIC: 3 %, and 19 %)",
+    "within 5 %, speeds at the floor 7 % too low (APIC and TPIC: 3 % and 19 %)",
 )
 
 

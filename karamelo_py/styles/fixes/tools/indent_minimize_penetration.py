@@ -29,7 +29,7 @@ class IndentMinimizePenetration(StiffTool, BallTool):
 
     Notes
     -----
-    Points are spheres (in 2D disks) with a radius rp of half the side of a cube of their present
+    Each point is a sphere (a disk in 2D). Its diameter 2 rp is the edge of a cube of its present
     volume. A point at the distance r from the centre, with the overlap p = R + rp - r > 0, gets the
     force m p / dt^2, which moves a free point out of the ball within one step. Friction and dt are
     as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
