@@ -87,8 +87,8 @@ def spherical(hub: Hub, active: bool) -> None:
     Use this command before the first solid, in a 1D domain with x >= 0. The hoop strains,
     components 22 and 33, are the radial displacement / r. Points carry the volume and mass of
     one steradian, r^2 dr: multiply by 4 pi for the whole sphere. A node at x = 0 does not move.
-    Materials must behave alike in y and z. At a Poisson's ratio near 0.5, and in plastic flow of
-    metals, a linear basis locks: use anti_volumetric_locking(true).
+    Materials must behave in the same way in y and z. At a Poisson's ratio near 0.5, and in plastic
+    flow of metals, a linear basis locks: use anti_volumetric_locking(true).
 
     See Also
     --------

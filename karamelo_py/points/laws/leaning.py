@@ -25,7 +25,7 @@ def warn_of_leaning(
 
 
 def leans(law: Any, scene: Any) -> bool:
-    """Return True if bodies of `law` would shear out of a `scene` (with ``d`` and ``hub``)."""
+    """Return True if bodies of `law` would shear out of the plane or line of a `scene`."""
     return any(
         when(part, scene)
         for part in law_parts(law)
