@@ -505,7 +505,7 @@ def test_compiled_formulas_have_the_numbers_of_the_built_in_law(
         ('"I1 - 3"', "a stress of 2 at rest", "least for I1 = I2 = 3"),
         ('"k*(I1 - 3)"', "unknown name 'k'", "k=..., after the formula"),
         ("k*(I1 - 3), k=mu, c9=1", "no argument is named 'c9'", "rho=..., energy=..., fibre="),
-        ("k*(I1 - J), k=-mu, J=1", "J is a variable of the formula", "by another name"),
+        ("k*(I1 - J), k=-mu, J=1", "J is a variable of the formula", "another name for it"),
         ("PI*(I1 - 3), PI=3", "'PI' is the number pi", "a name that is free"),
         ("exp*(I1 - 3), exp=3", "'exp' is a function", "a name that is free"),
         ('k*(I1 - 3), k="mu"', 'k = "mu" is not a number', "a number"),

@@ -244,8 +244,8 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 # serve. Only the leader writes _STATE. Each thread has a range of the indices of a loop, and a
 # ticket: the number of the loop, and how many indices of the range are left. A thread takes an
 # index by decreasing a ticket with compare-and-swap. This is correct because:
-# 1. Each index is processed once: of several swaps of a ticket one succeeds, and tickets of
-#    different loops differ.
+# 1. Each index is processed once: only one of several swaps of a ticket succeeds, and
+#    tickets of different loops differ.
 # 2. A thread that has taken an index sees the task, arguments and count of its loop. The leader
 #    writes them before it stores the tickets (release), and a swap acquires the ticket; swaps by
 #    other threads in between continue the release.

@@ -638,7 +638,7 @@ def _touch_place(bodies, control, count, where):
 
 @noinline
 def _count_work(control, n, work):
-    """Add work on the body of a node, which contact does not give to other bodies."""
+    """Add work of contact on the body of a node; minus its sum over bodies is the loss."""
     if counts(control.ranks, n):
         add_to(control.totals, WORK, work)
         add_to(control.totals, CONTACT_LOSS, -work)

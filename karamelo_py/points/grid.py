@@ -81,7 +81,7 @@ class ReflectingGrid(Grid):
 
 @point_function(otherwise=True)
 def reflected(grid, kin, y, v, moment):
-    """Return position, velocity, moment after reflection, and 1 per direction that reflects."""
+    """Return position, velocity, moment after reflection; per direction, 1 if reflected, else 0."""
     return y, v, moment, ()
 
 

@@ -122,7 +122,7 @@ def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -
 
 
 class ProgramWriter:
-    """Writes formulas of `names` with common `numbers`; other names are numbers that may change."""
+    """Writes formulas in `names`. They have common `numbers`, which include all other names."""
 
     def __init__(self, names: Sequence[str]):
         self.names = names

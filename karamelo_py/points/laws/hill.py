@@ -188,7 +188,7 @@ class Hill(NamedTuple):
         Instead of R: yield stresses (r11, r22, r33) / reference stress and shear yield stresses
         (r12, r13, r23) / (reference stress / sqrt(3)). All are 1 for an isotropic body.
     axes
-        As for orthotropic; the elastic material also rotates with them.
+        As for orthotropic. They also apply to the elastic material.
 
     Example
     -------
