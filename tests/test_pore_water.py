@@ -113,6 +113,29 @@ def test_steady_seepage_follows_darcy(run_script, scheme, steps):
     assert abs(log["lid_x"] + 500) < 0.1
 
 
+def test_the_pressure_at_a_drained_wall_that_moves_depends_little_on_the_step(run_interpreted):
+    """A wall that holds all components drags soil; its nodes are solved for as they then move."""
+    text = """
+        method(tlmpm, FLIP, linear, 1)
+        scheme(semi-implicit)
+        dimension(2, 0, 1, 0, 1, 0.25)
+        region(layer, block, 0, 1, 0, 1)
+        material(clay, linear, 1590, 1e7, 0.2)
+        pore_water(clay, n=0.4, permeability=1)
+        solid(clay, region, layer, 2, clay, 0.25, 0)
+        region(left, block, -INF, 1e-6, -INF, INF)
+        group(left, nodes, region, left, all)
+        fix(drain, pore_pressure, left, 0)
+        fix(wall, velocity_nodes, left, 0, 1e-4)
+        compute(p, probe, all, pore_pressure, x=0, y=0)
+        log_modify(custom, step, p)
+        set_dt(0.0024/{n})
+        run(5*{n})
+        """
+    coarse, fine = (run_interpreted(text.format(n=n)).log["p"][-1] for n in (1, 8))
+    assert abs(coarse / fine - 1) < 0.3
+
+
 @same_kernels
 @pytest.mark.parametrize(("scheme", "steps"), [("musl", 10000), ("semi-implicit", 1000)])
 def test_a_given_flux_leaves_through_a_seepage_face_that_lets_nothing_in(run_script, scheme, steps):
@@ -294,6 +317,26 @@ def test_a_modified_skeleton_keeps_its_water(run_interpreted):
     )
     log = run_interpreted(script.replace("N = 16", "N = 4")).log
     assert abs(log["p"][-1] / 50 - 1) < 1e-6
+
+
+def test_a_rotating_block_has_the_pressure_of_its_centrifugal_force(run_interpreted):
+    """At most rho w^2 R^2 / 2 = 0.5 kPa; straight steps alone would expand water by (w dt)^2."""
+    text = """
+        method(tlmpm, FLIP, linear, 1)
+        scheme(semi-implicit)
+        dimension(2, -1, 1, -1, 1, 0.5)
+        region(layer, block, -0.5, 0.5, -0.5, 0.5)
+        material(clay, linear, 1590, 1e7, 0.2)
+        pore_water(clay, n=0.4, permeability=1e-2)
+        solid(clay, region, layer, 2, clay, 0.5, 0)
+        fix(v, initial_velocity_particles, all, -y0, x0)
+        compute(p, probe, all, pore_pressure)
+        log_modify(custom, step, p)
+        set_output(1)
+        run(5)
+        """
+    log = run_interpreted(text).log
+    assert abs(log["p"]).max() < 500  # K/n (w dt)^2 = 128 kPa
 
 
 def test_an_undrained_column_carries_its_load_with_water(run_script):

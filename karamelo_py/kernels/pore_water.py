@@ -46,6 +46,7 @@ OF_MASS = Company(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),)
 OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
 BEFORE_LOADS = Company(before=(NodeTask(pores.SplitMomentum()),))
 OF_MOVE = Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))
+OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWaterOfStep()),))
 COMPANIES = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
@@ -99,7 +100,7 @@ COMPANIES_OF_SOLUTION = (
     (BeforeLoads, BEFORE_LOADS),
     (InternalForce, Company(then=(*OF_FORCE, pressures.SumsOfCells()))),
     (NodalUpdate, Company(before=SOLVE)),
-    (Move, OF_MOVE),
+    (Move, OF_MOVE_OF_STEP),
     (
         Strain,
         Company(

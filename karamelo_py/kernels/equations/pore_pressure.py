@@ -38,6 +38,7 @@ from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.records import put_at
 from karamelo_py.points.basis.product import digits
 from karamelo_py.points.grid import Grid
+from karamelo_py.points.kinematics import total as sum_of
 from karamelo_py.points.laws.pore_water import pore_stiffness
 
 ACCURACY = 1e-5  # residual / first residual
@@ -139,7 +140,9 @@ class Foresee(NamedTuple):
     surface: float
 
     says = "velocities before the pressure changes"
-    goes_through = ("sums", "velocity", "water sums", "node response", "cell pressures")
+    goes_through = (
+        "sums", "velocity", "water sums", "water update", "node response", "cell pressures",
+    )  # fmt: skip
 
     def at_node(task, kin, nodes, n, dt):
         out, d = field(nodes.fields, NodeResponse), kin.dimension
@@ -147,7 +150,7 @@ class Foresee(NamedTuple):
         put_at(out, n, 0, (real(0, dt),) * (4 * d + 6))
         if not pores.is_wet_node(nodes, kin, n):
             return
-        water = field(nodes.fields, pores.WaterSums)
+        water, update = field(nodes.fields, pores.WaterSums), field(nodes.fields, pores.WaterUpdate)
         pores.close_if_dry(nodes, kin, n)
         drag, forces = pores.forces_at(task, kin, nodes, n, dt)
         m, V, of_V = water[n, arrays.MASS], water[n, pores.of_volumes(kin)], pores.of_volumes(kin)
@@ -157,10 +160,10 @@ class Foresee(NamedTuple):
             on_water, force, v, w = forces[k]
             held = nodes.velocity[n, k]
             new = held if held == held else v + dt * force / drag.whole
-            beyond = v - held if held == held else real(0, dt)  # as in `DragWater`
-            change = real(0, dt) if held == held else new - v
-            w += drag.left * beyond
-            w = drag.left * w + drag.taken * (dt * on_water * per_mass - change)
+            before = held if held == held else v
+            by_force = dt * on_water * per_mass - (new - before)
+            w = drag.left * (w + drag.left * (v - before)) + drag.taken * by_force
+            update[n, k] = before  # for `DragWaterOfStep`
             out[n, V_ * d + k] = new
             out[n, S_ * d + k] = share * w
             out[n, MOBILE * d + k] = real(0, dt) if held == held else dt / drag.whole
@@ -236,16 +239,37 @@ def _grid_of(grids, n):
     return record(grids, g)
 
 
+def _growth(d, H):
+    """Return det(I + H) - 1 - tr H."""
+    if d == 1:
+        return 0.0
+    plane = H[0][0] * H[1][1] - H[0][1] * H[1][0]
+    if d == 2:
+        return plane
+    first = H[1][1] * H[2][2] - H[1][2] * H[2][1]
+    second = H[0][0] * H[2][2] - H[0][2] * H[2][0]
+    volume = H[0][1] * (H[1][2] * H[2][0] - H[1][0] * H[2][2])
+    volume += H[0][2] * (H[1][0] * H[2][1] - H[1][1] * H[2][0])
+    return plane + first + second + H[0][0] * first + volume
+
+
 def _outflow(system, c, corners):
-    """Return the volume per time that leaves cell `c`, from the velocities at its nodes."""
-    nodes, d = system.nodes, system.kin.dimension
-    total, stays = 0.0, 0.0
-    for _, offset, slopes in corners:
-        n, force = c + offset, _row(system, c, slopes)
+    """Return the volume per time that leaves cell `c`, from the velocities at its nodes.
+
+    In a rotation by w dt, volumes grow by (w dt)^2: with K/n = 5 GPa this is no small pressure.
+    """
+    nodes, d, V = system.nodes, system.kin.dimension, system.cells[c, VOLUME]
+    seen = [(c + offset, _row(system, c, slopes)) for _, offset, slopes in corners]
+    flow, stays = 0.0, 0.0
+    for n, force in seen:
         for k in range(d):
-            total += force[k] * (nodes[n, V_ * d + k] + nodes[n, S_ * d + k])
+            flow += force[k] * (nodes[n, V_ * d + k] + nodes[n, S_ * d + k])
         stays += nodes[n, 4 * d + STAYS]
-    return total - 0.5**d * system.cells[c, VOLUME] * stays
+    H = [
+        [system.dt / V * sum_of([f[k] * nodes[n, V_ * d + i] for n, f in seen]) for k in range(d)]
+        for i in range(d)
+    ]
+    return flow + V / system.dt * _growth(d, H) - 0.5**d * V * stays
 
 
 @noinline

@@ -546,36 +546,56 @@ class ShareForces(NamedTuple):
         share_forces(task, kin, nodes, n, dt)
 
 
+def _drag_water(task, kin, nodes, n, dt):
+    out, d = field(nodes.fields, WaterUpdate), kin.dimension
+    if not is_wet_node(nodes, kin, n):
+        put_at(out, n, 0, (0,) * (2 * d))
+        return
+    water = field(nodes.fields, WaterSums)
+    m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
+    both = m_s + water[n, arrays.MASS]
+    per_mass, per_whole = 1 / water[n, arrays.MASS], 1 / nodes.sums[n, arrays.MASS]
+    out[n, 2 * d] = left
+    for k in range(d):
+        of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
+        dv = nodes.update[n, arrays.of_change(kin) + k]
+        before = nodes.update[n, k] - dv
+        # Water next to a fix that holds the soil slips past it unless drag holds it, too.
+        beyond = nodes.sums[n, of_momentum] * per_whole - before
+        w = water[n, of_momentum] * per_mass + left * beyond
+        further = before - out[n, k] if task.of_step else real(0, dt)
+        by_force = dt * water[n, of_force] * per_mass - dv - further
+        new = left * (w + left * further) + taken * by_force
+        out[n, k] = new
+        out[n, d + k] = new - w
+        out[n, 2 * d + 1 + k] = beyond
+        water[n, of_force] = 0
+        nodes.sums[n, of_momentum] *= both * per_whole
+    nodes.sums[n, arrays.MASS] = both
+
+
 @node_task
 class DragWater(NamedTuple):
     """Updates the relative velocity with the soil's velocity change; resets the mass."""
 
+    of_step = False
     says = "drag"
     goes_through = ("sums", "update", "water sums", "water update")
 
     def at_node(task, kin, nodes, n, dt):
-        out, d = field(nodes.fields, WaterUpdate), kin.dimension
-        if not is_wet_node(nodes, kin, n):
-            put_at(out, n, 0, (0,) * (2 * d))
-            return
-        water = field(nodes.fields, WaterSums)
-        m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
-        both = m_s + water[n, arrays.MASS]
-        per_mass, per_whole = 1 / water[n, arrays.MASS], 1 / nodes.sums[n, arrays.MASS]
-        out[n, 2 * d] = left
-        for k in range(d):
-            of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
-            dv = nodes.update[n, arrays.of_change(kin) + k]
-            # Water next to a fix that holds the soil slips past it unless drag holds it, too.
-            beyond = nodes.sums[n, of_momentum] * per_whole - (nodes.update[n, k] - dv)
-            w = water[n, of_momentum] * per_mass + left * beyond
-            new = left * w + taken * (dt * water[n, of_force] * per_mass - dv)
-            out[n, k] = new
-            out[n, d + k] = new - w
-            out[n, 2 * d + 1 + k] = beyond
-            water[n, of_force] = 0
-            nodes.sums[n, of_momentum] *= both * per_whole
-        nodes.sums[n, arrays.MASS] = both
+        _drag_water(task, kin, nodes, n, dt)
+
+
+@node_task
+class DragWaterOfStep(NamedTuple):
+    """Like `DragWater`, with the soil's velocities before the step (d,) from `WaterUpdate`."""
+
+    of_step = True
+    says = DragWater.says
+    goes_through = DragWater.goes_through
+
+    def at_node(task, kin, nodes, n, dt):
+        _drag_water(task, kin, nodes, n, dt)
 
 
 def _make_flux(task, kin, nodes, n, dt):
