@@ -451,11 +451,17 @@ BOX = """
 """
 
 
-@pytest.mark.parametrize(("kin", "x"), [(PlaneStrain, 3.0), (Axisymmetric, 3.0)])
+@pytest.mark.parametrize(
+    ("kin", "x"), [(PlaneStrain, 3.0), (Axisymmetric, 3.0), (Axisymmetric, 0.0)]
+)
 @pytest.mark.parametrize(("filled", "part"), [(0.9, 0.01), (1.1, 0.0)])
 def test_a_liquid_closes_a_gap_only_where_there_is_one(kin, x, filled, part):
-    """A wall fills half of the cells around a node, and water the rest, or less."""
-    h, room = 0.5, 0.5**2 * (x if kin().hoops else 1)
+    """A wall fills half of the cells around a node, and water the rest, or less.
+
+    On the axis, points at h/4 and 3 h/4 fill a cell: 3/4 of one ring, 1/4 of the other.
+    """
+    h, on_axis = 0.5, 0.5 * (0.75 * 0.25 + 0.25 * 0.75)
+    room = h**2 * ((x or on_axis * h) if kin().hoops else 1)
     contact = SimpleNamespace(
         stride=1, per_mass=np.array([1e-4, 1e-3]) / h, fluid=(False, True), memory=(1, 100)
     )

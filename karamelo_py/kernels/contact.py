@@ -450,7 +450,8 @@ def closing_part(bodies, pair, x, h):
     (contact, kin, nodes), (n, m) = bodies, pair
     a, b = n // contact.stride, m // contact.stride
     filled = contact.per_mass[a] * nodes.sums[n, MASS] + contact.per_mass[b] * nodes.sums[m, MASS]
-    if filled > FULL * (h * x[0] if kin.hoops else h):
+    # Cells around a node on the axis have a radius, too; this is the sum of two points per cell.
+    if filled > FULL * h * max(x[0], 3 / 16 * h) ** kin.hoops:
         return 0.0
     return max(contact.fluid[a] / contact.memory[a], contact.fluid[b] / contact.memory[b])
 
