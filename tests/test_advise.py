@@ -121,10 +121,10 @@ def test_errors_that_stop_falling_are_no_promise(folder, capsys):
     """Order 4 that ends at 0.03: the last order is 1, and it is told that it may be 0 next."""
     advise("-var", "slope=4", "-var", "least=0.03", "-run", status=1)
     out = capsys.readouterr().out
-    assert re.search(r"uncertain: expected err 0.0144, .* between .* and 0.03\b", out)
+    assert re.search(r"uncertain: expected err 0.0144, .* from .* to 0.03\b", out)
     assert "N = 80: err 0.03, the target is missed" in out
     assert "no variant is expected to reach err <= 0.02" in out
-    assert "with 0.03; finer values of N or other choices may do" in out
+    assert "with 0.03; finer values of N or other choices may suffice" in out
 
 
 def test_a_target_met_by_chance_alone_is_no_contradiction(folder, capsys):
@@ -293,7 +293,7 @@ def test_doubts_of_a_forecast():
     best.choice.warnings = ("points cross cells",)
     assert adviser.doubts(best) == ["its runs warn: points cross cells"]
     said = sureness(adviser, best)
-    assert said.startswith("not sure: expected") and "lies between" not in said
+    assert said.startswith("not sure: expected") and "its orders give" not in said
     best.choice.warnings = ()
     best.choice.values["kind"] = "ulmpm"
     assert "gradient of the linear basis jumps" in adviser.doubts(best)[0]

@@ -26,7 +26,7 @@ SYNTAX = [
     ("a =", 1, "nothing is assigned to 'a'"),
     ("a = 1.2.3", 5, "'1.2.3' is not a number"),
     ("a = 1e3.5", 5, "'1e3.5' is not a number\n"),
-    ("run(1e3.5)", 5, "a whole number as the exponent"),
+    ("run(1e3.5)", 5, "a whole number after e"),
     ("run(&\n10)", 5, "may run over several lines inside its parentheses"),
     ("a = 1 + & # more\n 2", 9, "leave it out"),
     ("label loop", 7, "a script has no loops, blocks or imports"),

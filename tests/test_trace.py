@@ -213,7 +213,7 @@ def test_a_function_that_cannot_be_compiled_is_named():
     with pytest.raises(CannotCompile) as raised:
         kernel(caller)(1.0)
     assert cause_of(raised.value) == (
-        "it cannot be compiled: kernels know no text with numbers in it (in told), "
+        "it cannot be compiled: kernels do not support text with numbers in it (in told), "
         "in 'return len(f\"{x}\")'"
     )
     assert place_in(told, raised.value) == f" (test_trace.py:{told.__code__.co_firstlineno + 4})"
@@ -313,9 +313,9 @@ def test_a_number_is_looked_for_among_others():
 @pytest.mark.parametrize(
     ("function", "arguments", "reason"),
     [
-        (caught, (1.0,), "no `try` and no `with`"),
+        (caught, (1.0,), "do not support `try` or `with`"),
         (kinds_of, (1.0, 2), "ask for the type of a number"),
-        (imported, (1.0,), "no `import` within a function"),
+        (imported, (1.0,), "do not support `import` within a function"),
     ],
 )
 def test_what_nothing_follows_is_refused(function, arguments, reason):

@@ -154,8 +154,8 @@ def _thin(hub: Hub, held: dict[int, Roller]) -> Words:
             plate = f"half of a plate, held in its middle plane {AXES[k]} = {held[k].at:g}, and"
         yield (
             f"{plate} nothing acts along {AXES[k]}: {layers} times the points "
-            f"of plane stress{cost(hub, layers, 2, _longer(hub, 2))}, with the same energies to "
-            "some per cent, and cells need not fit into the thickness",
+            f"of plane stress{cost(hub, layers, 2, _longer(hub, 2))}, with energies equal within "
+            "a few per cent, and cells need not fit into the thickness",
             _domain_of(hub, rest, f" and plane_stress(true, thickness={thickness:g})")
             + to_change(hub, THIN_BODY),
         )
@@ -291,7 +291,7 @@ def _mirrored(hub: Hub) -> Words:
             yield (
                 f"the scene is symmetric about {AXES[k]} = {middle:g}: twice the points (unless "
                 "it may buckle or break unevenly); energies are halved, and bases "
-                "wider than linear change results by some per cent on coarse grids",
+                "wider than linear change results by a few per cent on coarse grids",
                 f"half of it, and the nodes at {AXES[k]} = {middle:g} held in {AXES[k]}",
             )
             return

@@ -78,7 +78,7 @@ def pore_water(
     The stable step is set by the fast compression wave (about 1850 m/s in water-saturated soil),
     not by the drag. With N cells along a drainage path of length L, consolidation to Tv = 1 takes
     about 2 N L c/c_v steps, where c is the wave speed and c_v the coefficient of consolidation.
-    With scheme(semi-implicit), c is the wave speed of the dry soil. If these steps are too many, as
+    With scheme(semi-implicit), c is the wave speed of the dry soil. If these are too many steps, as
     at 1e-9 m/s, use scheme(quasi-static), or multiply the densities by a factor, as in
     inputs/in.terzaghi.
 
@@ -127,7 +127,7 @@ def pore_water(
             "intrinsic=..., the permeability in m^2" if permeability else "permeability=... in m/s"
         )
         hub.warn(
-            f"the hydraulic conductivity is {conductivity:.3g} m/s, outside of all soils, from "
+            f"the hydraulic conductivity is {conductivity:.3g} m/s, outside the range of soils, "
             f"{SLOWEST:g} to {FASTEST:g}",
             hint=f"{other}, if {name} is in the wrong unit",
         )

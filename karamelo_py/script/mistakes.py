@@ -25,7 +25,7 @@ _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 def check_characters(text: str) -> None:
     first = _KEYWORD.match(text)
     if first and first[1].lower() in table()["abaqus"].split():
-        hint = "docs/howto/from-abaqus.md says it in this language; solid mesh reads its mesh"
+        hint = "docs/howto/from-abaqus.md gives the equivalents here; solid mesh reads its mesh"
         raise Mistake("this is an input file of Abaqus", *first.span(1), "a script", hint)
     if first := _DYNA.match(text):
         hint = (

@@ -496,14 +496,14 @@ def _nothing(adviser: Adviser) -> int:
         print(f"reaches it only by chance: {by_luck(adviser, lucky)}")
     elif sizes:
         error, label = min(sizes, key=lambda item: item[0])
-        further = f"finer values of {adviser.name} or other choices may do"
+        further = f"finer values of {adviser.name} or other choices may suffice"
         print(f"nearest: {label} with {error:.3g}; {further}")
     hope = adviser.hopeful()
     if hope is not None:
         print(
-            f"{adviser.label(hope.choice, hope.step)} may do, at about {adviser.cost} "
+            f"{adviser.label(hope.choice, hope.step)} may suffice, at about {adviser.cost} "
             f"{hope.cost:.3g}: expected {hope.error:.3g}, at best {hope.forecast.low:.3g}; "
-            "with -run it is tried"
+            "-run tries it"
         )
     return 1
 

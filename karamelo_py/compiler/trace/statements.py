@@ -176,10 +176,10 @@ _CHANGING = (list, dict, set)
 _ON_ALL_WAYS = "on one of several ways, a list would change on all"
 _IMPORT = "`import` within a function: import at the top of the file"
 _WORDS = {
-    "Try": "`try` and no `with`", "With": "`try` and no `with`", "Delete": "`del`",
+    "Try": "`try` or `with`", "With": "`try` or `with`", "Delete": "`del`",
     "Import": _IMPORT, "ImportFrom": _IMPORT,
     "Global": "`global`", "Nonlocal": "`nonlocal`", "Match": "`match`", "ClassDef": "`class`",
-    "Raise": "`raise` of this kind", "FunctionDef": "function within of this kind",
+    "Raise": "`raise` of this kind", "FunctionDef": "nested function of this kind",
 }  # fmt: skip
 
 
@@ -246,7 +246,7 @@ class AstCompiler:
 
     def unknown(self, node: ast.AST) -> None:
         kind = type(node).__name__
-        raise Untraceable(f"kernels know no {_WORDS.get(kind, kind)}")
+        raise Untraceable(f"kernels do not support {_WORDS.get(kind, kind)}")
 
     def name(self, name: str) -> Any:
         if name in self.names:
@@ -302,7 +302,7 @@ class AstCompiler:
     def FormattedValue(self, node: ast.FormattedValue) -> str:
         value = self.do(node.value)
         if is_value(value):
-            raise Untraceable("kernels know no text with numbers in it")
+            raise Untraceable("kernels do not support text with numbers in it")
         if node.conversion >= 0:
             value = {"s": str, "r": repr, "a": ascii}[chr(node.conversion)](value)
         return format(value, self.do(node.format_spec) if node.format_spec else "")

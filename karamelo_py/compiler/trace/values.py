@@ -192,7 +192,7 @@ class Value:
 
     __bool__ = _only_at_run_time("a condition in an expression within an expression")
     __int__ = __index__ = __float__ = _only_at_run_time("a number that has to be written")
-    __iter__ = __len__ = __contains__ = _only_at_run_time("what is gone through or counted")
+    __iter__ = __len__ = __contains__ = _only_at_run_time("an iteration, length or membership")
     __hash__ = _only_at_run_time("a key")
     __str__ = __repr__ = __format__ = _only_at_run_time("a number in a text")
 
@@ -213,7 +213,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
         if isinstance(a._kind, types.Array):  # the array would change in place
-            raise Untraceable("an array as a whole is changed: change its items")
+            raise Untraceable("an array cannot be changed as a whole: change its items")
         return _operated(operation, a, b)
 
     return apply
