@@ -149,3 +149,14 @@ def test_artificial_heat_flux(run_interpreted):
 def test_heat_flux_needs_a_method_with_heat(run_interpreted):
     out = run_interpreted(FLUX.format(more=""), command="check").out
     assert "Qh of material air has no effect" in out
+
+
+def test_heat_flux_does_not_mix_with_temperatures(run_interpreted):
+    """Nodes would average kelvin and energy per mass: cold steel warmed beside a gas at rest."""
+    text = FLUX.format(more=", thermo-mechanical")
+    steel = "region(b, block, 0.5, 1)\n    material(steel, linear, 7800, 2e11, 0.3, 500, 50)\n"
+    solid = "    solid(steel, region, b, 2, steel, 0.1, 300)\n    p = "
+    text = text.replace("region(all, block, 0, 1)", "region(all, block, 0, 0.5)")
+    err = run_interpreted(text.replace("    p = ", "    " + steel + solid, 1), status=1).err
+    assert "Qh of material 'air' diffuses energy per mass, and solid 'steel'" in err
+    assert err.count("error:") == 1

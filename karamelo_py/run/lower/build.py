@@ -95,6 +95,8 @@ def check_scene(hub: Hub) -> None:
                 hint="give a material one: material(ID, linear, rho, E, nu, cp, kappa), or "
                 "temperature(...) with eos-strength",
             )
+        if hub.update.thermal:
+            _refuse_other_heat(hub)
     except ScriptError as error:
         if error.mark is None:
             error.mark, error.command = method.mark, "method"
@@ -113,6 +115,20 @@ def check_scene(hub: Hub) -> None:
                 f"solid '{solid.id}' is rigid, and the domains of its points would deform",
                 mark=solid.mark,
                 hint="a basis without domains that deform: linear, a spline, or ugimp",
+            )
+
+
+def _refuse_other_heat(hub: Hub) -> None:
+    """Nodes conduct either heat or, for gases with Qh, energy per mass."""
+    solids = hub.solids.values()
+    for solid in solids:
+        warm = [one for one in solids if laws.can(one.material.law, initial_heat)]
+        if warm and diffuses_energy(solid.material.law):
+            raise ScriptError(
+                f"Qh of material '{solid.material.id}' diffuses energy per mass, and solid "
+                f"'{warm[0].id}' conducts heat by temperature: both would mix at nodes",
+                mark=solid.mark,
+                expected="no Qh, or no solid with a temperature",
             )
 
 
