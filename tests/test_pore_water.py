@@ -339,6 +339,24 @@ def test_a_rotating_block_has_the_pressure_of_its_centrifugal_force(run_interpre
     assert abs(log["p"]).max() < 500  # K/n (w dt)^2 = 128 kPa
 
 
+def test_soft_undrained_soil_does_not_break_under_its_weight(run_interpreted):
+    """Growth of volumes by the velocities that precede the solution broke it in five steps."""
+    run_interpreted("""
+        method(tlmpm, FLIP, linear, 1)
+        scheme(semi-implicit)
+        dimension(2, 0, 1, 0, 1, 1/6)
+        region(layer, block, 0, 1, 0, 1)
+        material(clay, linear, 1590, 1e6, 0.2)
+        pore_water(clay, n=0.4, permeability=1e-2)
+        solid(clay, region, layer, 2, clay, 1/6, 0)
+        region(bottom, block, -INF, INF, -INF, 1e-6)
+        group(bottom, nodes, region, bottom, all)
+        fix(base, velocity_nodes, bottom, 0, 0)
+        fix(weight, body_force, all, 0, -9.81)
+        run(12)
+        """)
+
+
 def test_an_undrained_column_carries_its_load_with_water(run_script):
     """The exact answer without waves: load K/n / (K/n + M), from the first hundred steps on."""
     log = run_script(
