@@ -258,8 +258,8 @@ def _outflow(system, c, corners):
     """Return the volume per time that leaves cell `c`, from the velocities at its nodes.
 
     In a rotation by w dt, volumes grow by (w dt)^2: with K/n = 5 GPa this is no small pressure.
-    This term is taken from the velocities before the step: those of the pressure at its beginning
-    contain noise, and soft soil would break.
+    This term is taken from the velocities before the step, as foreseen velocities contain noise
+    that breaks soft soil.
     """
     nodes, d, V = system.nodes, system.kin.dimension, system.cells[c, VOLUME]
     seen = [(c + offset, _row(system, c, slopes)) for _, offset, slopes in corners]
