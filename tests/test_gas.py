@@ -147,8 +147,8 @@ def test_artificial_heat_flux(run_interpreted):
 
 
 def test_heat_flux_needs_a_method_with_heat(run_interpreted):
-    out = run_interpreted(FLUX.format(more=""), command="check").out
-    assert "Qh of material air has no effect" in out
+    said = run_interpreted(FLUX.format(more=""), command="check").err
+    assert "heat flux of material 'air': Qh has no effect" in said
 
 
 def test_heat_flux_does_not_mix_with_temperatures(run_interpreted):

@@ -241,7 +241,8 @@ TWO = [
     body("b", "block, 5, 6, 7, 8", "spin=0.1"),
 ]
 MISTAKES = {
-    "contact/bodies, a, c": ("there is no solid and no region 'c'", "a, b"),
+    "contact/bodies, a, c": ("there is no solid and no region 'c'", "one of still, a, b"),
+    "contact/bodies, a, fat": ("there is no solid and no region 'fat'", "did you mean 'far'?"),
     "contact/bodies, a, a": ("'a' is named twice", "each once"),
     "contact/bodies, a, b, restitution=2": ("restitution", "from 0 to 1"),
     "contact/bodies, a, b, mu=-1": ("mu", "at least 0"),

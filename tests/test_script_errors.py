@@ -209,6 +209,7 @@ COMMANDS = [
     ("a = 0\naxisymmetric(a)", 14, 'hint: write a = "false"'),
     ("axisymmetric(1)", 14, "hint: write true"),
     ("group wall region wall", 7, "hint: arguments go in parentheses: group(wall, particles, reg"),
+    ("method(auto, accuracy=0,01)", 25, "hint: with a decimal point: accuracy=0.01; in parenth"),
     ("include(nofile.in)", 9, "no file"),
     ("print()", 1, "first is missing"),
     ('run_while("abc")', 11, "not the text 'abc'"),

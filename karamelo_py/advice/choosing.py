@@ -284,7 +284,8 @@ def choose(hub: Hub, name: str, accuracy: float | None) -> Chosen:
         return Chosen(PLAIN._replace(scene=f"-var auto {name}"), lines, accuracy)
     rows = ((choice, _written(choice.lines, facts)) for choice in CHOICES if choice.when(facts))
     fit = (Chosen(choice, lines, accuracy) for choice, lines in rows if _runs(hub, lines))
-    chosen = next(fit, Chosen(PLAIN, PLAIN.lines, accuracy))
+    plain = (lines for lines in (PLAIN.lines, *zip(NEUTRAL)) if _runs(hub, lines))
+    chosen = next(fit, None) or Chosen(PLAIN, next(plain, PLAIN.lines), accuracy)
     if accuracy is None or not hub.checking:
         return chosen
     named = {other: _written(lines, facts) for other, lines in ALTERNATIVES.items()}

@@ -156,10 +156,16 @@ def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | 
 
 
 def in_parentheses(arguments: Sequence[Argument]) -> str | None:
-    """Suggest velocity=(0, -2) for velocity=0, -2."""
+    """Suggest velocity=(0, -2) for velocity=0, -2, and n=0.4 for n=0,4."""
     for one, two in pairwise(arguments):
         if (named := one.keyword()) and NUMBER.fullmatch(two.text):
-            return f"in parentheses: {named[0]}=({named[1].text}, {two.text})"
+            name, first = named[0], named[1].text
+            vector = f"in parentheses: {name}=({first}, {two.text})"
+            begins = one.mark.column + one.mark.length + 1
+            decimal = first.isdigit() and two.text.isdigit() and begins == two.mark.column
+            return (
+                f"with a decimal point: {name}={first}.{two.text}; {vector}" if decimal else vector
+            )
     return None
 
 

@@ -348,7 +348,7 @@ def run(options: Namespace) -> int:
     timed = options.cost in ("seconds", "wall_s", "particle_steps_per_s")
     plan = variables.family(options, timed=timed)
     values = plan.values
-    items = records.recorded(options.accuracy, plan.script, values)
+    items = records.recorded(options.accuracy, plan.script, values, "-accuracy")
     if len(items) != 1:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:

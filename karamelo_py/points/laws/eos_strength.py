@@ -226,11 +226,12 @@ suggestion(
 )
 
 
-suggestion(
+known_failure(
     EosStrength,
+    "heat flux of material '{owner.id}'",
     when=lambda law, scene: diffuses_energy(law) and not scene.hub.update.thermal,
-    cost="Qh of material {owner.id} has no effect: no heat flows",
-    instead="method(..., thermo-mechanical), or leave Qh out",
+    reason="Qh has no effect, because no heat flows in a mechanical method",
+    cure="method(..., thermo-mechanical), or no Qh",
 )
 
 
@@ -255,7 +256,7 @@ known_failure(
     when=lambda law, scene: (
         _supersonic(law, scene)
         and not isinstance(law.viscosity, Absent)
-        and not (diffuses_energy(law) and scene.hub.update.thermal)
+        and not diffuses_energy(law)
     ),
     reason="artificial viscosity initially overheats a gas that hits a wall, an axis or a "
     "point: its density there stays too low, around a point by half at four cells and by a "

@@ -12,7 +12,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Fix
 from karamelo_py.scene.region import Region
 from karamelo_py.scene.solid import Solid
-from karamelo_py.script.errors import Mark, ScriptError, plural
+from karamelo_py.script.errors import Mark, ScriptError, plural, unknown
 from karamelo_py.styles.fixes.formulas import judge_friction
 from karamelo_py.styles.fixes.rigid_body import Components, RigidBody
 
@@ -44,9 +44,9 @@ class Party(NamedTuple):
         ID, mark = argument.word() or argument.text, argument.mark
         solid = hub.solids.get(ID)
         if solid is None and ID not in hub.regions:
-            candidates = ", ".join([*(s.id for s in hub.solids.values() if s.rigid), *hub.regions])
+            rigid = (solid.id for solid in hub.solids.values() if solid.rigid)
             message = f"there is no solid and no region '{ID}'"
-            raise ScriptError(message, mark=mark, expected=candidates or cls.script_kind)
+            raise unknown(message, ID, dict.fromkeys([*rigid, *hub.regions]), mark=mark)
         region = look_up(hub.regions, argument) if solid is None else solid.region
         if solid is not None:
             _require_rigid(solid, mark)
