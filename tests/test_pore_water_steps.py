@@ -146,6 +146,25 @@ def mandel(nu, k, force, a, b):
     return centre, -b * force * (1 - nu) / 2 / G / a, terms, rates, c, p0
 
 
+PLATES = """
+dimension(2, 0, 1, 0, 0.5, 1/N)
+region(layer, block, 0, 1, 0, 0.5)
+material(clay, linear, 1590, 1e7, 0.2)
+pore_water(clay, n=0.4, permeability={k})
+solid(clay, region, layer, 2, clay, 1/N, 0)
+region(bottom, block, -INF, INF, -INF, 1e-6)
+region(top, block, -INF, INF, 0.5 - 1e-6, INF)
+region(left, block, -INF, 1e-6, -INF, INF)
+region(right, block, 1 - 1e-6, INF, -INF, INF)
+group(bottom, nodes, region, bottom, all)
+group(top, nodes, region, top, all)
+group(left, nodes, region, left, all)
+group(right, nodes, region, right, all)
+fix(base, velocity_nodes, bottom, NULL, 0)
+fix(axis, velocity_nodes, left, 0, NULL)
+"""
+
+
 @pytest.mark.parametrize("cells", [8, pytest.param(16, marks=pytest.mark.full)])
 def test_the_pressure_rises_first_as_mandel_and_cryer_found(run_script, cells):
     """Between plates, the pressure at the centre rises by 11 % before it falls."""
@@ -160,21 +179,7 @@ def test_the_pressure_rises_first_as_mandel_and_cryer_found(run_script, cells):
         N = {cells}
         method(tlmpm, FLIP, linear, 1)
         scheme(quasi-static)
-        dimension(2, 0, 1, 0, 0.5, 1/N)
-        region(layer, block, 0, 1, 0, 0.5)
-        material(clay, linear, 1590, 1e7, 0.2)
-        pore_water(clay, n=0.4, permeability=1e-8)
-        solid(clay, region, layer, 2, clay, 1/N, 0)
-        region(bottom, block, -INF, INF, -INF, 1e-6)
-        region(top, block, -INF, INF, 0.5 - 1e-6, INF)
-        region(left, block, -INF, 1e-6, -INF, INF)
-        region(right, block, 1 - 1e-6, INF, -INF, INF)
-        group(bottom, nodes, region, bottom, all)
-        group(top, nodes, region, top, all)
-        group(left, nodes, region, left, all)
-        group(right, nodes, region, right, all)
-        fix(base, velocity_nodes, bottom, NULL, 0)
-        fix(axis, velocity_nodes, left, 0, NULL)
+        {PLATES.format(k=1e-8)}
         fix(plate, velocity_nodes, top, NULL, ({plate} + {at_once}*(time < {1.5 * first}))/dt)
         fix(drain, pore_pressure, right, 0)
         compute(centre, probe, all, pore_pressure, x=0, y=0)
@@ -210,21 +215,7 @@ def test_semi_implicit_steps_have_the_pressure_of_mandel_and_cryer(run_script, c
         N = {cells}
         method(tlmpm, FLIP, linear, 1)
         scheme(semi-implicit)
-        dimension(2, 0, 1, 0, 0.5, 1/N)
-        region(layer, block, 0, 1, 0, 0.5)
-        material(clay, linear, 1590, 1e7, 0.2)
-        pore_water(clay, n=0.4, permeability=1e-3)
-        solid(clay, region, layer, 2, clay, 1/N, 0)
-        region(bottom, block, -INF, INF, -INF, 1e-6)
-        region(top, block, -INF, INF, 0.5 - 1e-6, INF)
-        region(left, block, -INF, 1e-6, -INF, INF)
-        region(right, block, 1 - 1e-6, INF, -INF, INF)
-        group(bottom, nodes, region, bottom, all)
-        group(top, nodes, region, top, all)
-        group(left, nodes, region, left, all)
-        group(right, nodes, region, right, all)
-        fix(base, velocity_nodes, bottom, NULL, 0)
-        fix(axis, velocity_nodes, left, 0, NULL)
+        {PLATES.format(k=1e-3)}
         fix(plate, velocity_nodes, top, NULL, {velocity})
         fix(drain, pore_pressure, right, 0)
         fix(p, initial_pore_pressure, all, {p0})

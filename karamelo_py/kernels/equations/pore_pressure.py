@@ -170,7 +170,7 @@ class Foresee(NamedTuple):
             across += share * w * water[n, pores.of_pressure(kin) + d + k]
         is_open = pores.is_open(nodes, n)
         closed = real(0, dt) if is_open else per_volume
-        supply = real(0, dt) if is_open else pores.supply_at(nodes, kin, n)
+        supply = real(0, dt) if is_open else pores.mass_given(nodes, kin, n, False)
         supply *= water[n, of_V + 1] * per_mass * per_volume
         numbers = (drag.taken * share, share, dt * drag.taken * per_mass)
         put_at(out, n, 4 * d, (*numbers, closed, real(0, dt), closed * across + supply))

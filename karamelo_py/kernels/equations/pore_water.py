@@ -432,26 +432,17 @@ def _faces(nodes, kin, n):
     return [*areas, sqrt(squared), V]
 
 
-def supply_at(nodes, kin, n):
-    """Return the mass flow rate of water that fixes will supply to a node."""
+def mass_given(nodes, kin, n, store):
+    """Return the mass flow rate of water that fixes supply to a node; `store` it by `WAYS`."""
     supply = field(nodes.fields, GivenFlux)
     whole = real(0, nodes.sums[n, 0])
     if supply is None:
         return whole
     for k, size in enumerate(_faces(nodes, kin, n)):
-        whole += supply[n, k] * size
-    return whole
-
-
-def _mass_given(nodes, kin, n):
-    """Return the mass flow rate of water into a node; store it by `WAYS`."""
-    supply = field(nodes.fields, GivenFlux)
-    whole = real(0, nodes.sums[n, 0])
-    if supply is None:
-        return whole
-    for k, size in enumerate(_faces(nodes, kin, n)):
-        supply[n, k] *= size
-        whole += supply[n, k]
+        given = supply[n, k] * size
+        if store:
+            supply[n, k] = given
+        whole += given
     return whole
 
 
@@ -624,7 +615,7 @@ def _make_flux(task, kin, nodes, n, dt):
         enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
         drained = drained and not enters
     closed = not drained and _is_rim(nodes, kin, n, task.rim)
-    supply = _mass_given(nodes, kin, n)
+    supply = mass_given(nodes, kin, n, True)
     stays = across + supply if closed else supply
     leaves = across + supply if drained else real(0, dt)
     columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
