@@ -46,8 +46,8 @@ NEUTRAL = (
 )
 
 CROSSED = 0.1  # number of cells through which stressed material may move
-TRANSITS = 10  # of waves through a body, below which loads are not slow
-SLOWLY = 0.4  # change of a load in a transit / range
+TRANSITS = 10  # transits of a wave through a body in a run below which no load is slow
+SLOWLY = 0.4  # change of a slow load in a transit / range of the load
 FILLED = 0.85  # area of a block / area of its box, which three Gauss points per cell exceed
 FAST = 0.005  # fraction of the wave speed above which impacts cause shocks
 

@@ -163,7 +163,7 @@ def _thin(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 class Fewer(NamedTuple):
-    """Replaces a scene in fewer dimensions, for warnings of inclined material directions."""
+    """The scene with fewer dimensions, as seen by the rules for inclined material directions."""
 
     hub: Hub
     d: int

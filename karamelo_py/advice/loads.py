@@ -40,7 +40,7 @@ def extent(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rollers(hub: Hub) -> dict[int, Roller]:
-    """Return symmetry planes by direction; not for directions with planes at both ends."""
+    """Return symmetry planes by direction, except directions with planes at both ends."""
     found: dict[int, Roller] = {}
     solids = [solid for solid in hub.solids.values() if solid.count]
     if not solids:

@@ -169,7 +169,7 @@ def begun() -> None:
 
 
 def _one_file(arguments: list[str]) -> list[str]:
-    """Replace several files after -restart, which a shell has inserted, by the last of them."""
+    """If a shell has expanded the name after -restart to several files, retain the last one."""
     chosen: list[str] = []
     for word in arguments:
         before = chosen[-1] if chosen else ""

@@ -36,8 +36,9 @@ def modify(hub: Hub, kind: str, ID: str, *numbers: Argument) -> None:
     -----
     The next run uses the new constants, without compilation. A stress outside the new yield surface
     is returned to it in the first step. If an elastic modulus changes, incremental laws retain
-    their stress; with laws of the total deformation, the stress changes at once. The density
-    (points have masses) and constants of the initial state, such as pc of cam-clay, are fixed.
+    their stress; with laws of the total deformation, the stress changes at once. The density cannot
+    change, since points have masses; nor can constants of the initial state, such as pc of
+    cam-clay.
 
     ``material`` also changes constants of parts of eos-strength, if only one part has that name.
 

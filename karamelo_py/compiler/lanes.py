@@ -365,7 +365,7 @@ def _gather(array, at):
 
         if array.ndim > 1:
             return apart()
-        # For parameters of laws, as most groups have a single material.
+        # Most groups have a single material, so parameters of the law are loaded as plain numbers.
         one = all_same(builder, values[0])
         return _either(builder, one, lambda: splat(builder, of(0), lanes), apart)
 

@@ -198,7 +198,7 @@ def _address(lowering: Any, name: str, run: Callable, count: int) -> Value:
 
 @in_kernels
 def _task(lowering: Any, function: Any, items: tuple) -> tuple[Value, Value]:
-    """Store items; return the address of a function of them and an index, and their address."""
+    """Store items; return the address of a function of items and index, and the items' address."""
     kind = HeldTuple(tuple(held_type(types.unliteral(lowering.kind_of(item))) for item in items))
     stored = held_as(lowering, items, kind)
     task = _address(lowering, function.seen.__qualname__, _Task(function.seen, kind), 2)

@@ -1,6 +1,6 @@
 """Records of arrays, and nested tuples as flat sequences.
 
-Comprehensions make lists: interpreted, this takes 67 % of the time that tuples take.
+Comprehensions build lists, which take 67 % of the time of tuples when interpreted.
 """
 
 

@@ -100,7 +100,7 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    # (3,) int64: how many occupied tiles, parts of the points, and parts for other processes
+    # (3,) int64: number of occupied tiles; of parts of the points; of parts for other processes
     count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
@@ -123,7 +123,7 @@ CLEAR, TAKE, ADD = range(3)  # last column of Buffers.parts
 
 
 class Buffers(NamedTuple):
-    """Sums of point tiles in dense boxes of nodes, one after another.
+    """Buffers to which the points of tiles scatter: dense boxes of nodes, one after another.
 
     A tile of nodes adds the boxes that reach it in a fixed order, and then sets them to 0. The
     parts of a tile are ranges of nodes that overlap a box; an additional first part clears nodes
@@ -238,7 +238,7 @@ class Hooks(NamedTuple):
     holders: np.ndarray  # (N, d) HELD if several hooks hold the same nodes, else (0, d)
     loads: np.ndarray  # (N, d) loads in this step if hooks apply forces, else (0, d)
     rigid_fields: np.ndarray  # (F,) bool: rigid velocity fields, of N/F nodes each; or (0,)
-    torques: np.ndarray  # (values,) slot of the torque of a force's slot, or 0
+    torques: np.ndarray  # (values,) for the slot of a force: slot of its torque, or 0
     mode: Tag  # one or several threads
     apart: Apart
     whole: tuple  # tags of hooks on whole points

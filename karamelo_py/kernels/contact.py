@@ -76,7 +76,7 @@ class ContactImpulse(StepField):
 
 
 class StrainingChange(Field):
-    """Change of the velocity that strains a node, by the last active contact there."""
+    """Change of the velocity with which a node strains points, by the last active contact."""
 
     shape = staticmethod(lambda kin: kin.dimension)
 
@@ -124,7 +124,7 @@ class Bodies(NamedTuple):
 def around_of(kin, contact, nodes, pair, again):
     """Return sliding speed around the axis, its change per impulse, and speed before the step.
 
-    `again`: by the velocities that strain points, instead of w*. Returns () without rotation.
+    `again`: from the velocities that strain points, instead of w*. Returns () without rotation.
     """
     return ()
 
@@ -495,7 +495,7 @@ def _friction_of(yielding, friction, push, slide, share):
 
 @noinline
 def _meet(contact, nodes, n):
-    """List the fields that meet at node `n`; return their number, 0 if `n` is not in the first."""
+    """List the fields that meet at node `n`; return their number (0 if `n` is not in the first)."""
     if not nodes.sums[n, MASS] > 0:
         return 0
     a = n // contact.stride
@@ -639,7 +639,7 @@ def _touch_place(bodies, control, count, where):
 
 @noinline
 def _count_work(control, n, work):
-    """Add work of contact on the body of a node; minus its sum over bodies is the loss."""
+    """Add the work of contact on a node's body; the loss is minus the sum over all bodies."""
     if counts(control.ranks, n):
         add_to(control.totals, WORK, work)
         add_to(control.totals, CONTACT_LOSS, -work)

@@ -57,7 +57,7 @@ def _take_around_twisted(kin, bodies, control, sides, impulse):
 
 @contact.work_around.on(Twisted)
 def _work_around_twisted(kin, nodes, n):
-    """Return the work with the mean of the angular velocities before the step and w*."""
+    """Return the work, with the mean of the angular velocity before the step and w*."""
     sums, update = field(nodes.fields, SumsAround), field(nodes.fields, UpdateAround)
     impulse = field(nodes.fields, contact.ContactImpulse)[n, AROUND]
     return float(0.5 * impulse * (sums[n, 1] / sums[n, 0] + update[n, 0]))

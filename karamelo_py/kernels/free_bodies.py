@@ -164,7 +164,7 @@ def _recall(grip, control, state, contact):
     contact.usual, contact.spare = times.kick * memory[3], times.kick * (1 - NEW) * memory[4]
     stiff = SOFT * times.kick / (times.contact_dt * times.contact_kick)
     slid = motion.from_start(state, (memory[6] - at[0], memory[7] - at[1], memory[8] - at[2]))
-    for c in range(3):  # by positions, as velocities are noisy
+    for c in range(3):  # from positions, as velocities are noisy
         contact.hold[c] = times.kick / contact.mass * memory[c] + stiff * slid[c]
         along += contact.normal[c] * contact.hold[c]
     for c in range(3):

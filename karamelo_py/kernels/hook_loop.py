@@ -469,7 +469,7 @@ def _change_velocity(members, call, c, q):
     # Strain before the forces uses the velocity of the last step, and the hooks that held it.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
-    # v* is of the last step
+    # v* is from the last step
     remaps = hook.stage == arrays.POST_VELOCITIES_TO_GRID
     star = last if remaps or (strains_first and last == value) else v
     state, force = (nodes.sums[n, arrays.MASS], v, star), nodes.sums[n, arrays.of_force(kin) + c]
@@ -552,7 +552,7 @@ def _act_on_whole_nodes(members, task, call, count):
 
 
 def without_whole(hooks):
-    """Omit functions of whole points, for which loops would be compiled again."""
+    """Omit functions of whole points: with them, loops would be compiled again."""
     return arrays.with_items(hooks, whole=())
 
 
@@ -724,7 +724,7 @@ def _act_on_warmth(members, task, call, count):
 
 
 def _of_time(tag, kin, call):
-    """Return formulas of time now and at the end of the step; dt and kick of contacts; the kick."""
+    """Return the formulas of time now and at the end of the step, dt and kick of contact, kick."""
     values = []
     for shift in (0.0, call.dt):
         for c in range(kin.dimension):
@@ -795,7 +795,8 @@ def _begin_or_end_totals(stage, hooks, control, begin):
 def point_hooks(stage, then, hooks, s, arguments_of):
     """Call the point functions of `stage` in each block.
 
-    `arguments_of` has two functions: arguments of a block's point functions, its heat arrays.
+    `arguments_of` holds two functions: one returns the arguments of a block's point functions, the
+    other its heat arrays.
     """
     control, without, (what_of, heat_of) = s.control, without_whole(hooks), arguments_of
     call = Call(without, control, step_size(s), NONE, 1.0)

@@ -5,9 +5,9 @@ formula for blocks of members and call the function by address, so only new func
 
 Node function ``(node: OneNode) -> (v, v_star, force, total)``: `value` and `before` are the formula
 at the step's time and one step earlier; `share` is 1 / number of members with mass; `kick` is half
-of the last step plus half of this one. Totals are published, plus the momentum per kick by which a
-change of v before the update changes points. Where several hooks hold a node, the last one that
-sets v_star to its value applies and gets the totals of the other hooks. If the velocity that
+of the last step plus half of this one. Totals are published; they include, per kick, the momentum
+that points gain if v is changed before the update. Where several hooks hold a node, the last one
+that sets v_star to its value applies and gets the totals of the other hooks. If the velocity that
 strains points is mapped separately, hooks also set v of it; before the forces (usf, usavg), hooks
 that hold set it to v_star.
 

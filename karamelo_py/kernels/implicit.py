@@ -322,7 +322,7 @@ def by_gradient(kin, h, C):
 
 
 def by_displacement(kin, D, g):
-    """Return df/du (d d), u at a node with gradient g, from df/dH (d t), f at another node."""
+    """Return df/du (d d) from df/dH (d t), for f at one node, and u at one with gradient g."""
     d, t = len(kin.Unknown._fields), kin.tensor_size
     return tuple(
         [

@@ -534,7 +534,7 @@ def _try(links, bodies, fraction, bounded):
 
 @noinline
 def _fall(links, rest):
-    """Return the residual times the Newton step, the slope along the step."""
+    """Return the slope along the Newton step: the product of residual and step."""
     m, total = links.slope.shape[0], 0.0
     for n in range(links.free.shape[0]):
         for a in range(6):
@@ -678,7 +678,7 @@ def _hit(links, link):
 
 @noinline
 def _solve_three(W, p):
-    """Solve W p = b, W (3, 4) symmetric with b last, by the adjugate."""
+    """Solve W p = b by the adjugate; W (3, 4) is symmetric, with b as last column."""
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         total = 0.0

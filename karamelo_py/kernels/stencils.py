@@ -53,7 +53,7 @@ def give_affine(lanes, w, stencil, parts):
 
 
 def gathered_by_arms(w):
-    """Return (a,) if a point stores a sum_I N_I v*_I (X_I - x)^T away from walls, else ()."""
+    """Return (a,) if the moment away from walls is a sum_I N_I v*_I (X_I - x)^T, else ()."""
     return transfers.by_arms(w.transfer, inverse_spread(w.basis, w.grid))
 
 

@@ -170,7 +170,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of a pass; strain depends on an earlier move, and on the step of velocity."""
+    """List the tasks of a pass. Strain depends on an earlier move and the velocity's step."""
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -180,7 +180,7 @@ def _tasks(gathers: list[Gather]) -> tuple:
 
 
 def _kinds(tags: Any) -> Any:
-    """Return the classes of tags; tags without numbers would compare equal."""
+    """Return the classes of tags; tags of different classes may compare equal."""
     return tuple(_kinds(tag) if type(tag) is tuple else type(tag) for tag in tags)
 
 
@@ -233,7 +233,7 @@ def fused(rows: Iterable[Any]) -> list[Any]:
 
 
 def staged(rows: Iterable[Any]) -> list[Any]:
-    """List the rows one by one; each is a part of a pass of the fused step if possible."""
+    """List the rows as separate passes, each taken from a fused pass where possible."""
     rows = list(rows)
     return one_by_one(rows, _FusedStep(rows).visits)
 

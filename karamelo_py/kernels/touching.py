@@ -122,7 +122,7 @@ def push(terms, memory, p, near):
     d, last_dt, closer = len(x), dt, dt * dot(slip, normal)
     ball, aside = reach_of(lever, p, whole, d)
     rate = spring_rate(lever[d + RATE, p], STIFF / (contact_dt * contact_kick), within, reach)
-    if lever[d + RATE, p] > 0:  # by positions, as velocities are noisy
+    if lever[d + RATE, p] > 0:  # from positions, as velocities are noisy
         closer, last_dt = within + ball + aside - float(lever[d + DEPTH, p]), 2 * kick - dt
     else:
         ball = ball_at_first(ball, within, closer)
@@ -137,7 +137,7 @@ def push(terms, memory, p, near):
     hold = x._make([float(grip[k, p]) for k in range(d)])
     mean, unused = float(grip[d, p]), float(grip[d + 1, p])
     slid = x - x
-    if mean > 0:  # by positions, as velocities are noisy
+    if mean > 0:  # from positions, as velocities are noisy
         slid = x._make([float(grip[d + 2 + k, p]) for k in range(d)]) - x
         slip = 1 / (2 * kick - dt) * slid
     hold = along(hold + mass * rate * slid, normal)

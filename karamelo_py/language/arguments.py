@@ -99,7 +99,7 @@ class Argument:
         return self._interpreter.evaluate(parse_expression(self._raw), self._raw)
 
     def take(self, numbers: dict[str, Argument]) -> list[str]:
-        """Store `numbers` of the call for the formula; return names that the formula lacks."""
+        """Store the `numbers` of the call; return the names that the formula does not use."""
         self._numbers = numbers
         return [name for name in numbers if name not in _NAME.findall(self.text)]
 

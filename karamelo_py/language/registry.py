@@ -94,7 +94,7 @@ def _of_module(family: str, name: str) -> EntryPoint | None:
 
 
 def forget_other(module: str) -> bool:
-    """Remove an imported module of another folder; return True if this folder has that module."""
+    """Forget a module imported from another folder; return True if this folder has it, too."""
     spec, loaded = PathFinder.find_spec(module), sys.modules.get(module)
     if spec and loaded and loaded.__spec__ and loaded.__spec__.origin != spec.origin:
         for name in [name for name in sys.modules if f"{name}.".startswith(f"{module}.")]:

@@ -1,4 +1,4 @@
-"""Nodes of a simulation, accessed by number: all at once, or a limited number at a time."""
+"""Access to the nodes of a simulation by their numbers: all at once, or in batches."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class Backend(SceneState, Protocol):
     rollback: RollbackPoint | None
     states_every: int
     repeats_steps: bool
-    remedy: str  # changes of the scene that may prevent the failure of a step
+    remedy: str  # changes to the scene that may avoid the failed step
 
     def begin(self, end_time: float) -> None: ...
     def go_on(self, end_time: float, halvings: int) -> None: ...

@@ -46,7 +46,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Largest distance from the rotation axis of an ellipsoid that fills the bounding box."""
+        """Largest distance from the rotation axis to the ellipsoid in the bounding box."""
         w, half = self.turning, np.zeros(3)
         half[: len(self.centre)] = (self.high - self.low) / 2
         across = np.dot(w, w) * np.eye(3) - np.outer(w, w)

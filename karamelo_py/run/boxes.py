@@ -1,4 +1,4 @@
-"""Boxes of nodes, spans of node numbers, and buffers for the contributions of points."""
+"""Boxes: the nodes that the points of one tile can reach, and the buffers for their sums."""
 
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ class Boxes(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """Pairs of a box and a tile of nodes that overlap."""
+    """Overlaps between boxes and tiles of nodes, one entry per pair."""
 
     box: np.ndarray  # (k,)
     tile: np.ndarray  # (k,)
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for each item of k lists, the index of its list and its index in the list."""
+    """Return, for all items of `counts` lists, the list's number and the index in the list."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -128,13 +128,13 @@ def summed(nodes: Nodes) -> list[np.ndarray]:
 
 
 def read_beside(nodes: Nodes) -> list[np.ndarray]:
-    """Return arrays that must be zero at nodes next to the nodes in use."""
+    """Return arrays that must be zero at the nodes next to the nodes in use."""
     beside = field(nodes.fields, Acceleration)
     return summed(nodes) + ([] if beside is None else [beside])
 
 
 def beyond(contact: Tag) -> int:
-    """Return how many cells beyond the nodes in use contact reads."""
+    """Return the number of cells beyond the nodes in use that contact reads."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 
@@ -150,7 +150,7 @@ def give_up(array: np.ndarray) -> None:
 
 
 def grow(array: np.ndarray, rows: int) -> None:
-    """Resize an array in place, since setups refer to it."""
+    """Resize an array in place, because setups hold references to it."""
     if len(array) < rows:
         forget_array(array)
         array.resize((rows + rows // 8, *array.shape[1:]), refcheck=False)

@@ -29,7 +29,7 @@ NORMAL = COMPONENTS[:3]
 
 @dataclass
 class LoadPath(Named):
-    """Strains and stresses at the end of a load path; strains not named do not change."""
+    """Strains and stresses at the end of a load path; components not named do not change."""
 
     increments: int
     duration: float
@@ -270,14 +270,14 @@ class Point:
     def _turned(self, angle: float, dt: float) -> np.ndarray:
         """Return dt grad v (3, 3) of a rotation about z that a law takes as rigid.
 
-        To first order it is skew. The second-order part depends on the law: its strain follows from
-        the symmetric part and its volume from det F, or both follow from F.
+        To first order it is skew. The second-order part depends on how the law computes strain and
+        volume: strain from the symmetric part and volume from det F, or both from F.
         """
         if angle == 0:
             return np.zeros((3, 3))
         skew = np.zeros((3, 3))
         skew[1, 0], skew[0, 1] = angle, -angle
-        # In the first case, volume is constant if (1 + a) ((1 + a)^2 + angle^2) = 1.
+        # In the first case, the volume is constant if (1 + a) ((1 + a)^2 + angle^2) = 1.
         roots = np.roots([1, 0, angle**2, -1])
         same_volume = float(roots[np.argmin(np.abs(roots - 1))].real) - 1
         exact = np.sin(angle) / angle * skew + (np.cos(angle) - 1) * np.diag([1, 1, 0])

@@ -28,13 +28,14 @@ from karamelo_py.run.state import SceneState
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import moved
 
-GROWING = 2  # windows of growth before a warning
+GROWING = 2  # consecutive windows with growth before a warning
 
 
 def unknown_work(hub: Hub) -> str:
     """Return the source of work that is not tracked, or "".
 
-    Work of compiled hooks is summed. Python fixes declare by `Fix.conserves` that they do none.
+    Work of compiled hooks is summed. A Python fix that does no work declares this by
+    `Fix.conserves`.
     """
     method, implicit = hub.update.method, hub.update.scheme.traits.implicit
     apart = method.own_grids or (implicit and method.fields_per_solid)
@@ -82,7 +83,7 @@ class EnergyWatch:
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if watch.watch_energy:
-            # Velocities are half a step old, stresses the fraction `strained_before` of a step.
+            # Velocities lag by half a step, stresses by the fraction `strained_before` of a step.
             self._begin_to_look(0.25 + 0.5 * update.scheme.traits.strained_before, anew)
         counted = simulation.notes_temperatures and not unknown_heat(simulation.hub)
         heat.watch_heat = int(update.thermal and counted)
@@ -151,7 +152,8 @@ class EnergyWatch:
             return False
         if not watch.watch_energy:
             return True
-        # Use the last window, too: noise that grows by 50 % in 100 steps is in the state already.
+        # Include the last window: noise that grows by 50 % in 100 steps has already spoiled the
+        # state.
         before = watch.first_mean if watch.looks >= FEW else watch.first_balance
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
@@ -163,7 +165,7 @@ class EnergyWatch:
     def change(self) -> float | None:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
-        # Relative to the first balance, which `forget_growth` does not change.
+        # Relative to the first balance, which `forget_growth` leaves unchanged.
         return -100 * self.share_lost()
 
     def forget_growth(self) -> None:

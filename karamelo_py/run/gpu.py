@@ -30,7 +30,7 @@ from karamelo_py.run.checkpoint.arrays import kept_at_nodes, of_nodes
 from karamelo_py.script.formula import GLOBAL, UNIFORM, evaluate_in_table
 
 POLL = 64  # steps between reads of `fate`
-FAR = 1.0  # path of points in cells after which they are reordered
+FAR = 1.0  # distance in cells that points move before they are reordered
 PARTS = "begin", "step", "last step", "before", "behind", "order"  # names of launches
 Hooks = tuple[arrays.Hooks | arrays.NoHooks, Sequence[Callable]]
 NO_HOOKS: Hooks = arrays.NoHooks(), ()
@@ -64,15 +64,15 @@ def as_rows(image: np.ndarray) -> np.ndarray:
 def _no_formula(*_): ...
 
 
-def _no_hook(m, v, star, force, *_):  # the loops contain a call of it that is never made
+def _no_hook(m, v, star, force, *_):  # the loops refer to it, but never call it
     return v, star, force, force
 
 
 class StepsOnCard:
     """Steps of a lowered scene on a GPU.
 
-    `program` contains the classes of the scheme and its passes, `hooks` the compiled hooks and
-    their functions in the order of the table of hooks.
+    `program` holds the classes of the scheme and of its passes; `hooks`, the compiled hooks and
+    their functions, in the order of the table of hooks.
     """
 
     def __init__(
@@ -163,7 +163,7 @@ class StepsOnCard:
         if not row.gathers:
             for block, cells in pairs:
                 yield self.of_points(visit.load_point, block, cells)
-        # If cells belong to reference positions, points are sorted only once.
+        # If stencils belong to reference positions (total frame), one sort is enough.
         if visit.lists and (s.frame.moves or not self.begin):
             for block, cells in pairs:
                 yield self.of_points(visit.count, block, cells)
@@ -220,7 +220,7 @@ class StepsOnCard:
         return any(program.begin < program.end for program in self.hooks.programs[h])
 
     def _values(self, h: int) -> int:
-        """Return the number of published values (one step old) that threads copy for formulas."""
+        """Return how many published values (one step old) threads copy for formulas."""
         if not (self.table[h].uses_before and self._has_formulas(h)):
             return 0
         return 1 + max(self._slots_read(), default=0)
@@ -323,7 +323,7 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish a hook's totals right after it, if formulas read published values of hooks."""
+        """Publish a hook's totals right after it, if formulas read values that hooks publish."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []

@@ -48,7 +48,7 @@ class StepPolicy(NamedTuple):
         return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:
-        """Return clock fields for points whose longest `path` so far is in cells."""
+        """Return clock fields for points whose longest path so far is `path`, in cells."""
         (courant, share), scale = self.still if path <= STILL else self.moving, 1 / 2**halvings
         return {
             "courant": courant,

@@ -1,4 +1,4 @@
-"""Tiles of grids: points in them, nodes that these points reach, and nodes in use."""
+"""Tiles: blocks of grid cells with their points, the nodes in reach, and the nodes in use."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
@@ -88,7 +88,7 @@ class Tiles:
         shaped = shape_size(type(basis), d) > 0
         self._most_rows = inf if shaped else most
         rows = np.prod(widest[:, :-1], axis=1, dtype=np.int64).max()
-        # A long tile has points that spread at one end: the nodes in use are stored per row.
+        # Points of a long tile may spread at one end only, so the nodes in use are stored per row.
         by_rows = self.long and not shaped and not self.direct
         self._most_in_box = int(rows) if by_rows else 0
         self.count = int(self.first[-1])
@@ -158,7 +158,7 @@ class Tiles:
         self.sorts += 1
 
     def _reach(self, s: Setup, block: Block, x: np.ndarray) -> float:
-        """Return a bound, valid until the next sort, of the distance in cells from `x` to nodes."""
+        """Bound the distance in cells from `x` to its nodes; valid until the next sort."""
         far = 0.0
         if len(x) > self.dimension:
             at = OnGrids(s.basis, s.kin, s.grids, block.points.grid, x)
@@ -183,8 +183,8 @@ class Tiles:
         points, tiling = block.points, block.tiling
         x = self._where(s, points)
         reach = self._reach(s, block, x)
-        # Use several parts per thread, as tiles differ in size. With few points use one: the first
-        # thread would finish before others start.
+        # Use several parts per thread, as tiles differ in size. With few points use one part: the
+        # first thread would finish before the other threads start.
         n, mode = x.shape[1], self.mode
         parts = min(4 * self.threads, n // PART, 4 * n // self.count)
         if self.threads == 1 or parts < 2:
@@ -364,7 +364,7 @@ class Tiles:
     def _see_nodes(
         self, tiles: np.ndarray, grid: np.ndarray, begin: np.ndarray, end: np.ndarray
     ) -> None:
-        """Note tiles of nodes that are in use, and the nodes from `begin` to `end` in them."""
+        """Record tiles of nodes in use, and their nodes from `begin` to `end`."""
 
     def _parts(self, grid, begin, end, first, steps) -> np.ndarray:
         """Return `Buffers.parts` of the nodes (k, d) from `begin` to `end` of grids.

@@ -18,8 +18,8 @@ EDGE = 0.05  # tolerance for the smallest sub-boxes
 SHEET = 0.01  # tolerance for a surface that may belong to a thin sheet
 LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off / box size
-# Largest part of a box that may consist of smallest sub-boxes with a curved surface. A corner in 2D
-# or an edge in 3D has 1/3 of ROUGH; thin sheets have more.
+# Tolerated fraction of a box in smallest sub-boxes whose surface is not plane. It is ROUGH/3 at a
+# corner in 2D or an edge in 3D, and larger in thin sheets.
 ROUGH = 0.025
 MOSTLY = 0.1
 FACE = 2  # pieces of a box face per direction
@@ -30,7 +30,7 @@ class Pieces(NamedTuple):
     number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) of the box volume
-    # (m,) part of each box in smallest sub-boxes with a curved surface
+    # (m,) fraction of each box in smallest sub-boxes whose surface is not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
@@ -44,7 +44,8 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
     Returns the mask of boxes that reach into the region, and the pieces of cut boxes.
 
-    Boxes are first cut at the domain and the region's bounding box: faces along axes are exact.
+    Boxes are first cut at the domain and the region's bounding box, so that faces along axes are
+    exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -171,7 +172,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
         covered = []
         for side in (-0.5, 0.5):
             at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
-            # A box face that lies in the surface is covered for neither of its boxes.
+            # A box face that lies in the surface counts as covered for neither of its two boxes.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)
@@ -199,8 +200,8 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the results of `_plane` for slopes -`m` < 0 (d, n).
 
-    The part is a simplex at the lowest corner, minus (plus, minus ...) the simplices at the other
-    corners, which lie outside the cube.
+    The volume is the simplex at the lowest corner, minus its overhangs beyond the cube, which are
+    simplices at the other corners (inclusion and exclusion).
     """
     d = len(m)
     top = mean + m.sum(axis=0) / 2

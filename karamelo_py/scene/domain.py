@@ -66,7 +66,7 @@ class Domain:
         return round((self.hi[k] - self.lo[k]) / (self.h or 1.0))
 
     def with_images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return both ends (3,) of the grid, beyond the domain in periodic directions."""
+        """Return both ends (3,) of the grid; it extends past the domain in periodic directions."""
         more = np.zeros(3)
         more[list(self.periodic)] = GHOSTS * (self.h or 0.0)
         return self.lo - more, self.hi + more

@@ -29,7 +29,7 @@ _OF_GROUPS = (
 
 
 class MachineMemory(NamedTuple):
-    """Bytes, including swap; caches that the system does not report (ZFS) are not `free`."""
+    """Memory in bytes, including swap; caches that are not reported (ZFS) are not `free`."""
 
     free: float
     whole: float
@@ -38,7 +38,7 @@ class MachineMemory(NamedTuple):
 def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory | None:
     """Return the memory available to `processes`, or None if the system does not report it.
 
-    Limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v) count.
+    Includes limits of the machine, of containers and jobs (cgroups) and of processes (ulimit -v).
     """
     import psutil
 
@@ -136,7 +136,7 @@ class Room(NamedTuple):
 
 
 def room_for_points(hub: Scene, already: int, dimension: int, state: int) -> Room:
-    """Return the room for points, each with `state` state variables.
+    """Return the memory for points and the bytes of a point with `state` state variables.
 
     A point has two positions, a velocity, a mass, the state and three integers. The last good state
     that a run stores holds a position, a velocity and the state again.

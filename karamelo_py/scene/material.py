@@ -12,7 +12,7 @@ class MaterialPart(Named):
 
     `kind` is a family such as ``eos``, and `style` its member.
 
-    `made` is the law, or `laws` are several laws by kind; `given` are the arguments.
+    `made` is the law, or several laws by kind; `arguments` are those in the script.
     """
 
     def __init__(

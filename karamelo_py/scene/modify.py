@@ -109,15 +109,15 @@ class Fix(Publisher):
     # Contact does not change these velocities.
     prescribes_velocity = False
     prescribes_rotation = False  # prescribes the angular velocity of nodes, whose torque is ID_s
-    # Directions in which nodes are held or bounded. Splines change at faces whose nodes are all
-    # held.
+    # Directions in which nodes are held or bounded. Splines are modified at faces whose nodes are
+    # all held.
     held_directions: tuple[int, ...] = ()
     # Friction coefficient (formula) of this wall in directions without a formula, or None.
     wall_friction: Any = None
     # Declared fields (`compiler.fields`); `Force` if ``initial_integrate`` sets forces on points.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    by_sizes = False  # takes sizes of points from their volumes, for a thickness of 1
+    by_sizes = False  # computes point sizes from volumes, for a thickness of 1
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes velocities of points
     reads_itself = False  # formulas may contain values that this fix publishes

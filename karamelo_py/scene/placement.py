@@ -27,7 +27,7 @@ class Placement(NamedTuple):
     """Points and their initial domains. A value that is equal for all points may be a scalar."""
 
     x0: Any  # (n, d) positions: array or Filled
-    volume: float | np.ndarray  # (n,) per thickness (2D) or cross-section (1D), without the radius
+    volume: float | np.ndarray  # (n,) per unit thickness or area, without the factor radius
     half_size: np.ndarray  # (n, d) of initial domains
     lo: np.ndarray  # (d,) of the solid
     hi: np.ndarray

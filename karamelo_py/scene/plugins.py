@@ -277,7 +277,7 @@ def _wrong_size(kind: type[Field], domain: Any) -> str:
 
 
 def _shows(hub: Scene, column: str, kind: type | None, where: str = "point_fields") -> str:
-    """Return what else shows `column`, or ""; `kind` is its field, None for a law."""
+    """Return the part that already shows `column`, or ""; `kind` is its field, None for a law."""
     if COLUMNS[where].get(column) is not None:
         return "one of every scene"
     if kind is not None and where == "point_fields" and column in hub.fields.columns_of_laws():

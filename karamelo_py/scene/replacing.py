@@ -10,7 +10,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def chosen_of(solid: Solid, kept: np.ndarray) -> Placement:
-    """Return a placement with some points of a solid.
+    """Return the placement of selected points of a solid.
 
     `kept` is a mask, or numbers that may repeat.
     """

@@ -233,7 +233,7 @@ class NodesView(View):
 
     @Shown
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d) before the momentum update; in later stages, those for the gradient."""
+        """Velocities (n, d) before the momentum update; in later stages, as used for gradients."""
         if self._on_velocity:
             return self._vectors("velocity")[self.index]
         if self._stage == arrays.POST_PARTICLES_TO_GRID:

@@ -26,7 +26,8 @@ CLOSE = (
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# A larger tolerance would accept a first correction without equilibrium; a smaller is round-off.
+# A larger tolerance would accept the first correction without equilibrium; a smaller one is below
+# round-off.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
 

@@ -171,7 +171,7 @@ def meant(name: str, names: Iterable[str], form: str = "{}") -> str | None:
 
 
 def one_of(name: str, names: Iterable[str], family: str = "", page: str = "") -> str:
-    """Return ``one of a, b, c``; if they are many, the closest one and where all are listed."""
+    """Return ``one of a, b, c``; if there are many, the closest ones and where all are listed."""
     names = list(dict.fromkeys(names))
     close = ", ".join(nearest_few(name, names))
     if len(names) <= 12 or not (close or family):

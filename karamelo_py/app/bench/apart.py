@@ -85,7 +85,7 @@ class Scaled(NamedTuple):
     points: int
     best: float  # particle-steps per second
     exchange: float  # fraction of the time that the busiest process waits
-    imbalance: float  # mean fraction of the time that processes wait beyond that
+    imbalance: float  # mean further fraction of the time that processes wait
 
 
 def scaled(job: Measurement, ranks: Sequence[int], available: int) -> Iterator[Scaled]:

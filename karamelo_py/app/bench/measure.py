@@ -32,7 +32,7 @@ MOST_STEPS = 2500  # number of steps after which points may leave the domain
 ARRAYS = 3 * 256 * 2**20  # bytes, far more than caches hold
 REPETITIONS = 5
 ALONE = 0.5  # fraction of a step above which a component limits it
-APART = 1.5  # times of separate sweeps are trusted up to this ratio to a compiled step
+APART = 1.5  # largest trusted ratio of the time of separate sweeps to the time of a compiled step
 
 
 class Workload(NamedTuple):
@@ -64,7 +64,7 @@ WORKLOADS = _read_workloads()
 
 
 class Timed(NamedTuple):
-    """A row of a step that is timed, alternately with points and without."""
+    """One row of a step, timed alternately with and without points."""
 
     mode: Any
     of_points: dict[str, list[float]]

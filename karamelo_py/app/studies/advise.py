@@ -404,7 +404,7 @@ def check(script: Path, case: Mapping[str, str], folder: str) -> Record:
 
 
 def chosen_in(script: Path, case: Mapping[str, str]) -> dict[str, Any]:
-    """Return what ``method(auto)`` chooses in a case, and what else it supports."""
+    """Return the choice of ``method(auto)`` in a case, and other set-ups that it supports."""
     with TemporaryDirectory() as folder:
         record = check(script, case, folder)
         if error := error_of(record):

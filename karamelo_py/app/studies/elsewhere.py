@@ -463,7 +463,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
 
     place = Elsewhere(parcel, send, executor, jobs, ends, client.nthreads)
     client.subscribe_topic(parcel.mark, lambda event: place.places.update([event[1]]))
-    if options.on == "local":  # they are of the terminal's group
+    if options.on == "local":  # local processes are in the process group of the terminal
         client.run(ignore_interrupts)
     _closed(ends, _in_time, connect=lambda: client.run(end_study, parcel.mark), patience=TO_CLOSE)
     return place

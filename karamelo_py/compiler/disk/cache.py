@@ -103,7 +103,7 @@ def _is_own(module: str, top: str) -> bool:
 
 
 def _words(thing: Any) -> str:
-    """Describe what determines a function, in the same words in every process."""
+    """Describe everything that determines a function, in the same words in every process."""
     if isinstance(thing, _PLAIN):
         return f"{type(thing).__name__} {thing!r}"
     if isinstance(thing, dict):

@@ -246,7 +246,7 @@ def noinline(function: Callable) -> Callable:
 def address_of(function: Callable, signature: types.Type) -> int:
     """Compile `function` (cached on disk) and return its address for kernels.
 
-    Callers do not contain the function, so they need not be compiled again for another one.
+    Callers contain only this address: for another function, they need not be compiled again.
     """
     key = function, signature, session.changes
     addresses = session.addresses

@@ -186,7 +186,7 @@ class Lowering:
         return self.read[key][0]
 
     def function(self, name: str, run: Callable, kinds: tuple, result: Any = None) -> ir.Function:
-        """Return the module's separate function for `run`; `gives` is its result type."""
+        """Return the module's separate function for `run`, whose result type is `result`."""
         module = self.builder.module
         functions = vars(module).setdefault("own", {})
         if (run, kinds) not in functions:
@@ -199,7 +199,7 @@ class Lowering:
         return functions[run, kinds]
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
-        """Write a function, and return its result type (by the code, if `result` is None)."""
+        """Write a function; return its result type, which follows from the code if not given."""
         passed = iter(values)
         with traced.writing(self):
             value = run(

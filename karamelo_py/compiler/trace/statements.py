@@ -359,7 +359,7 @@ class AstCompiler:
         return self.chain(node.values, isinstance(node.op, ast.And))
 
     def chain(self, nodes: list[ast.expr], every: bool) -> Any:
-        """Compile `and` or `or`, with the first value that decides as result, or the last value."""
+        """Compile `and` or `or`; the result is the first value that decides, or else the last."""
         value = self.do(nodes[0])
         if len(nodes) == 1:
             return value

@@ -117,7 +117,7 @@ def in_one(called: dict[Any, Callable]) -> Iterator[None]:
         _replacements.reset(before)
 
 
-all_called_in_one = _replacements.get  # None if modules call others
+all_called_in_one = _replacements.get  # None if modules may call other modules
 
 
 def in_one_module() -> bool:

@@ -189,7 +189,7 @@ def _register(kind: Any) -> None:
 
 
 class ExtensiveQuantity(NodalQuantity):
-    """Base of quantities whose sums all have a factor that is 0 in gaps, such as `mass`."""
+    """Base of quantities whose sums all contain a factor, such as `mass`, that is 0 in gaps."""
 
     masked = False
 
@@ -236,7 +236,7 @@ def is_apart(w):
 
 @reads("mass")
 def mass(pt):
-    """Return the mass given to the common sums.
+    """Return the mass that a point adds to the common sums.
 
     It is 0 for rigid points with separate sums.
     """

@@ -85,7 +85,7 @@ class CorrectAcceleration(NamedTuple):
 
 
 def _strides(grids, kin, n):
-    """Return the differences in number of adjacent nodes along the axes."""
+    """Return the strides of node numbers along the axes."""
     g = 0
     while g + 1 < grids.first.size and int(n) >= grids.first[g + 1]:
         g += 1

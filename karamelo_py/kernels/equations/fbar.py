@@ -26,7 +26,7 @@ class VolumeCorrection(StepField):
 
 
 class NodalMean(SummedField):
-    """Weighted sum and weights at a node, then the mean (volume ratios, temperatures)."""
+    """Sums of weighted values and of weights at a node; later their ratio, the mean."""
 
     shape = pair
 
@@ -100,7 +100,7 @@ def mean_stress(pt):
 
 @eq.reads("mass", "state", "material", "deformation gradient", "averaged stress")
 def minus_V_stress_beside(pt):
-    """Return -V (averaged - the point's mean stress), a tensor."""
+    """Return -V times (averaged mean stress minus the point's), a tensor."""
     _, _, f = pt.law_state_F
     V_tau, present = mean_stress(pt)
     change = present * pt.of(AveragedStress)[0, pt.p] - V_tau

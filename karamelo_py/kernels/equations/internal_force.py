@@ -67,7 +67,7 @@ def _levers(pt):
 def stretch_levers(pt, growth, mean):
     """Stretch levers by a spatial increment dt grad v, and add their work.
 
-    `mean`: forces act between two increments; otherwise within this one.
+    `mean`: the forces act between two increments, otherwise during this one.
     """
     for lever in _levers(pt):
         arm = load_vector(pt.kin, lever, pt.p)

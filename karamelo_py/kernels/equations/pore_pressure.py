@@ -63,7 +63,7 @@ def _count_below(d):
 
 
 def _rank(way):
-    """Return the index of a direction of -1, 0, 1 per axis; lower cells: below `_count_below`."""
+    """Return the index of a direction (-1, 0, 1 per axis); lower cells come first."""
     rank = 0
     for k in way:
         rank = 3 * rank + k + 1
@@ -257,9 +257,9 @@ def _growth(d, H):
 def _outflow(system, c, corners):
     """Return the volume per time that leaves cell `c`, from the velocities at its nodes.
 
-    In a rotation by w dt, volumes grow by (w dt)^2: with K/n = 5 GPa this is no small pressure.
-    This term is taken from the velocities before the step, as foreseen velocities contain noise
-    that breaks soft soil.
+    A rotation by w dt makes volumes grow by (w dt)^2, which is a large pressure if K/n is 5 GPa.
+    This term uses the velocities before the step, since predicted velocities contain noise that
+    breaks soft soil.
     """
     nodes, d, V = system.nodes, system.kin.dimension, system.cells[c, VOLUME]
     seen = [(c + offset, _row(system, c, slopes)) for _, offset, slopes in corners]

@@ -124,8 +124,8 @@ class WaterAgain(FieldMappedAgain):
 class WaterUpdate(StepField):
     """w* after the update, w* - w, the mass of the soil, exp(-b) and f.
 
-    After the update, exp(-b), and the velocity of points minus the velocity of a fix that holds the
-    soil of the node (d,), replace the last three.
+    After the update, the last three are replaced by exp(-b) and the velocity (d,) of points minus
+    the velocity of a fix that holds the soil at the node.
     """
 
     shape = numbers(4, 2)

@@ -114,7 +114,7 @@ def _by_constant(value: Any) -> Callable:
 
 
 def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
-    """Decorate the implementation for a law that wraps another, which must have the function."""
+    """Decorate the implementation for a wrapping law; the wrapped law must have the function."""
 
     def register(implementation: Callable) -> Callable:
         _handing_on.add(implementation)

@@ -51,7 +51,7 @@ def changing(simulation: SceneState) -> Iterator[tuple[str, np.ndarray]]:
 
 def copied(simulation: SceneState, before: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     copies = {}
-    # One by one, so that only one array has two copies at a time.
+    # Copied one at a time, so that two copies of only one array exist at once.
     for name, array in (*changing(simulation), ("values", simulation.setup.control.values)):
         copy = before.pop(name, None)
         if copy is None or copy.shape != array.shape or copy.dtype != array.dtype:
@@ -205,7 +205,7 @@ def restore(simulation: SceneState, state: ArraysByName) -> None:
     s = simulation.setup = s._replace(blocks=tuple(blocks))
     simulation.tiles.lay_out(s)
     for name, array in changing(simulation):
-        # The tiles already belong to the present number of processes.
+        # The tiles have already been divided among the present processes.
         if not name.startswith("tiling/"):
             array[...] = _checked(state, name, array)
     for block in s.blocks:

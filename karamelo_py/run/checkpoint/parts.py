@@ -95,7 +95,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-        # The log comes last, as it shows other parts.
+        # The log comes last, because it shows values of the other parts.
     yield ("log", "", ""), hub.output.log
 
 
@@ -142,7 +142,7 @@ class Grown:
 
 @dataclass
 class Unwritable:
-    """A copy of a value that cannot be stored in a file, with the reason."""
+    """A value that cannot be stored in a file, and the reason."""
 
     kept: object
     fault: ScriptError
@@ -173,7 +173,7 @@ def _random_state(state: dict) -> np.random.RandomState:
     return generator
 
 
-# Types that JSON does not have: functions that convert a value to JSON arguments, and back.
+# For each type that JSON lacks: functions that convert a value to JSON arguments, and back.
 KINDS: dict[type, tuple[Callable, Callable]] = {
     tuple: (list, lambda *items: items),
     set: (list, lambda *items: set(items)),
@@ -252,7 +252,7 @@ class RollbackPoint:
             self._parts = {self.step: self.parts}
 
     def again(self, advance: Callable[[int], int], end: int) -> int:
-        """Repeat the steps to `end`; restore states of parts at noted steps; return the status."""
+        """Repeat the steps up to `end`, restoring parts at the noted steps; return the status."""
         update = self.hub.update
         while update.step < end:
             noted = min((step for step in self._parts if update.step < step < end), default=end)

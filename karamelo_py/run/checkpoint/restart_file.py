@@ -132,8 +132,8 @@ def _arrays_in(root: "h5py.Group") -> "list[h5py.Dataset]":
 def refuse_altered(path: Path, *, large: bool, rank: int = 0, size: int = 1) -> None:
     """Raise ScriptError if arrays of a file do not match their checksums.
 
-    If `large`, arrays of points and nodes are compared, otherwise all other arrays; each array is
-    compared by one process.
+    If `large`, arrays of points and nodes are checked, otherwise all other arrays. Each array is
+    checked by one process.
     """
     import h5py
 

@@ -88,7 +88,7 @@ class Contact:
         return stiffness * self._around(self.equations.positions[self.first, 0], h)
 
     def _around(self, x: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """Return length or area (m,) per angle at radii `x`, for cells of size `h`; otherwise 1."""
+        """Return length or area (m,) per radian at radii `x`, for cells of size `h`; 1 if plane."""
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:

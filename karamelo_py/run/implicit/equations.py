@@ -26,7 +26,7 @@ from karamelo_py.scene.modify import Fix
 
 BATCH = 8192  # points assembled at a time
 MOST_MOVED = 0.5  # displacement relative to other nodes, in cells per cell of distance
-# The arrays FOLLOWING are reused while the arrays FOLLOWED do not change.
+# Arrays in FOLLOWING are reused as long as the arrays in FOLLOWED are unchanged.
 FOLLOWED, FOLLOWING = ("nodes", "deforming"), ("positions", "rigid_motions", "differences")
 
 

@@ -177,7 +177,7 @@ class LoadSteps:
         return time
 
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
-        """Take a substep, with the loads at its end; return corrections and residual.
+        """Take a substep with the loads at its end; return number of corrections and residual.
 
         Raises `Failed` if there is no equilibrium, in which case points have not moved.
         """
@@ -189,7 +189,8 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         simulation.steps.load_step(dt)
         try:
-            # These sums also contain the capacities for heat flow. Heat changes the stress.
+            # The sums include the heat capacities, which conduction needs. Conduction changes the
+            # stress.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             loaded = simulation.hooks if self.dynamic else None
             loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
@@ -346,7 +347,8 @@ class LoadSteps:
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at their nodes, and set nodal velocities.
 
-        A fix gets the velocity that nodes would have without it. On rigid solids, other forces act.
+        A fix gets the velocity that nodes would have without it. With rigid solids, a fix also gets
+        contact and inertial forces.
         """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update

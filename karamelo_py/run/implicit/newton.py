@@ -59,8 +59,7 @@ class Newton:
     """The balance of forces as a function of displacements, and its solution.
 
     `free` (m, d) masks the unknown components, `external` (m, d) are all forces except internal
-    ones, `pushing` are contact and tools. `seconds` sums the time of the stages stress, assembly
-    and solution; ``fixed()`` returns the components (nodes, d) that fixes hold.
+    ones, `pushing` lists contact and tools.
     """
 
     def __init__(

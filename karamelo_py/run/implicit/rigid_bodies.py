@@ -21,7 +21,7 @@ UNSUPPORTED = 1e-2  # tolerated unsupported fraction of a load; a ball touches f
 
 
 class LoadedBody:
-    """Motion of one body, its `nodes` (n,) among the nodes of the equations, and the loads on it.
+    """One body: its motion, the loads on it, and its `nodes` (n,) as indices in the equations.
 
     `motions` (n, d, 6) are nodal velocities per unit of the body's velocity and spin. `ways` (k,)
     are indices of its unknown components. `led` (6,) is the prescribed velocity and spin.
@@ -90,7 +90,7 @@ class MovingBodies:
         self.q = np.zeros(len(self.load))
 
     def rest(self, balance: np.ndarray) -> np.ndarray:
-        """Return forces and torques (k,) that no contact balances."""
+        """Return the forces and torques (k,) that contact does not balance."""
         return self.T.T @ balance.ravel() + self.load
 
     def norm(self, forces: np.ndarray) -> float:

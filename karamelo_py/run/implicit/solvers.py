@@ -24,7 +24,7 @@ class Unconverged(Exception):
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
-    """Decouple the `fixed` components (m, d) of a matrix; add `more` (m,) to other diagonals."""
+    """Decouple `fixed` components (m, d) of a matrix; add `more` (m,) to its other diagonals."""
     rows = np.repeat(np.arange(len(fixed)), np.diff(A.indptr))
     some = np.any(fixed, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
@@ -83,9 +83,9 @@ def amg(
     """Solve by conjugate gradients (GMRES if A is not symmetric) with algebraic multigrid.
 
     `rigid` are the rigid motions (n, k) of the unknowns, 0 for decoupled ones. They are the near
-    null space for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the final
-    residual / b. Most of the time is spent building the hierarchy, so it is stored in `kept` and
-    reused for similar matrices while few iterations are needed.
+    null space for smoothed aggregation (Vanek, Mandel & Brezina 1996). `accuracy` is the tolerance
+    for |residual| / |b|. Most of the time is spent building the hierarchy, so it is stored in
+    `kept` and reused for similar matrices while few iterations are needed.
     """
     import pyamg
 
@@ -153,7 +153,7 @@ def solve(
 
 
 def rigid_motions(positions: np.ndarray, free: int) -> np.ndarray:
-    """Return rigid motions (m, d, k) of nodes, with translations from direction `free` on."""
+    """Return rigid motions (m, d, k) of nodes; translations start at direction `free`."""
     m, d = positions.shape
     x = positions - positions.mean(0)
     motions = [np.broadcast_to(np.eye(d)[i], (m, d)) for i in range(free, d)]

@@ -119,7 +119,7 @@ def check_scene(hub: Hub) -> None:
 
 
 def _refuse_other_heat(hub: Hub) -> None:
-    """Nodes conduct either heat or, for gases with Qh, energy per mass."""
+    """Raise ScriptError for Qh next to solids with a temperature: nodes conduct only one."""
     solids = hub.solids.values()
     for solid in solids:
         warm = [one for one in solids if laws.can(one.material.law, initial_heat)]
@@ -320,7 +320,7 @@ def solids_alike(hub: Hub, ids: tuple[int, int] | None) -> Iterable[list[Solid]]
 
 
 def returns_loss(hub: Hub) -> bool:
-    """Return True if kinetic energy that the transfer dissipates heats points.
+    """Return True if the kinetic energy that the transfer dissipates heats the points.
 
     The loss of FLIP 1 without moments vanishes as the step goes to 0. For XPIC see
     `kernels.equations.loss.reflect`.

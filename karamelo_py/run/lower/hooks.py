@@ -82,7 +82,7 @@ def is_wet(hub: Hub) -> bool:
 
 
 class Programs:
-    """Code and constants of all formulas, one after another."""
+    """Concatenated code and constants of all formulas."""
 
     def __init__(self, hub: Hub):
         self.hub = hub
@@ -115,7 +115,7 @@ class _Builder:
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
-        self.whole: list[Tag] = []  # hooks of whole points
+        self.whole: list[Tag] = []  # hooks that treat all directions of a point at once
         self.wet = is_wet(hub)
 
     def add(self, fix: Fix, moment: str, hook: CompiledHook) -> None:

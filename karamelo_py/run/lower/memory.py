@@ -1,6 +1,6 @@
-"""Memory of a scene, or of the part on one process; a scene that does not fit is refused.
+"""Memory of a scene, or of its part on one process; scenes that do not fit are refused.
 
-Only the minimum that a run needs is compared: no scene that could run is refused.
+Only the minimum that a run needs is compared, so that no scene that could run is refused.
 """
 
 import gc

@@ -1,4 +1,4 @@
-"""Scenes that a scheme with a solution for the pore pressure does not support."""
+"""Scenes that schemes with an implicit pore pressure do not support."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ from karamelo_py.script.errors import ScriptError
 
 
 def check(hub: Hub) -> None:
-    """Raise ScriptError with all reasons, if there are any."""
+    """Raise one ScriptError with all reasons, if there are any."""
     update = hub.update
     name = f"scheme {registry.name_of('scheme', type(update.scheme))}"
     errors = [*unsupported(hub, name)]

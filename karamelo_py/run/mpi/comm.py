@@ -23,7 +23,7 @@ LAUNCHED = (
     ("MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"),
     ("SLURM_STEP_NUM_TASKS", "SLURM_PROCID"),
 )
-# Answers that are not step numbers (these are positive).
+# Answers other than step numbers, which are positive.
 WELL, HERE, FAILED = 0, -1, -2
 RankArray = tuple[int, np.ndarray]
 PAUSE = 0.005  # seconds between checks of other processes

@@ -61,7 +61,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
 
 
 IMBALANCE = 1.1  # factor by which a new division must reduce the largest work
-# Ratio of lengths above which bodies are cut along long tiles; gaps in rows make loops slow.
+# Factor by which long tiles must be longer along rows to be cut there: short rows make loops slow.
 ROWS = 4
 OF_TILES = ("number", "range", "grid", "box", "rows")
 FINE = 1000  # the cost of a tile is an integer, in this fraction of a unit
@@ -167,7 +167,7 @@ class SharedTiles(Tiles):
     def _with(self, k: int, points: Points, stay: np.ndarray, come: list[list]) -> Points:
         """Join points that stay and points that arrive, in the memory of the last sort."""
         count = len(stay) + sum(parts[0].shape[-1] for parts in come)
-        # New memory would take longer than the rest of a sort.
+        # Allocating new memory would take longer than the rest of a sort.
         arrays = []
         for i, (name, old) in enumerate(arrays_of(points)):
             new = [parts[i] for parts in come]

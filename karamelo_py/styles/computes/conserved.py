@@ -115,11 +115,12 @@ class LostByContact(Compute):
 
     Notes
     -----
-    Contact at nodes (ulmpm/contacts) is inelastic. An impulse dissipates the impulse times the mean
-    of the approach velocities before and after the step; friction, times the sliding velocities.
-    The sum is the work of free rigid bodies, and of bodies that contact does not move, minus the
-    work on points. It is exact with FLIP 1 in musl and usavg. It includes damping and friction of
-    contact/surface and contact/rigid_body, but not load steps. The group must be all points.
+    Contact at nodes (ulmpm/contacts) is inelastic. A normal impulse dissipates the impulse times
+    the mean of the approach velocities before and after the step; friction dissipates the
+    tangential impulse times the mean sliding velocity. The sum is the work done by free rigid
+    bodies and by bodies that contact does not move, minus the work done on points. It is exact with
+    FLIP 1 in musl and usavg. It includes damping and friction of contact/surface and
+    contact/rigid_body, but not load steps. The group must be all points.
 
     See Also
     --------

@@ -159,8 +159,8 @@ class Error(Compared, Compute):
     -----
     Let e be the magnitude of the difference at a point (for a tensor sqrt(e_ij e_ij)) and V0 the
     initial volume of the point: L1 = sum V0 e / sum V0, L2 = sqrt(sum V0 e^2 / sum V0), max = max
-    e. ``relative`` divides by the same norm of the exact values; while all exact values are 0, by
-    the largest norm so far, or the result is inf if they were always 0.
+    e. ``relative`` divides by the same norm of the exact values. While all exact values are 0, it
+    divides by the largest norm so far; if that is 0, too, the result is inf.
 
     Publishes ID, the present error; ID_max, the largest error so far; and ID_history, the norm over
     all points and outputs so far, with each output weighted by the time since the previous output.

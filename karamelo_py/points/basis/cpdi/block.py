@@ -1,4 +1,4 @@
-"""The 3 x 3 nodes around a 2D domain, each with its sum over the corners, so visited once.
+"""Sums over the corners of a 2D domain at its 3 x 3 nodes, so that each is visited once.
 
 In 3D, with 27 nodes and eight corners, this would cost more than it saves.
 """

@@ -34,8 +34,8 @@ class IndentMinimizePenetration(StiffTool, BallTool):
     force m p / dt^2, which moves a free point out of the ball within one step. Friction and dt are
     as in contact/minimize_penetration (de Vaucorbeil & Nguyen 2021).
 
-    Publishes the force on the points as ID_x, ID_y, ID_z and the contact area as ID_s: the sum over
-    touching points of one face of the cube of each.
+    Publishes the force on the points as ID_x, ID_y, ID_z, and the contact area as ID_s: one face of
+    the cube of each touching point.
 
     See Also
     --------
