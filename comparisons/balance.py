@@ -133,7 +133,7 @@ def measure(script: Path, *, full: bool = False) -> Balance:
     )
     size = max(np.sqrt(2 * mass * log["E_balance"].max()), np.abs(impulse).max())
     watched = simulation.control.energy[0].watch_energy
-    lost = simulation.energy_watch.share_lost() if watched else np.nan
+    lost = simulation.energy_watch.lost_fraction() if watched else np.nan
     # Forces of implicit steps are those of their ends.
     momentum = np.nan if simulation.implicit else 100 * left / size if size else 0.0
     return Balance(len(dt), -100 * lost, momentum, why(hub, simulation, lost))

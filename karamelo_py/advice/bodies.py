@@ -60,10 +60,10 @@ def vibrating(facts: BasicFacts) -> list[Body]:
 
 
 def drift_of(facts: BasicFacts) -> Noise | None:
-    if not (facts.scheme.traits.keeping and facts.moves and facts.kept > 0.9) or _thrown(facts):
+    if not (facts.scheme.traits.conserving and facts.moves and facts.kept > 0.9) or _thrown(facts):
         return None
     limits = drift_limits(facts.basis)
-    bound = (limits.averaged if facts.scheme.traits.bears_drift else limits.drift)[facts.sparse]
+    bound = (limits.averaged if facts.scheme.traits.allows_drift else limits.drift)[facts.sparse]
     bound /= limits.line if facts.d == 1 else 1
     speed = cells = 0.0
     for body in vibrating(facts):
@@ -94,10 +94,10 @@ def _thrown(facts: BasicFacts) -> bool:
 
 def turn_of(facts: BasicFacts) -> Noise | None:
     turns = facts.moments or (facts.moves and facts.kept > 0.9)
-    if not (facts.scheme.traits.keeping and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
+    if not (facts.scheme.traits.conserving and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
         return None
     limits, dt, most = drift_limits(facts.basis), facts.simulation.dt, None
-    bound = (limits.rim_averaged if facts.scheme.traits.bears_drift else limits.rim)[facts.sparse]
+    bound = (limits.rim_averaged if facts.scheme.traits.allows_drift else limits.rim)[facts.sparse]
     for body in vibrating(facts):
         spin, reach = body.motion.spin, body.motion.reach
         speed, angle = spin * reach / facts.waves, spin * facts.duration

@@ -13,7 +13,7 @@ import numpy as np
 from karamelo_py.advice.basics import BasicFacts
 from karamelo_py.advice.bodies import sides
 from karamelo_py.language.rules import code_of
-from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, TOLD
+from karamelo_py.points.basis.linear import CROSSING, CURE, PER_CELL, WARNED_LOSS
 from karamelo_py.points.laws import law_kind, law_traits, specific_volume
 from karamelo_py.run import stable_step
 from karamelo_py.run.body_motion import BodyMotion
@@ -128,7 +128,7 @@ def measured(facts: BasicFacts) -> Crossing:
 
 def words_at_end(facts: BasicFacts) -> dict[str, str]:
     crossing, hub = measured(facts), facts.hub
-    if crossing.lost <= TOLD:
+    if crossing.lost <= WARNED_LOSS:
         return {}
     path = f"stressed material moved through {crossing.cells:.2g} cells"
     loss = f"about {crossing.percent:.0f} % of its pressure is lost on average, half at places"

@@ -31,7 +31,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     if simulation.implicit:
         return _gain_of_implicit_steps(hub)
     fraction = simulation.dt / step_size.stable_step(simulation, simulation.steps.limit)
-    keeping = stable_step.keeping_share(hub)
+    conserving = stable_step.conserving_fraction(hub)
     smooth = "a basis with smooth gradients (quadratic-spline), or method tlmpm"
     if fraction > 1 + 1e-9:
         above = f"time step is {fraction:.3g} x the stability limit"
@@ -43,13 +43,13 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
     # Use the wave speed of undeformed bodies; they may have softened since.
     fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.step[0].spacing) / fastest if fastest > 0 else np.inf
-    borne = courant * across
-    if update.fixed_dt is not None and simulation.dt > borne * (1 + 1e-9):
+    stable = courant * across
+    if update.fixed_dt is not None and simulation.dt > stable * (1 + 1e-9):
         alone = " of an isolated point" * (courant == stable_step.lone_point(hub))
         return (
-            f"time step is {simulation.dt / borne:.3g} x the stability limit{alone} in the "
-            f"undeformed state ({borne:.4g})",
-            f"set_dt({stable_step.DEFAULT_SHARE * borne:.3g}) or less, or remove set_dt",
+            f"time step is {simulation.dt / stable:.3g} x the stability limit{alone} in the "
+            f"undeformed state ({stable:.4g})",
+            f"set_dt({stable_step.DEFAULT_SHARE * stable:.3g}) or less, or remove set_dt",
         )
     if moves and jumps and update.transfer.traits.inverts_spread:
         return f"{transfer} with {basis} in the updated frame", f"FLIP, or {smooth}"
@@ -58,12 +58,12 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         return f"{transfer} with {basis} in a body that moves through the grid", smooth
     if update.anti_locking and moves:
         return "F-bar in the updated frame", "remove anti_volumetric_locking"
-    if keeping < stable_step.DEFAULT_SHARE and fraction > keeping * (1 + 1e-9):
+    if conserving < stable_step.DEFAULT_SHARE and fraction > conserving * (1 + 1e-9):
         points = " with one point per cell" if stable_step.sparse(hub) else ""
         return (
             f"points crossing cells: {transfer} and {scheme} with {basis}{points} at "
             f"{fraction:.2g} x the stability limit",
-            f"{_step_of(hub, simulation, keeping)}, scheme(usavg), or {smooth}",
+            f"{_step_of(hub, simulation, conserving)}, scheme(usavg), or {smooth}",
         )
     if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours are apart
         return "points more than a cell apart (numerical fracture)", WHOLE
@@ -125,7 +125,7 @@ def taken_by(hub: Hub) -> list[str]:
 def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
     if taken_by(hub):
         return None
-    lost, (cause, fix) = simulation.energy_watch.share_lost(), cause_of_loss(hub)
+    lost, (cause, fix) = simulation.energy_watch.lost_fraction(), cause_of_loss(hub)
     message = (
         f"energy balance: spurious loss of {100 * lost:.2g} % of the largest energy since the "
         f"first step ({when(simulation)})"

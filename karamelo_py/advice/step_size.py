@@ -6,9 +6,9 @@ from karamelo_py.kernels.clock import STILL, STRIDE
 from karamelo_py.run.lower.solved_pressure import is_wet, unsupported
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import (
+    conserving_fraction,
     courant_of,
     fastest_wave,
-    keeping_share,
     own_step_of_waves,
     own_weight_of_drift,
     sparse,
@@ -98,7 +98,7 @@ def words_of_limit(simulation: Simulation) -> str:
 
 def words_of_share(simulation: Simulation) -> str:
     hub, steps = simulation.hub, simulation.steps
-    asked, keeping = hub.update.dt_factor, keeping_share(hub)
+    asked, conserving = hub.update.dt_factor, conserving_fraction(hub)
     if hub.update.fixed_dt is not None:
         fraction = hub.update.fixed_dt / stable_step(simulation, steps.limit)
         words = f"{fraction:.3g} of the stable step"
@@ -114,8 +114,8 @@ def words_of_share(simulation: Simulation) -> str:
         fraction = asked
         words = f"{fraction:g} of the stable step, by dt_factor"
     # `large_steps` warns of a fraction above 1.
-    if max(keeping, 1e-9) * (1 + 1e-9) < fraction <= 1 and keeping < DEFAULT_SHARE:
-        return words + f": above {keeping:g} a body that drifts gains energy"
+    if max(conserving, 1e-9) * (1 + 1e-9) < fraction <= 1 and conserving < DEFAULT_SHARE:
+        return words + f": above {conserving:g} a body that drifts gains energy"
     return words
 
 

@@ -66,7 +66,7 @@ def warn_of_rotation(transfer: type) -> None:
 def _drift(transfer: Any, scene: Any) -> dict[str, Any] | None:
     if scene.drift is None:
         return None
-    averages = scene.scheme.traits.bears_drift
+    averages = scene.scheme.traits.allows_drift
     gains = "a vibration gains 0.1 to several times its energy"
     cure = "scheme(usavg), with which noise grows ten times less or not at all"
     if drift_limits(scene.basis).damps and scene.d == 3:

@@ -136,15 +136,15 @@ class EnergyWatch:
 
     def has_lost(self, within: float) -> bool:
         watch = self.watch
-        return bool(watch.watch_energy and watch.looks > LOOKS and self.share_lost() > within)
+        return bool(watch.watch_energy and watch.looks > LOOKS and self.lost_fraction() > within)
 
-    def share_lost(self) -> float:
+    def lost_fraction(self) -> float:
         """Return (energy lost since the first step) / (largest energy); negative for a gain."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
         return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
 
-    def grown_little(self) -> bool:
+    def is_sound(self) -> bool:
         """Return True if neither the energy nor the last step shows a fault in the state."""
         watch, heat = self.watch, self.heat
         swings = heat.watch_heat and self.control.step[0].last_dt > BORNE * heat.heat_limit
@@ -166,7 +166,7 @@ class EnergyWatch:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
         # Relative to the first balance, which `forget_growth` leaves unchanged.
-        return -100 * self.share_lost()
+        return -100 * self.lost_fraction()
 
     def forget_growth(self) -> None:
         """Measure growth from the present state, after a warning."""

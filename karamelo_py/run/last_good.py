@@ -58,7 +58,7 @@ class LastGood(NamedTuple):
         simulation, good = self.simulation, self.good
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         watch = simulation.energy_watch
-        grown, path = not watch.grown_little(), None
+        grown, path = not watch.is_sound(), None
         if grown:
             path = self._write_before_growth(step)
         else:
@@ -88,7 +88,7 @@ class LastGood(NamedTuple):
         while energy.watch_energy and simulation.step + LOOK < end:
             look = simulation.step + LOOK - (simulation.step - 1) % LOOK
             healthy = good.again(simulation.advance, look) == DONE
-            if not (healthy and simulation.energy_watch.grown_little()):
+            if not (healthy and simulation.energy_watch.is_sound()):
                 break
             if energy.balance - before < GROWTH * unit_of(energy):
                 good.keep(simulation, forget=False)

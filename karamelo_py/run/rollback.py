@@ -59,7 +59,7 @@ class RollBack:
         # Results depend on these states after a return, so they must not depend on run time.
         often = step % self.simulation.states_every == 0 or step == self.first_step + 1
         often |= not self.simulation.repeats_steps
-        if often and step != self.point.step and self.simulation.energy_watch.grown_little():
+        if often and step != self.point.step and self.simulation.energy_watch.is_sound():
             self._keep()
         else:
             self.point.note(always=self._always)
@@ -127,7 +127,7 @@ class RollBack:
         """Return True if points leave without an energy gain; smaller steps cannot help."""
         simulation, moves = self.simulation, self.hub.update.method.frame.moves
         watch = simulation.energy_watch
-        if not (moves and len(simulation.leaving()) and watch.grown_little()):
+        if not (moves and len(simulation.leaving()) and watch.is_sound()):
             return False
         step, present = simulation.step, PartStates.of(self.hub, OUTPUTS)
         self.point.return_to(simulation)

@@ -50,7 +50,7 @@ def sparse(hub: Hub) -> bool:
     return any(map(one_a_cell, hub.solids.values()))
 
 
-def keeping_share(hub: Hub) -> float:
+def conserving_fraction(hub: Hub) -> float:
     """Return the largest fraction of the stable step at which a drifting body gains no energy.
 
     With FLIP and similar transfers, jumps of gradients add energy to points that cross cells; the
@@ -63,14 +63,14 @@ def keeping_share(hub: Hub) -> float:
         return DEFAULT_SHARE
     basis = update.method.basis.traits
     kind = basis.nodes_per_cell if basis.gradient_jumps else 0
-    keeping = update.scheme.traits.keeping or ((DEFAULT_SHARE, DEFAULT_SHARE),) * 3
-    share = keeping[kind][sparse(hub)]
+    conserving = update.scheme.traits.conserving or ((DEFAULT_SHARE, DEFAULT_SHARE),) * 3
+    share = conserving[kind][sparse(hub)]
     if alpha > 0.99:
         return share
     return max(share, DAMPED) if sparse(hub) else DEFAULT_SHARE
 
 
-def _keeps_velocities(hub: Hub) -> bool:
+def _retains_velocities(hub: Hub) -> bool:
     """Return True if points carry velocities: FLIP and similar, no moments, not usl."""
     update = hub.update
     return (
@@ -111,7 +111,7 @@ def lone_point(hub: Hub) -> float:
     return share * 2 / sqrt(stiff[2 if usl else by_gradient] * hub.domain.dimension)
 
 
-def bears_drift(hub: Hub) -> bool:
+def allows_drift(hub: Hub) -> bool:
     """Return True if a drifting body is as stable and conservative as a body at rest.
 
     With cubic splines, the energy hardly depends on the position in the cells; usavg adds none with
@@ -121,12 +121,12 @@ def bears_drift(hub: Hub) -> bool:
     basis, scheme = hub.update.method.basis.traits, hub.update.scheme
     laws = _deforming(hub)
     return (
-        _keeps_velocities(hub)
+        _retains_velocities(hub)
         and len(laws) == 1  # a single elastic or metallic solid
         and not _flows(laws[0])
         and not basis.gradient_jumps
-        and (basis.bears_drift or scheme.traits.bears_drift)
-        and keeping_share(hub) == DEFAULT_SHARE
+        and (basis.allows_drift or scheme.traits.allows_drift)
+        and conserving_fraction(hub) == DEFAULT_SHARE
     )
 
 
@@ -137,11 +137,11 @@ def own_weight_of_drift(hub: Hub) -> float:
     for two or more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks that drift
     at 0.05 to 0.5 of the wave speed, the energy gain increases with speed.
     """
-    if bears_drift(hub):
+    if allows_drift(hub):
         return 0.0
     basis = hub.update.method.basis.traits
     boxes = basis.steep_edge and basis.cells > 1
-    fed = boxes and _keeps_velocities(hub) and not hub.update.scheme.traits.bears_drift
+    fed = boxes and _retains_velocities(hub) and not hub.update.scheme.traits.allows_drift
     return BOX_WEIGHT if fed and hub.update.transfer.alpha > 0.99 and not sparse(hub) else 1.0
 
 
@@ -217,13 +217,13 @@ def own_step_of_waves(hub: Hub, *, still: bool) -> tuple[float, float]:
 
     `still`: no point has moved as far as `STILL`.
     """
-    method, share = hub.update.method, keeping_share(hub)
+    method, share = hub.update.method, conserving_fraction(hub)
     # Transfers with moments are stable up to 1.3 h/c with quadratic splines, 1.5 with cubic.
     still &= method.frame.moves and not stores_moment(hub.update.transfer)
     if still:
         # With a linear basis in 3D, an isolated point is stable up to 0.8 h/c.
         share = max(share, DAMPED if sparse(hub) and hub.domain.dimension == 3 else DEFAULT_SHARE)
-    courant = courant_number(hub, longer=still or bears_drift(hub))
+    courant = courant_number(hub, longer=still or allows_drift(hub))
     return min(courant, lone_point(hub)), share
 
 

@@ -15,8 +15,8 @@ from karamelo_py.points.transfers import flip_coefficient
 from karamelo_py.run.no_number import endless_speed
 from karamelo_py.run.stable_step import (
     common_velocity,
+    conserving_fraction,
     courant_number,
-    keeping_share,
     own_step_of_waves,
     own_weight_of_drift,
     stable_conduction,
@@ -44,7 +44,7 @@ class StepPolicy(NamedTuple):
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
             return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
         # Fractions that scripts set refer to h/(c + |v|), also at rest.
-        asked = courant_number(hub, longer=False), update.dt_factor or keeping_share(hub)
+        asked = courant_number(hub, longer=False), update.dt_factor or conserving_fraction(hub)
         return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
 
     def numbers(self, path: float, halvings: int) -> dict[str, float]:

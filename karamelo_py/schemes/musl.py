@@ -20,7 +20,7 @@ class MUSL(NamedTuple):
 
     traits = SchemeTraits(
         maps_velocity_again=True,
-        keeping=((0.9, 0.9), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
+        conserving=((0.9, 0.9), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
     )
     rows = (
         table.BEGIN,

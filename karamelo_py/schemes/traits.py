@@ -27,7 +27,7 @@ class SchemeTraits(NamedTuple):
     courant_of_dry: tuple[float, float] | None = None
     # Fractions of the stable step up to which a drifting body gains no energy, for 2 and 1 points
     # per cell, by basis: smooth gradients, gradient jumps, nodes within cells. None: any step.
-    keeping: tuple[tuple[float, float], ...] | None = None
+    conserving: tuple[tuple[float, float], ...] | None = None
     # fraction of the strain increment that precedes the forces
     strained_before: float = 0.0
     # maps velocities to nodes again after the points have moved
@@ -35,7 +35,7 @@ class SchemeTraits(NamedTuple):
     # scheme for steps in which fixes prescribe velocities of deformable points; None: this one
     leading: Any = None
     # a drifting body never gains energy
-    bears_drift: bool = False
+    allows_drift: bool = False
     # vibrations are damped, with two points per cell and direction
     damps: bool = False
     # solves for the pore pressure at the end of a step

@@ -20,8 +20,8 @@ class USAVG(NamedTuple):
 
     traits = SchemeTraits(
         strained_before=0.5,
-        bears_drift=True,
-        keeping=((0.9, 0.9), (0.9, 0.5), (0.45, 0.45)),  # docs/energy.md
+        allows_drift=True,
+        conserving=((0.9, 0.9), (0.9, 0.5), (0.45, 0.45)),  # docs/energy.md
     )
     rows = (
         table.BEGIN,

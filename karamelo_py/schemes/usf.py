@@ -25,7 +25,7 @@ class USF(NamedTuple):
 
     traits = SchemeTraits(
         strained_before=1.0,
-        keeping=((0.9, 0.6), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
+        conserving=((0.9, 0.6), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
     )
     rows = (
         table.BEGIN,

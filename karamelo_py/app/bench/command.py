@@ -169,12 +169,12 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
     cached = " (above 100 %: caches hold a part)" if one.roofline > 1 else ""
     print(f"  {'fraction of the memory bandwidth':<34} {100 * one.roofline:8.1f} %{cached}")
     print(f"  {'the same, of arrays of its size':<34} {100 * one.roofline_in_place:8.1f} %")
-    stages = one.sweeps_of_points | one.sweeps_of_nodes if one.told_apart else {}
+    stages = one.sweeps_of_points | one.sweeps_of_nodes if one.distinguished else {}
     for stage, per in stages.items():
         print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")
     print(f"    {'together, in one compiled loop':<38} {1e9 / best:8.2f} ns")
     fractions = "sweeps are too short to be timed one by one"
-    if one.told_apart:
+    if one.distinguished:
         fractions = f"nodes {100 * one.nodes:.0f} % of the sweeps, {100 * one.rest:.0f} % outside"
     print(f"  {'limited by':<34} {one.limit:>8} ({fractions})")
 

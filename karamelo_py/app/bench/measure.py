@@ -97,7 +97,7 @@ class Measured(NamedTuple):
         return (swept - self.waits) * self.best / self.points
 
     @property
-    def told_apart(self) -> bool:
+    def distinguished(self) -> bool:
         return self.swept <= APART
 
     @property
@@ -115,9 +115,9 @@ class Measured(NamedTuple):
     def limit(self) -> str:
         """The component that takes at least half of a step: ``overhead``, ``nodes`` or ``memory``.
 
-        Otherwise ``arithmetic`` (instructions or latency); ``unknown`` if not `told_apart`.
+        Otherwise ``arithmetic`` (instructions or latency); ``unknown`` if not `distinguished`.
         """
-        if not self.told_apart:
+        if not self.distinguished:
             return "unknown"
         if self.rest >= ALONE:
             return "overhead"

@@ -69,7 +69,7 @@ class RunPage(Rhythmic, Listener):
         log = {name: n for name, n in zip(names, numbers, strict=True) if not isinstance(n, str)}
         watch = simulation.control.energy[0]
         has_gain = watch.watch_energy and watch.looks >= FEW  # the mean is over `FEW` checks
-        gain = -100 * simulation.energy_watch.share_lost() if has_gain else None
+        gain = -100 * simulation.energy_watch.lost_fraction() if has_gain else None
         why = unknown_work(hub)
         self._unwatched = f"energy is {energy.not_watched(why)}" if why else ""
         limit = "load steps" if simulation.implicit else simulation.ruling_limit

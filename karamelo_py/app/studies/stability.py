@@ -48,7 +48,7 @@ GAINED = "spurious energy gain"
 LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")
-UNTOLD = ("left", "short")  # classes that say nothing about the step
+SILENT = ("left", "short")  # classes that say nothing about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps after which energy has been checked often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps after which slow growth is recognised
@@ -318,7 +318,7 @@ class Map:
         for j in range(self.shape[1]):
             column = [classes[i, j] for i in range(self.shape[0])]
             edge = next((i for i, kind in enumerate(column) if kind not in BORNE), None)
-            row = self.results.get((edge - 1, j)) if edge and column[edge] not in UNTOLD else None
+            row = self.results.get((edge - 1, j)) if edge and column[edge] not in SILENT else None
             if row and row.get("dt") and row.get("stable_dt"):
                 ratios.append((row["dt"] / row["stable_dt"], int(row["steps"])))
         return ratios

@@ -178,8 +178,7 @@ class Warming(eq.Task):
         return fma(weight, node.w.nodes.update[node.i, 1], change), mean
 
     def updated(task, pt, total, totals, fastest):
-        """Store the new temperature; report how much faster heat flows than before deformation.
-        """
+        """Store the new temperature; report how much faster heat flows than before deformation."""
         law, state, f = pt.law_state_F
         T, p = pt.of(Temperature)[0, pt.p], pt.p
         capacity = pt.of(Capacity)[0, p]

@@ -34,7 +34,7 @@ class BasisTraits(NamedTuple):
     spread: float | None = None
     # Fraction of the stable step with corrected accelerations (updated frame)
     corrected_share: float = 0.8
-    bears_drift: bool = False  # drifting bodies conserve energy at the full stable step
+    allows_drift: bool = False  # drifting bodies conserve energy at the full stable step
     drift_limits: DriftLimits | None = None  # None: as for similar bases
     # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     # ``deformation`` (F in 2D or 3D), ``corners`` (of the `element`)

@@ -13,7 +13,7 @@ from karamelo_py.points.transfers import flip_coefficient
 STRETCH = 0.3  # strain above which points at distances of a cell separate
 SMALL = 0.3  # fraction of the stable step up to which impacts conserve energy
 PER_CELL = 0.17  # stress decreases by about exp(-0.17 N) if stressed material crosses N cells
-TOLD = 0.03  # loss of stress for a warning
+WARNED_LOSS = 0.03  # loss of stress for a warning
 
 
 class Linear(NamedTuple):
@@ -77,7 +77,7 @@ CURE = "cpgimp or quadratic-spline instead of linear, with FLIP 0.99 (pressure w
 known_failure(
     Linear,
     CROSSING,
-    when=lambda basis, scene: scene.crossing.lost > TOLD,
+    when=lambda basis, scene: scene.crossing.lost > WARNED_LOSS,
     reason="material under impact or initial stress will move at {scene.crossing.speed:.3g} "
     "through {scene.crossing.cells:.2g} cells while stressed; with a linear basis its pressure "
     "falls by 10 to 35 % in each, about {scene.crossing.percent:.0f} % on average, "

@@ -197,7 +197,7 @@ class CubicSpline(NamedTuple):
         courant_total=1.25,
         courant_still=1.4,
         courant_strained_first=1.0,
-        bears_drift=True,
+        allows_drift=True,
         drift_limits=CUBIC,
     )
 

@@ -422,7 +422,7 @@ def _is_borne(law: Any, mean: float) -> bool:
     return bool(tr(cauchy_stress(law, kin, after)) > 1.5 * mean)
 
 
-def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
+def _unsustained_tension(fix: InitialStress, scene: Any) -> list[dict]:
     """Return bodies in which at least 10 % of the points cannot sustain their tension."""
     cases = []
     normal = fix.formulas[:3]
@@ -454,7 +454,7 @@ def _unborne_tension(fix: InitialStress, scene: Any) -> list[dict]:
 known_failure(
     InitialStress,
     "initial tension",
-    when=_unborne_tension,
+    when=_unsustained_tension,
     reason="fix {part.id} pulls {pulled:.0%} of the points of solid '{solid}' with a mean stress "
     "of up to {most:.3g}, which its material cannot sustain: they separate in the first step",
     cure="compression is negative: {line}",

@@ -135,8 +135,8 @@ def _compression_energy_tait(eos, j, memory):
 @ratio_at_pressure.on(Tait)
 def _ratio_at_pressure_tait(eos, p, heat):
     # A tension of K would need an infinite volume.
-    borne = max(p, -eos.tension)
-    return power(max(1 + borne / eos.K, round_off(p)), -1 / eos.gamma)
+    limited = max(p, -eos.tension)
+    return power(max(1 + limited / eos.K, round_off(p)), -1 / eos.gamma)
 
 
 class IdealGas(NamedTuple):
@@ -221,7 +221,7 @@ def _shocks(eos, scene):
         return None
     if scene.linear:
         loss = f"{scene.transfer_name} with a linear basis loses 33 % of the pressure or more"
-    elif ratio < STRONG or scene.scheme.traits.bears_drift:
+    elif ratio < STRONG or scene.scheme.traits.allows_drift:
         return None
     else:
         loss = "this scheme loses 3 to 15 % of the energy at the front"
