@@ -550,6 +550,10 @@ QUESTIONS = {
     "prescribed displacement": "howto/boundary",
     "mass scaling": "howto/time-step",
     "hourglass": "failures",
+    "python interface": "tutorials/python",
+    "spall": "materials",
+    "anisotropic": "materials",
+    "my run is slow": "run-faster",
 }
 
 
