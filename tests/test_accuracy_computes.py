@@ -216,7 +216,14 @@ def test_mistakes(run_interpreted, tmp_path, line, said):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"), [("", "has no rows"), ("a b\n1 2\n3\n", "line 3"), ("a\n1\nx\n", "line 3")]
+    ("text", "said"),
+    [
+        ("", "has no rows"),
+        ("a b\n1 2\n3\n", "line 3"),
+        ("a\n1\nx\n", "line 3"),
+        ("0,1;2,5\n0,2;3,5\n", "expected: decimal points: 0.1;2.5"),
+        ("# t, a\nt a\n0,1 -2,5\n", "line 3 of"),
+    ],
 )
 def test_files_that_are_no_curves(run_interpreted, tmp_path, text, said):
     curve(tmp_path, text)

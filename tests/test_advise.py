@@ -107,6 +107,14 @@ def test_no_target_and_a_wrong_one(folder, capsys, accuracy, said):
     assert said in err and err.count("error: ") == 1
 
 
+def test_variables_are_checked_before_the_scene_of_method_auto(folder, capsys, monkeypatch):
+    words = auto(folder)
+    words[words.index("N=20")] = "slope=a,b,c"
+    monkeypatch.setattr("karamelo_py.app.studies.advise.chosen_in", None)
+    assert main(words) == 1
+    assert "no variable makes the scene finer" in capsys.readouterr().err
+
+
 def test_a_misspelt_word_ends_the_study(folder, capsys):
     (folder / "in.law").write_text(
         'word = "linear"\n' + SCRIPT.replace('FLIP, "cubic-spline"', "FLIP, word")

@@ -363,6 +363,8 @@ MESSAGES = {
     "named twice": ("fix(f, contact/friction, a, a, 0.1)", "'a' is named twice"),
     "negative": ("fix(f, contact/friction, a, b, -0.1)", "-0.1"),
     "unknown": ("fix(f, contact/friction, a, c, 0.1)", "unknown solid 'c'"),
+    "no second solid": ("fix(f, contact/friction, a, 0.1)", "solid2 is missing"),
+    "no coefficient": ("fix(f, contact/friction, a, b)", "mu|no-slip is missing"),
 }
 
 

@@ -26,6 +26,14 @@ set_output(1)
 log_modify(custom, step, E, A, L{more})
 run(4)
 """
+
+
+def test_a_loss_without_contact_is_told(run_interpreted):
+    alone = HIT.replace("method(ulmpm/contacts", "method(ulmpm").replace("fix(f, contact", "#")
+    script = alone.format(basis="linear", scheme="musl", law="soft", motion="", more="")
+    assert "contact_loss 'L' stays 0: the scene has no contact" in run_interpreted(script).err
+
+
 FREE = "fix(b, rigid_body, b, velocity=(0.2, -0.9), spin=0.1)"
 THROWN = "fix(v, initial_velocity_particles, b, 0.2 - 0.1*(y0 - 5.2), -0.9 + 0.1*(x0 - 5))"
 LED = "fix(v, velocity_particles, b, 0.2, -0.9)"

@@ -331,6 +331,14 @@ def test_what_is_measured_and_shown_nowhere(advice):
     assert "name Ek in log_modify" in said and "Es" not in said
 
 
+def test_materials_that_nothing_uses(advice):
+    said = advice(plane(more="material(spare, linear, 1, 1, 0)\neos(water, linear, 1, 1)"))
+    assert said.splitlines() == [
+        "no solid uses the material spare / leave it out, or name it in a solid",
+        "no material uses the eos water / leave it out, or name it in a material",
+    ]
+
+
 def test_what_an_included_script_shows(advice, tmp_path):
     """Also one that stands behind the run that is looked at."""
     (tmp_path / "rest.in").write_text("log_modify(custom, step, Ek)\n")

@@ -496,6 +496,9 @@ def test_what_a_solution_for_the_pressure_does_not_support_is_refused(run_interp
     change = {"head": f"{head}\nscheme(semi-implicit)", "tail": f"{tail}\nrun(1)"}
     err = run_interpreted(SCENE.format(**USUAL | change), status=1).err
     assert "semi-implicit" in err and words in err and err.count("error:") == 1
+    if "basis" in words:  # its word is marked
+        line, carets = err.splitlines()[1:3]
+        assert line.index("quadratic-spline") == carets.index("^" * len("quadratic-spline"))
 
 
 MISTAKES = [

@@ -38,6 +38,8 @@ def test_probe_measures_what_the_dump_holds(run_interpreted):
     corner = np.flatnonzero(of_b)[np.lexsort((-dump.y[of_b], dump.x[of_b].round(3)))[0]]
     assert last["g"] == pytest.approx(dump.s11[corner], rel=1e-8)
     assert last["far"] == pytest.approx(dump.x.max(), rel=1e-8)
+    # Warned once of each probe that is more than a cell of 0.1 away from the points of its group.
+    assert run.err.count("no point is near") == 2 and "no point is near x=9;" in run.err
     # Before the first step the mean place of a block is its middle.
     assert run.log.b_x[0] == pytest.approx(1.5)
 
@@ -54,6 +56,7 @@ def test_probe_of_what_is_not_there(run_interpreted):
         ("compute(q, probe, all)", "column"),
         ("compute(q, probe, all, x, point=0)", "above 0"),
         ("compute(q, probe, all, x, point=1, x=2)", "not both"),
+        ("compute(q, probe, all, x, x=1, z=0)", "a 2D scene has no coordinate z"),
     ],
 )
 def test_mistakes(run_interpreted, line, remedy):

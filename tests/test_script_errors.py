@@ -249,6 +249,7 @@ COMMANDS = [
     ("neo_hookean(m2, 1000, 1e6, 0.3)", 1, "hint: material(ID, neo-hookean, rho, E, nu"),
     ("viscosity(m, prony, g=(0.1), tau=(1))", 11, "hint: viscosity(prony, m, ...)"),
     ("run(0.6)", 5, "hint: run_time(T) runs for a time T"),
+    ("set_dt(time(0.1))", 8, "hint: the number without time()"),
     ("set_output(0.05)", 12, "hint: time(0.05) is a time"),
     ("compute(p, probe, all, ux)", 24, "hint: fix(u, displacement, all), before it, gives"),
     ("compute(p, probe, all, displacement_x)", 24, "hint: fix(u, displacement, all), before"),

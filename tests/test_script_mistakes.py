@@ -57,6 +57,27 @@ def test_what_follows_from_a_missing_part_is_not_told(run_interpreted, wrong, ot
     assert [text.split(": ")[-1] for _, text in found[1:]] == others
 
 
+def test_what_follows_from_refused_pore_water_or_solids_is_not_told(run_interpreted):
+    script = """\
+        method(tlmpm, FLIP, linear, 0.99)
+        dimension(2, 0, 1, 0, 1, 0.1)
+        region(b, block, 0.2, 0.5, 0, 0.5)
+        material(m, linear, 1000, 1e6, 0.3)
+        pore_water(m, n=40, permeability=1e-3)
+        solid(b, region, b, 2, m, 0.1)
+        group(top, nodes, region, b, solid, b)
+        fix(s, seepage_face, top, 0)
+        fix(q, initial_pore_pressure, all, 0)
+        dump(d, all, particle, 1, d.*, pore_pressure, wx)
+        fix(w, water_flux, top, 1, yhi)
+        run(10)
+        """
+    for wrong in (script, script.replace("n=40", "n=0.4").replace("m, 0.1)", "m, -0.1)")):
+        first, second = places(run_interpreted(wrong, status=1).err)
+        assert "porosity" in first[1] or "'h'" in first[1]
+        assert "unknown fix style" in second[1]
+
+
 def test_what_follows_from_a_refused_setting_or_deletion_is_not_told(run_interpreted):
     lines = [
         "plane_stres(true)",  # 1: wrong

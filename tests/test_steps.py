@@ -132,6 +132,13 @@ def test_set_dt(run_interpreted):
     assert (log.Step == range(5)).all()
 
 
+def test_the_program_chooses_the_step_again_after_set_dt(run_interpreted):
+    fixed = ("set_dt(0.003)", LOG, "run(2)", "set_dt(NULL)", "run(2)")
+    log = run_interpreted(block(1, *fixed)).log
+    own = run_interpreted(block(1, LOG, "run(1)")).log.dt[0]
+    assert log.dt == pytest.approx([0.003, 0.003, 0.003, own, own], rel=1e-6)
+
+
 def test_as_many_steps_as_fit():
     """17500 additions of 2e-4 are not quite 3.5; there is no step more for that."""
     control = new_control(np.zeros(3))

@@ -257,14 +257,15 @@ def warn_of_stress_left(hub: Hub, simulation: Simulation) -> None:
         return
     p = int(np.argmax(left))
     solid = solid_with(hub, p)
-    command = "plane_stress" if hub.domain.dimension == 2 else "uniaxial_stress"
+    plate = hub.domain.dimension == 2
+    command, across = ("plane_stress", "plate") if plate else ("uniaxial_stress", "bar")
     names = [name for name in ("thickness", "damage", "ep") if name in hub.fields.particle_names()]
     state = ", ".join(f"{name} {hub.fields.particle(name)[p]:.3g}" for name in names)
     hub.warn(
-        f"{command}: by {when(simulation)}, a step has left "
-        f"{left[p]:.1%} of the largest stress across a point of solid '{solid.id}' "
+        f"{command}: the stress across the {across} is not 0: up to {when(simulation)} it was "
+        f"{left[p]:.1%} of the largest stress at a point of solid '{solid.id}' "
         f"(material {solid.material.id}; {state})",
-        cause="its law breaks or softens faster than the trials of a step follow; the rest enters "
-        "the next step",
-        hint="dt_factor(0.5) or smaller load steps; column stress_left shows where",
+        cause="the law breaks or softens faster than the iterations of a step can follow; the next "
+        "steps remove this stress",
+        hint="dt_factor(0.5) or smaller load steps; the column stress_left shows these points",
     )

@@ -31,6 +31,7 @@ from karamelo_py.scene import machine_memory
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.material import Material
 from karamelo_py.scene.solid import words_of_volumes
+from karamelo_py.script.errors import plural
 
 LOADED = 24 << 20  # bytes of compiled loops and imported modules
 
@@ -130,6 +131,9 @@ def report(hub: Hub, end_time: float = inf) -> None:
     for suggestion in advice:
         say(f"  {suggestion.reason}")
         say(f"    instead: {suggestion.cure}")
+    if hub.warned:
+        say("")
+        say(f"{plural(len(hub.warned), 'warning')}, printed above this report")
 
 
 def _say_of_gpu(say: Callable, simulation: Simulation) -> None:

@@ -3,6 +3,7 @@
 from math import inf
 
 from karamelo_py.kernels.clock import STILL, STRIDE
+from karamelo_py.language import registry
 from karamelo_py.run.lower.solved_pressure import is_wet, unsupported
 from karamelo_py.run.simulation import Simulation
 from karamelo_py.run.stable_step import (
@@ -93,7 +94,13 @@ def step_by_script(fixed_dt: float | None, dt_factor: float | None) -> str:
 
 
 def words_of_limit(simulation: Simulation) -> str:
-    return simulation.ruling_limit + EXPLAINED.get(simulation.ruling_limit, "")
+    limit, scheme = simulation.ruling_limit, simulation.hub.update.scheme
+    words = EXPLAINED.get(limit, "")
+    if limit == "light_nodes" and max(scheme.traits.courant) < 1:
+        courant = float(simulation.control.step[0].courant)
+        name = registry.name_of("scheme", type(scheme))
+        words = f" and nodal modes in scheme {name}, stable up to {courant:.2g} h/c"
+    return limit + words
 
 
 def words_of_share(simulation: Simulation) -> str:

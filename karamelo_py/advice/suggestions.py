@@ -27,7 +27,7 @@ def seconds_of_step(hub: Hub, count: int) -> float:
 
 
 def suggestions(hub: Hub, simulation: Simulation) -> list[Advice]:
-    rules = _unread, _of_parts, lesser_models, _output
+    rules = _unread, _unused, _of_parts, lesser_models, _output
     return [Advice("", *words) for rule in rules for words in rule(hub, simulation)]
 
 
@@ -47,6 +47,20 @@ def _unread(hub: Hub, simulation: Simulation) -> Words:
                     "shown",
                     f"leave it out, or name {names[0]} in log_modify",
                 )
+
+
+def _unused(hub: Hub, simulation: Simulation) -> Words:
+    if any(name.endswith("_exx") for name in hub.values.names()):
+        return  # element tests may use materials
+    materials = [*hub.materials.values()]
+    of_fixes = [value for fix in hub.fixes.values() for value in vars(fix).values()]
+    used = {(part.kind, part.id) for m in materials for part in m.parts() if part is not m}
+    used |= {("material", m.id) for m in materials if m in of_fixes}
+    used |= {("material", solid.material.id) for solid in hub.solids.values()}
+    for kind, catalogue in {"material": hub.materials, **hub.parts}.items():
+        owner = "solid" if kind == "material" else "material"
+        for ID in (ID for ID in catalogue if (kind, ID) not in used):
+            yield f"no {owner} uses the {kind} {ID}", f"leave it out, or name it in a {owner}"
 
 
 def _output(hub: Hub, simulation: Simulation) -> Words:

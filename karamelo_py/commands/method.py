@@ -14,7 +14,8 @@ from karamelo_py.language.signature import Argument, In, Parameter, variants_of
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.plugins import check_part
 from karamelo_py.schemes.quasi_static import PUBLISHED
-from karamelo_py.script.errors import ScriptError, meant, unknown
+from karamelo_py.script.errors import Mark, ScriptError, meant, unknown
+from karamelo_py.script.syntax import CommandCall
 from karamelo_py.styles.methods.base import CORRECTED
 
 
@@ -96,8 +97,20 @@ def method(
             {Feature(CORRECTED.option, "", CORRECTED.option): CORRECTED},
             [Feature(*name, word) for name, word in zip(names, words, strict=True)],
         )
-    chosen.mark, chosen.corrected = hub.mark, mass == "corrected"
+    chosen.mark, chosen.marks = hub.mark, _marks(hub)
+    chosen.corrected = mass == "corrected"
     hub.update.thermal = chosen.thermal
+
+
+def _marks(hub: Hub) -> dict[str, Mark]:
+    statement = hub.interpreter.statement
+    raws = statement.arguments if isinstance(statement, CommandCall) else ()
+    words = [Argument(raw, hub.interpreter) for raw in raws[:3]]
+    if len(words) < 3 or any(word.keyword() for word in words):
+        return {}
+    marks = dict(zip(("method", "transfer", "basis"), [word.mark for word in words], strict=True))
+    here = hub.mark is not None and all(mark[:2] == hub.mark[:2] for mark in marks.values())
+    return marks if here else {}
 
 
 def _refuse_after_solids(hub: Hub) -> None:

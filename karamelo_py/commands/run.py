@@ -68,25 +68,28 @@ def carry_out(hub: Hub, **length: Any) -> None:
     hub.runs.append(after)
 
 
-def set_dt(hub: Hub, dt: Annotated[float, Positive]) -> None:
-    """Set a constant time step.
+def set_dt(hub: Hub, dt: Annotated[float, Positive] | None) -> None:
+    """Set a constant time step, or return to the step that the program chooses.
 
     Parameters
     ----------
     dt
-        The time step. A run warns if it is above the stable step, which is the cell size divided by
-        (wave speed + velocity), less with usl. A run stops at once if the step is above four times
-        the limit of heat conduction.
+        The time step, or NULL: the step again follows the fastest point. A run warns if the step is
+        above the stable one, which is the cell size divided by (wave speed + velocity), less with
+        usl. A run stops at once if the step is above four times the limit of heat conduction.
 
     Example
     -------
     set_dt(0.001)
+    set_dt(NULL)
 
     See Also
     --------
     dt_factor
     """
     hub.update.fixed_dt, hub.update.dt_mark = dt, hub.mark
+    if dt is None:
+        return
     hub.values.set("dt", dt)
     if hub.update.dt_factor is not None:
         _warn_of_factor(hub)

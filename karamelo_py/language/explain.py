@@ -10,6 +10,7 @@ from karamelo_py.language.kinds import Parameter, Unfit
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.unknown import longer
 from karamelo_py.script.errors import Mark, ScriptError, meant, nearest, table
+from karamelo_py.script.terms import number_of
 
 
 def wrong_count(
@@ -54,12 +55,17 @@ def _of_surplus(text: str, expected: Sequence[Parameter], name: str) -> str | No
 def _left_out(slots: Sequence[Parameter], arguments: Sequence[Argument]) -> list[Parameter]:
     missing, rest = [], list(arguments)
     for slot in slots:
-        words = () if slot.shown == slot.name else slot.kind.words
-        if rest and (not words or rest[0].text in words):
+        if rest and _fits(slot, rest[0].text):
             del rest[0]
         else:
             missing.append(slot)
     return [] if rest or missing == slots[len(arguments) :] else missing
+
+
+def _fits(slot: Parameter, text: str) -> bool:
+    if slot.shown != slot.name and slot.kind.text.startswith(("the word ", "one of ")):
+        return text in slot.kind.words
+    return number_of(text) is None or not slot.kind.text.startswith("the ID of ")
 
 
 def _named(missing: Sequence[Parameter], slots: Sequence[Parameter]) -> list[str]:

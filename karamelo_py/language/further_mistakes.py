@@ -24,6 +24,11 @@ _SCENE = frozenset(
 )
 # These add columns to points.
 _COLUMNS = _SCENE | {"plane_strain", "plane_stress", "uniaxial_stress", "scheme", "fix"}
+# These exist only if a solid has pore water.
+_OF_WATER = {
+    *("pore_pressure", "initial_pore_pressure", "seepage_face", "flux", "saturation", "porosity"),
+    *("water_content", "wx", "wy", "wz", "t11", "t22", "t33", "t12", "t13", "t23"),
+}
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
 _PLAIN = {"group", "plot", "load_path", "element"}
 # Index of the style among the arguments.
@@ -55,8 +60,8 @@ class Dependents:
             self.undeleted.add(name.removeprefix("delete_"))
         if name in _SCENE or name in ("scheme", "set_dt"):
             self.names |= _RUNS
-        if name == "pore_water":
-            self.names |= {"pore_pressure", "initial_pore_pressure", *_RUNS}
+        if name in ("pore_water", "solid"):
+            self.names |= _OF_WATER | _RUNS
         if name == "scheme":
             self.names.update(table()["implicit"].split())
         if name in _SCENE | _NAMED and statement.arguments:

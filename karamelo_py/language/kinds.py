@@ -372,7 +372,8 @@ class Parameter:
         if self.keyword:
             return f"{self.name}={'|'.join(self.kind.words) or self.name}"
         if len(self.kind.words) == 1:
-            return self.kind.words[0]
+            alone = self.kind.text.startswith("the word ")
+            return self.kind.words[0] if alone else f"{self.name}|{self.kind.words[0]}"
         if self.kind.words and self.kind.text.startswith("one of "):
             return "|".join(self.kind.words)
         return self.name

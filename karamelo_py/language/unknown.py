@@ -43,6 +43,9 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
     other = table()["functions"].get(name)
     if statement:
         other = in_own_words(script, name) or instead("command", name) or as_style(script, name)
+    if name == "time" and not statement:
+        message, expected = "time(...) is an interval for output, not a number", "a number"
+        return ScriptError(message, mark=mark, expected=expected, hint="the number without time()")
     if script.knows(name) and not other:
         message = f"'{name}' is not a {kind} but a variable"
         expected = "an operator between the name and the parenthesis"

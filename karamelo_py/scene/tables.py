@@ -11,7 +11,7 @@ from karamelo_py.language.kinds import TableFile
 from karamelo_py.language.scene import Scene
 from karamelo_py.language.signature import Argument
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.reading import read_text
+from karamelo_py.script.reading import read_text, refuse_decimal_commas
 from karamelo_py.script.terms import number_of
 
 
@@ -103,11 +103,12 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     """
     rows = []
     try:
-        lines = read_text(path).splitlines()
+        text = read_text(path)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ScriptError(f"{path} cannot be read: {reason}", argument="file") from None
-    for number, line in enumerate(lines, 1):
+    refuse_decimal_commas(path, text, "file")
+    for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
             cells = re.split(r"\s*[,;\t]\s*" if re.search("[,;\t]", line) else r"\s+", line.strip())
             rows.append((number, [cell.strip('" ') for cell in cells]))
@@ -122,10 +123,8 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
     for number, cells in rows:
         values = [number_of(cell) for cell in cells]
         if len(values) != len(names) or None in values or any(map(isnan, values)):
-            raise ScriptError(
-                f"line {number} of {path}: {' '.join(cells)}",
-                expected=f"{len(names)} numbers: {', '.join(names)}",
-                argument="file",
-            )
+            expected = f"{len(names)} numbers: {', '.join(names)}"
+            message = f"line {number} of {path}: {' '.join(cells)}"
+            raise ScriptError(message, expected=expected, argument="file")
         table.append(values)
     return dict(zip(names, np.array(table, float).reshape(-1, len(names)).T, strict=True))

@@ -353,6 +353,15 @@ def run(options: Namespace) -> int:
         raise ScriptError(f"-accuracy {options.accuracy}", expected="one column")
     if options.cost not in records.COLUMNS:
         raise ScriptError(f"-cost {options.cost}", expected="one of " + ", ".join(records.COLUMNS))
+    numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
+    name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
+    finer = "a number with at least 3 values, such as -var N=10,20,40,80, or with one value and "
+    finer += "words to compare"
+    if name not in numeric:
+        raise ScriptError("no variable makes the scene finer", expected=finer)
+    together = variables.zipped(options)
+    if any(name in group for group in together):
+        raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     target, chosen = options.target, {}
     if ["auto"] in (words[:1] for words in plan.script.words("method")):
         chosen = chosen_in(options.script, {name: texts[0] for name, texts in values.items()})
@@ -362,20 +371,11 @@ def run(options: Namespace) -> int:
     if target is None:
         expected = "-target 1e-2, or method(auto, accuracy=0.01) in the script"
         raise ScriptError("there is no largest error", expected=expected)
-    numeric = [name for name in values if all(number_of(v) is not None for v in values[name])]
-    name = options.along or max(numeric, key=lambda n: len(values[n]), default=None)
-    compared = name in numeric and len(values[name]) == 1 < prod(map(len, values.values()))
-    if name not in numeric or (len(values[name]) < 3 and not compared):
-        wrong = "no variable makes the scene finer"
-        if name in numeric:
-            wrong = f"-var {name} has {plural(len(values[name]), 'value')}"
-        expected = "a number with at least 3 values, such as -var N=10,20,40,80, or with one value "
-        expected += "and words to compare"
-        raise ScriptError(wrong, expected=expected)
+    compared = len(values[name]) == 1 < prod(map(len, values.values()))
+    if len(values[name]) < 3 and not compared:
+        wrong = f"-var {name} has {plural(len(values[name]), 'value')}"
+        raise ScriptError(wrong, expected=finer)
     others = {n: v for n, v in values.items() if n != name}
-    together = variables.zipped(options)
-    if any(name in group for group in together):
-        raise ScriptError(f"-zip: {name} makes the scene finer", expected="choices in step")
     combined = variables.cases(others, together, options.where) if others else [{}]
     choices = [ChoiceRuns(case) for case in combined]
     most = len(choices) * len(values[name])

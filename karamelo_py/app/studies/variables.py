@@ -43,7 +43,7 @@ def choices(words: Iterable[str], in_step: Container[str] = ()) -> dict[str, lis
         values = [value.strip() for value in text.split(",")]
         if not equals or not name.isidentifier() or not all(values):
             raise ScriptError(f"-var {word}: this is not a list of values", expected=VALUES)
-        if re.fullmatch(r"\d+,\d+[eE][+-]?\d+", text):
+        if re.fullmatch(r"[1-9]\d*,\d+[eE][+-]?\d+", text):
             hint = f"{text.replace(',', '.')}, or {text.replace(',', '.0,')} for two values"
             raise ScriptError(f"-var {word}: a decimal comma?", expected=hint)
         if name in variables:

@@ -138,9 +138,11 @@ def features(hub: Hub) -> Iterator[Feature]:
     mark, name = method.mark, registry.name_of("method", type(method))
     transfer = registry.name_of("transfer", type(update.transfer))
     scheme = registry.name_of("scheme", type(update.scheme))
-    yield Feature("method", name, f"method {name}", mark=mark)
-    yield Feature("basis", method.basis_name, f"the basis {method.basis_name}", mark=mark)
-    yield Feature("transfer", transfer, f"transfer {transfer}", mark=mark)
+    basis, marks = method.basis_name, dict.fromkeys(("method", "basis", "transfer"), mark)
+    marks |= method.marks
+    yield Feature("method", name, f"method {name}", mark=marks["method"])
+    yield Feature("basis", basis, f"the basis {basis}", mark=marks["basis"])
+    yield Feature("transfer", transfer, f"transfer {transfer}", mark=marks["transfer"])
     yield Feature("scheme", scheme, f"scheme {scheme}", mark=update.scheme_mark)
     if update.scheme.traits.implicit and update.scheme.traits.inertia:
         words = f"scheme {scheme}, which has no inertia of rotation around an axis"

@@ -140,7 +140,16 @@ class LostByContact(Compute):
             )
 
     def refresh(self) -> None:
-        self.publish_all(self.hub.fields.lost_by_contact())
+        hub = self.hub
+        touching = [fix for fix in hub.fixes.values() if fix.presses or fix.touches or fix.solids]
+        no_contact = not (touching or hub.update.method.fields_per_solid)
+        if no_contact and hub.update.first_time("contact loss"):
+            hub.warn(
+                f"compute contact_loss '{self.id}' stays 0: the scene has no contact",
+                mark=self.mark,
+                hint="method(ulmpm/contacts, ...), fix contact/surface or contact/rigid_body",
+            )
+        self.publish_all(hub.fields.lost_by_contact())
 
 
 class Drift:

@@ -295,6 +295,7 @@ class Probe(Mean):
     """
 
     empty = np.nan
+    _has_warned = False
 
     def __init__(
         self,
@@ -314,6 +315,12 @@ class Probe(Mean):
         self.at = {axis: c for axis, c in zip("xyz", (x, y, z), strict=True) if c is not None}
         if point is not None and self.at:
             raise ScriptError("a probe is at a point or at a position, not both", argument="point")
+        d = hub.domain.dimension
+        for axis in "xyz"[d:]:
+            if axis in self.at:
+                message = f"a {d}D scene has no coordinate {axis}"
+                expected = "a position " + ", ".join(f"{name}=..." for name in "xyz"[:d])
+                raise ScriptError(message, argument=axis, expected=expected)
         self.published = ("",) if len(self.columns) == 1 else self.columns
         count = sum(solid.count for solid in hub.solids.values())
         if point is not None and all(s.count for s in hub.solids.values()) and 0 < count < point:
@@ -324,8 +331,17 @@ class Probe(Mean):
         if self.point is None and not self.at:
             super().refresh()
             return
-        nearest = self.hub.fields.each(self, "nearest")
-        self.publish_all(*(min(nearest)[2:] if nearest else [self.empty] * len(self.columns)))
+        nearest = min(self.hub.fields.each(self, "nearest"), default=None)
+        self.publish_all(*(nearest[2:] if nearest else [self.empty] * len(self.columns)))
+        if nearest and self.at and nearest[0] > self.hub.domain.h**2 and not self._has_warned:
+            self._has_warned = True
+            place = ", ".join(f"{axis}={c:g}" for axis, c in self.at.items())
+            self.hub.warn(
+                f"compute probe '{self.id}': no point is near {place}; the nearest, with id "
+                f"{nearest[1]:.0f}, is at a distance of {nearest[0] ** 0.5:.3g}",
+                mark=self.mark,
+                hint="a position inside the body, or point=... for the point with this id",
+            )
 
     def terms(self, points: PointTable) -> list[np.ndarray]:
         volume = points.particle("volume")

@@ -1,6 +1,6 @@
 """Base of methods."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -76,6 +76,7 @@ class Method:
     basis_name = ""
     thermal = False
     mark: Mark | None = None
+    marks: Mapping[str, Mark] = {}  # of the words of method(...), by family
     corrected = False
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False

@@ -26,7 +26,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.script.derivatives import derivative, to_power
 from karamelo_py.script.errors import ScriptError
-from karamelo_py.script.reading import read_text
+from karamelo_py.script.reading import read_text, refuse_decimal_commas
 
 STEEPEST = 1e6  # largest slope of a flow stress / G
 
@@ -77,8 +77,9 @@ def _points(curve: tuple) -> np.ndarray:
     if len(curve) == 1 and isinstance(curve[0], Path):
         path = curve[0]
         try:
-            text = read_text(path).replace(",", " ")
-            points = np.loadtxt(text.splitlines(), ndmin=2)
+            text = read_text(path)
+            refuse_decimal_commas(path, text, "curve")
+            points = np.loadtxt(text.replace(",", " ").splitlines(), ndmin=2)
         except (OSError, ValueError) as error:
             raise ScriptError(f"{path}: {error}", argument="curve") from None
         if points.shape[1:] != (2,):
