@@ -160,3 +160,33 @@ def test_heat_flux_does_not_mix_with_temperatures(run_interpreted):
     err = run_interpreted(text.replace("    p = ", "    " + steel + solid, 1), status=1).err
     assert "Qh of material 'air' diffuses energy per mass, and solid 'steel'" in err
     assert err.count("error:") == 1
+
+
+WALL = """
+    method(ulmpm, FLIP, quadratic-spline, 1)
+    dimension(1, 0, 1, 0.1)
+    region(column, block, 0, 0.8)
+    eos(gas, ideal-gas, 1, 5/3, p=1e-6, Q1=6, Q2=0.2)
+    strength(none, fluid, 0)
+    material(gas, eos-strength, gas, none)
+    solid(gas, region, column, 2, gas, 0.1)
+    region(wall, block, -INF, 0.01)
+    group(wall, nodes, region, wall, all)
+    fix(wall, velocity_nodes, wall, 0)
+    fix(v, initial_velocity_particles, all, -1)
+    compute(Ek, kinetic_energy, all)
+    set_output(1)
+    log_modify(custom, step, dt, Ek)
+    run(10)
+"""
+
+
+def test_first_step_of_a_shock(run_interpreted):
+    """A cold gas that flows against a wall only loses kinetic energy (Noh 1987).
+
+    No rate of compression is known yet. The step is 0.9 h/(c' + v), c' = 2 Q1 v for a cell that
+    closes with v (Belytschko et al. 2014, eq. 6.3.10); with 0.9 h/v the energy grows by 40 %.
+    """
+    log = run_interpreted(WALL).log
+    assert log.dt[0] == pytest.approx(0.9 * 0.1 / (2 * 6 + 1), rel=2e-3)
+    assert log.Ek.max() <= log.Ek[0] * (1 + 1e-9)

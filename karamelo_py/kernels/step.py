@@ -20,7 +20,7 @@ from karamelo_py.kernels.table import Processor, take
 from karamelo_py.kernels.views import deformation_of, state_at
 from karamelo_py.kernels.watch import look, look_at_heat
 from karamelo_py.points.frames import inverse_stretch_squared
-from karamelo_py.points.laws import wave_speed_squared
+from karamelo_py.points.laws import meeting, wave_speed_squared
 
 
 class Fused(NamedTuple):
@@ -203,15 +203,17 @@ def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
 def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
     motion = control.motion[0]
-    rate = 0.0
+    rate, first = 0.0, control.step[0].last_dt == 0
     common = clocks.common_velocity(kin, motion, motion.rate)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         f = deformation_of(frame, kin, points, (law, state), p)
         shorter = inverse_stretch_squared(frame, kin, f, points.mass[p])
+        v = (load_vector(kin, points.v, p) - common).largest()
+        if first:
+            state = meeting(law, state, v)
         speed = sqrt(wave_speed_squared(law, kin, state) * shorter)
-        v = load_vector(kin, points.v, p) - common
-        rate = max(rate, speed + v.largest())
+        rate = max(rate, speed + v)
     motion.rate = max(motion.rate, rate)
 
 

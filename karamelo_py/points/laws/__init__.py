@@ -297,6 +297,12 @@ def wave_speed_bound(law, kin, state):
 
 
 @point_function(otherwise=True)
+def meeting(law, state, speed):
+    """Return the state with the viscous pressure of a shock, if a cell closes with a speed."""
+    return state
+
+
+@point_function(otherwise=True)
 def stretch_across(law, state):
     return 1
 

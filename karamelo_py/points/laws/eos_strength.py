@@ -590,6 +590,15 @@ def _wave_speed_squared_eos_strength(law, kin, state):
     return damped(squared, viscous)
 
 
+@laws.meeting.on(EosStrength)
+def _meeting_eos_strength(law, state, speed):
+    J, _, m = state
+    if isinstance(law.viscosity, Absent):
+        return state
+    at_once = viscous_after(law, J, m, -speed / law.viscosity.cell_size)
+    return state._replace(m=m._replace(viscous=(max(at_once[0], m.viscous[0]),)))
+
+
 @inviscid.on(EosStrength)
 def _inviscid_eos_strength(law):
     return law._replace(viscosity=Absent(), strength=inviscid(law.strength))
