@@ -87,7 +87,7 @@ def older(path: Path) -> None:
         (of_another_kind, "r.2.h5 is not a restart file of this program: list indices"),
         (spoilt, "r.2.h5 is not a restart file of this program: "),
         (spoilt_numbers, "r.2.h5: the file is damaged: "),
-        (incomplete, "r.2.h5: its state is not one of this scene: v of points"),
+        (incomplete, "r.2.h5: its state does not fit this scene: v of points"),
         (older, "r.2.h5 has format 4, of an older karamelo-py"),
     ],
 )

@@ -516,7 +516,7 @@ def test_check_tells_too(run_interpreted):
     assert "angular momentum: " in said
 
 
-GIVES = "gives 36 points of this group a different {}: this fix decides"
+GIVES = "gives 36 points of this group a different {}: this fix applies"
 VELOCITIES = [
     (["velocity_particles, left, 0.1, 0", "velocity_particles, left, 0.2, 1"], "vx and vy"),
     (["velocity_particles, left, 0.1, 0", "velocity_particles, all, NULL, 1"], "vy"),
@@ -567,7 +567,7 @@ def test_held_nodes_around_driven_points_are_told(run_interpreted, method, regio
     fixes = ["velocity_nodes, held, 0, 0", f"velocity_particles, left, {velocity}"]
     scene = _with_fixes(*fixes).replace("set_dt", lines + "\n    set_dt").replace("ulmpm", method)
     said = run_interpreted(scene, command="check").err
-    told_of = "gives all nodes around 36 points of this group a different vx: this fix decides how"
+    told_of = "gives all nodes around 36 points of this group a different vx: this fix applies how"
     assert (told_of in said) == told and ("a different v" in said) == told
     assert ("fix: nodes that these points do not reach" in said) == told
 

@@ -86,7 +86,7 @@ def test_fixes_that_do_not_agree(run_interpreted, second, warns):
             "quit",
         )
     ).err  # fmt: skip
-    assert ("gives 169 nodes of this group a different vx: this fix decides there" in err) == warns
+    assert ("gives 169 nodes of this group a different vx: this fix applies there" in err) == warns
     assert ("a different vx" in err) == warns
 
 

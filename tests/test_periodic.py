@@ -419,5 +419,5 @@ def test_directions_and_lengths_are_checked(run_interpreted, line):
     else:
         script = script.replace("boundary(periodic, x)", line)
     err = run_interpreted(script, status=1).err
-    told = "is for all directions", "has no shear", "is not a multiple of the cells"
+    told = "applies to all directions", "has no shear", "is not a multiple of the cells"
     assert any(words in err for words in told)

@@ -308,7 +308,7 @@ def test_variables_of_the_command_line(run_interpreted):
     [
         ("100, 0.3", "100, 0.2", "this statement was material(rubber,linear,2,100,0.3) there"),
         ("run(4)", "", "this one ends before"),
-        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there a run was here"),
+        ("run(4)", "region(r, block, 0, 1, 0, 1)", "there, this statement was a run"),
         ("FLIP, linear, 1", "FLIP, linear, 0.9", "this statement was method("),
     ],
 )
@@ -396,7 +396,7 @@ def test_colours_go_into_another_script(run_interpreted):
         ("box, 2, rubber", "box, 1, rubber", "solid 'body' 8 points of LinearElastic"),
         ("0, 1.2, 0.1)", "0, 1.3, 0.1)", "domain 2"),
         ("block, 0.3, 0.5,", "block, 0.35, 0.55,", "other points in solid 'body'"),
-        ("solid(body", "solid(other", "solid 'body', which is not here"),
+        ("solid(body", "solid(other", "solid 'body', which only that scene has"),
         ("rubber, linear, 2, 100", "rubber, neo-hookean, 2, 100", "points of LinearElastic"),
     ],
 )  # fmt: skip
@@ -479,7 +479,7 @@ def test_numbers_that_the_scene_does_not_have(run_interpreted, name, number):
         array[3] = number
         array.attrs["crc32"] = zlib.crc32(array[:].tobytes())
     result = run_interpreted(FLY, "-restart", "r.2.h5", status=1)
-    assert f"its state is not one of this scene: points/0/{name} has" in result.err
+    assert f"its state does not fit this scene: points/0/{name} has" in result.err
     assert str(number) in result.err
 
 

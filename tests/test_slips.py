@@ -61,9 +61,9 @@ OF = "material(rubber, eos-strength, e, s"
         ([], f"{METAL}temperature(w, plastic_work, 0.9, 0.5, 0, 0, 300, 1300)\n{OF}, w)",
          "a plastic strain of 1 warms it by 9e+04 kelvin", "500 for steel"),
         ([], f"{METAL}temperature(w, plastic_work, 0.9, 500, 0, 12e-6, 300, 1300)\n{OF}, w)",
-         "it expands by 2.5e-17 a kelvin", "alpha is 3 K = 4.8e+11 times"),
+         "it expands by 2.5e-17 per kelvin", "alpha is 3 K = 4.8e+11 times"),
         ([], "material(rubber, linear, 7850, 2e11, 0.3, 460, 45, 12)",
-         "it expands by 12 a kelvin", "1.2e-5"),
+         "it expands by 12 per kelvin", "1.2e-5"),
         ([], "eos(e, shock, 8930, 1e11, 3940, 1490, 2, 385, 294, 150, 60)\n"
          "strength(s, plastic, 43e9, 4e8)", "the slope S of its shock speed is 1490", "no unit"),
         ([], "eos(e, shock, 8930, 1e11, 3940, 1.49, 2, 385, 294, 150, 60)\n"

@@ -254,7 +254,7 @@ def test_what_cannot_be_thin_is_refused(run_interpreted, line, before, says):
     [
         ("plane_stress(true, thickness=0)", "thickness"),
         ("plane_stress(false, thickness=3)", "plane_stress(false) does not use thickness=3"),
-        ("plane_stress(true, thickness=2)\nplane_stress(true)", "with 2 across already"),
+        ("plane_stress(true, thickness=2)\nplane_stress(true)", "already set, with 2 across"),
         ("plane_stress(true)\neos(w, fluid, 1000, 2e6, 7)\nstrength(s, fluid, 1e-3)\n"
          "material(water, eos-strength, w, s)", "eos fluid is for fluids or loose grains"),
         ("plane_stress(true)\neos(w, ideal-gas, 1, 1.4, p=1)\nstrength(s, linear, 1)\n"

@@ -442,7 +442,7 @@ def test_constants_that_no_body_has(run_interpreted, line, says):
 @pytest.mark.parametrize(
     ("line", "says"),
     [
-        ("rubber, 1, 9", "r = 1 would leave less than no stress"),
+        ("rubber, 1, 9", "r = 1 would reverse the stress"),
         ("rubber, 2, -9", "above 0"),
         ("stiff, 2, 9", "no energy that could soften"),
         ("warm, 2, 9", "no energy that could soften"),

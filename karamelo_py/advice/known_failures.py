@@ -268,7 +268,7 @@ def warn_about_factor(hub: Hub) -> None:
     idle = update.dt_factor is not None and update.fixed_dt is None
     if idle and update.first_time("dt_factor"):
         hub.warn(
-            "dt_factor has no effect: load steps are set by set_dt, or 1",
+            "dt_factor has no effect: set_dt sets the size of load steps (default 1)",
             mark=update.dt_mark,
             hint="set_dt(...) instead",
             code="dt-factor-ignored",

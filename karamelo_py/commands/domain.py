@@ -164,7 +164,7 @@ def boundary(
     if shear:
         raise ScriptError(f"boundary({style}) has no shear", argument="shear", expected="periodic")
     if directions:
-        message = f"boundary({style}) is for all directions"
+        message = f"boundary({style}) applies to all directions"
         raise ScriptError(message, argument="directions", expected=f"boundary({style})")
     hub.update.boundary = style
     hub.update.boundary_mark = hub.mark
@@ -334,7 +334,7 @@ def _refuse_counts(hub: Hub, ID: str, arguments: Sequence[Argument]) -> None:
     region, *counts, material, h = (argument.text for argument in arguments)
     if len(counts) == hub.domain.dimension > 1:
         raise ScriptError(
-            f"{', '.join(counts)} points along the sides: points are counted in a cell here",
+            f"{', '.join(counts)} points along the sides: here ppc counts points in a cell",
             mark=arguments[1].mark,
             expected=solid.syntax,
             hint=f"solid({ID}, region, {region}, 1, {material}, {h}), or more than 1 in each "

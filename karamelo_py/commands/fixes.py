@@ -111,7 +111,7 @@ def _define(hub: Hub, kind: str, ID: str, style: str, arguments: tuple) -> Any:
     new.style = style
     if kind == "fix" and new.by_sizes and hub.domain.thickness != 1:
         raise ScriptError(
-            "it takes the sizes of points from their volumes, which contain the thickness",
+            "it computes sizes of points from their volumes, which contain the thickness",
             expected="plane_stress(true) with the thickness 1, and loads per thickness",
         )
     replaces = catalogue is hub.fixes
@@ -149,7 +149,7 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 f"'{ID}' would publish its value as '{name}', which is "
                 + MEANINGS.get(name, "a coordinate of points"),
                 argument="ID",
-                expected="an ID that means nothing else",
+                expected="an ID without another meaning",
                 hint=f"choose another ID, such as {ID}_1",
             )
         if name in hub.interpreter.variables:

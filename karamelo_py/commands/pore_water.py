@@ -92,7 +92,7 @@ def pore_water(
     fix pore_pressure, fix initial_pore_pressure, material, scheme semi-implicit
     """
     if (permeability is None) == (intrinsic is None):
-        message = "the permeability is given " + ("twice" if intrinsic else "nowhere")
+        message = "the permeability is " + ("given twice" if intrinsic else "missing")
         expected = "permeability=... in m/s, or intrinsic=... in m^2"
         raise ScriptError(message, argument="permeability", expected=expected)
     if not LEAST <= n <= MOST:
@@ -136,7 +136,7 @@ def pore_water(
     if grains > HEAVIEST:
         hub.warn(
             f"the grains of '{material.id}' would be {grains:.2g} times as dense as water: "
-            f"density {dry:g} over 1 - n",
+            f"density {dry:g} divided by 1 - n",
             hint="a material takes the dry density, (1 - n) times the density of its grains",
         )
     k = KozenyCarman() if kozeny else ConstantPermeability()

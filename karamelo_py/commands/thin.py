@@ -89,7 +89,7 @@ def _set(hub: Hub, active: bool, command: str, dimension: int, thickness: float)
         message = f"{command}(false) does not use {name}={thickness:g}"
         raise ScriptError(message, argument=name, expected=f"{command}(true, ...), or no {name}")
     if active and domain.thin and thickness != domain.thickness:
-        message = f"the body has {command} with {domain.thickness:g} across already"
+        message = f"{command} is already set, with {domain.thickness:g} across the body"
         raise ScriptError(message, argument="active", expected=f"one {command}(true, ...)")
     if active and domain.kin.hoops:
         message = f"the scene is {domain.kin.word}, which has hoop stress"

@@ -259,7 +259,7 @@ def one_by_one(rows: Iterable[Any], loops: Iterable[Visit] = ()) -> list[Any]:
 def _says_sweep(row: Sweep, setup: Any) -> str:
     parts = [tag.says for tag in row.visit.tasks if row.gathers]
     parts += [tag.says for tag in row.visit.quantities if row.scatters]
-    return ", ".join(parts) + (" in one visit of the points" if len(parts) > 1 else "")
+    return ", ".join(parts) + (" in one pass over the points" if len(parts) > 1 else "")
 
 
 _SAYS: dict[type, Any] = {
@@ -492,15 +492,15 @@ def sort_in_time(s: Setup) -> tuple:
 
 
 JOIN_MEANS, JOIN_STRESSES = seams(JoinMean, ()), seams(JoinMeanStress, ())
-SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of nodes a period apart")
-SEAM_AGAIN = SceneTask(seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of nodes a period apart")
+SEAM = SceneTask(seams(Join, sheared.OF_SUMS), "sums of periodic images")
+SEAM_AGAIN = SceneTask(seams(JoinVelocity, sheared.OF_VELOCITY), "momentum of periodic images")
 HEAT = SceneTask(lambda s: s.heat.rows, "heat to the nodes, its flow, temperature of the points")
 FRICTION = SceneTask(at_nodes_with(loss.FrictionalHeat, loss.ClearFrictionalHeat()))
 LOSS = SceneTask(
     at_nodes_with(loss.EnergyLoss, loss.KeepLoss()),
     "kinetic energy that the nodes lose, as heat to the points",
 )
-AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in one visit of the points")
+AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in a pass over the points")
 CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
 )

@@ -228,7 +228,7 @@ class Interpreter:
         last = replay.at_end
         self._execute(statement)
         if last and self.replay is replay:
-            raise replay.other_script("there a run was here", statement.mark)
+            raise replay.other_script("there, this statement was a run", statement.mark)
 
     def _including(self, depth: int) -> list[Mark]:
         frames = self.frames[:depth]

@@ -238,7 +238,7 @@ def check_name(name: str) -> None:
     free = f"another name, such as {name}_1 or my_{name}"
     other = f"{name}(...) calls it" if meaning == "a command" else instead("command", name)
     message = f"'{name}' is {meaning} and cannot be assigned"
-    expected = "a name that is free"
+    expected = "a name that is not in use"
     hint = f"{other}; or choose {free}" if other else f"choose {free}"
     raise ScriptError(message, code="taken-name", name=name, expected=expected, hint=hint)
 

@@ -54,7 +54,7 @@ class LoadPath(Named):
         normal = [name for name in NORMAL if name in self.stress]
         if normal:
             raise ScriptError(
-                f"the volume is prescribed, and s{normal[0]} needs it free",
+                f"the volume and s{normal[0]} are both prescribed",
                 argument="volumetric",
                 expected="normal strains with volumetric, no normal stresses",
             )

@@ -19,7 +19,7 @@ TWIST = Restrictions(
     only={"method": ("ulmpm", "tlmpm", "ulmpm/contacts")},
     without=("series", "corners", "mass=corrected", "periodic", "rigid_body", "newmark"),
     but={
-        "tools": "ulmpm/contacts with fix contact/friction, which also rubs around the axis, or "
+        "tools": "ulmpm/contacts with fix contact/friction, which also acts around the axis, or "
                  "fix angular_velocity_nodes",
         "rigid": "a stiff solid, or nodes held by fix angular_velocity_nodes",
         "yielding walls": "velocities without geq, leq and mu, or ulmpm/contacts with fix "

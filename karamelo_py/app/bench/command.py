@@ -168,7 +168,7 @@ def _print(name: str, one: measure.Measured | measure.Solved, *, published: bool
     print(f"  {'bytes moved per particle-step':<34} {one.bytes_per_particle_step:8.0f}")
     cached = " (above 100 %: caches hold a part)" if one.roofline > 1 else ""
     print(f"  {'fraction of the memory bandwidth':<34} {100 * one.roofline:8.1f} %{cached}")
-    print(f"  {'the same, of arrays of its size':<34} {100 * one.roofline_in_place:8.1f} %")
+    print(f"  {'the same, for arrays of its size':<34} {100 * one.roofline_in_place:8.1f} %")
     stages = one.sweeps_of_points | one.sweeps_of_nodes if one.distinguished else {}
     for stage, per in stages.items():
         print(f"    {stage:<38} {1e9 * per / one.points:8.2f} ns")

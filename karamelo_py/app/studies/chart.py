@@ -57,7 +57,7 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     wanted.add_argument(
         "-distribution", metavar="COLUMN",
-        help="draw the distribution of a result of sweep -sample, and it against each variable",
+        help="draw a result of sweep -sample: its distribution, and against each variable",
     )  # fmt: skip
     parser.add_argument("-cost", metavar="COLUMN", help="column of the cost (seconds)")
     parser.add_argument(
@@ -67,7 +67,7 @@ def add_options(parser: ArgumentParser) -> None:
     kinds.add_argument("-x", metavar="NAME", help="draw errors against this variable, not cost")
     kinds.add_argument("-heat", metavar="A,B", help="draw errors against two variables, as colours")
     kinds.add_argument(
-        "-versus", metavar="NAME", help="compare its two values in each of the tables"
+        "-versus", metavar="NAME", help="compare results for its two values in each table"
     )
     parser.add_argument("-law", metavar="FORMULA", help="a formula of -x, drawn with -y")
     parser.add_argument("-data", type=Path, metavar="FILE", help="measured points, drawn with -y")

@@ -38,7 +38,7 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "-within", type=above_zero, metavar="WIDTH",
-        help="end when the value is known within this (1/100 of the distance of the ends)",
+        help="tolerance of the value (1/100 of the range)",
     )  # fmt: skip
     parser.add_argument("-o", type=Path, default=Path("find.csv"), help="the table (find.csv)")
 

@@ -185,7 +185,7 @@ def add_options(parser: ArgumentParser) -> None:
         help="a log column, as for -record of sweep, and its measured value: a number or "
         "FILE:COLUMN",
     )  # fmt: skip
-    parser.add_argument("-most", type=positive, default=20, help="steps of the search at most (20)")
+    parser.add_argument("-most", type=positive, default=20, help="largest number of steps (20)")
     parser.add_argument("-o", type=Path, default=Path("fit.csv"), help="table of runs (fit.csv)")
 
 

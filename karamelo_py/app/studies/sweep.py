@@ -37,7 +37,7 @@ def add_options(parser: ArgumentParser) -> None:
         "-time", action="store_true",
         help="measure time: one run at a time, each several times; the table has the median",
     )  # fmt: skip
-    parser.add_argument("-repeat", type=positive, default=3, help="runs of each for -time (3)")
+    parser.add_argument("-repeat", type=positive, default=3, help="repetitions for -time (3)")
     parser.add_argument("-o", type=Path, default=Path("sweep.csv"), help="the table (sweep.csv)")
 
 
@@ -51,7 +51,7 @@ def run(options: Namespace) -> int:
     if options.fails:
         uncertainty.check(options.fails, [*plan.values, *(item.word for item in items), *COLUMNS])
     if options.keep and not options.on:
-        raise ScriptError("-keep without -on", expected="-on WHERE: here, all files are kept")
+        raise ScriptError("-keep without -on", expected="-on WHERE (local files always stay)")
     facts = {
         "record": [item.text for item in items], "computes": plan.script.computes(),
         "timed": options.time, "repeat": repeat, **drawn,

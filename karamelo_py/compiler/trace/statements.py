@@ -173,7 +173,7 @@ _BINARY = {
     ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Invert: operator.invert,
 }  # fmt: skip
 _CHANGING = (list, dict, set)
-_ON_ALL_WAYS = "on one of several ways, a list would change on all"
+_ON_ALL_WAYS = "a list cannot be changed on one of several branches only"
 _IMPORT = "`import` within a function: import at the top of the file"
 _WORDS = {
     "Try": "`try` or `with`", "With": "`try` or `with`", "Delete": "`del`",
@@ -351,7 +351,7 @@ class AstCompiler:
 
     def among(self, a: Any, things: Any) -> Any:
         if is_value(things):
-            raise Untraceable("kernels do not look for a number in an array")
+            raise Untraceable("kernels do not support `in` for arrays")
         same = [operator.eq(a, b) for b in things] if is_value(a) else [a in things]
         return functools.reduce(lambda one, other: emit(operator.or_, one, other), same or [False])
 

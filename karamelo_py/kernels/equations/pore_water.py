@@ -339,7 +339,7 @@ class PoreVolumes(eq.ExtensiveQuantity):
 
 
 class UnseenStrain(eq.ExtensiveQuantity):
-    says = "unseen strain and pressure to grid"
+    says = "null-space strain and pressure to grid"
     takes = OF_PORES
     gives = (
         eq.Sum(

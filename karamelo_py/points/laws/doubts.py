@@ -178,4 +178,4 @@ def _doubts_of_heat(law: Any, K: float, flow: float) -> Iterator[tuple[str, str]
 
 def _doubts_of_expansion(alpha: float, right: str) -> Iterator[tuple[str, str]]:
     if not EXPANSION[0] < abs(alpha) < EXPANSION[1]:
-        yield f"it expands by {alpha:.3g} a kelvin", f"{right}; for steel it is 1.2e-5"
+        yield f"it expands by {alpha:.3g} per kelvin", f"{right}; for steel it is 1.2e-5"

@@ -302,7 +302,7 @@ class ArrudaBoyce(NamedTuple):
     def checked(self):
         if not self.limit > 1:
             raise ScriptError(
-                f"chains straight at a stretch of {self.limit:g} have no rest",
+                f"chains that are straight at a stretch of {self.limit:g} are straight at rest",
                 argument="limit",
                 expected="a stretch above 1",
             )

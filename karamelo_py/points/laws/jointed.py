@@ -117,7 +117,7 @@ class JointedConstants(NamedTuple):
             raise ScriptError(
                 f"the angle of dilatancy psi = {psi:g} is impossible with phi = {phi:g}",
                 argument="psi",
-                expected=f"an angle from 0 to {phi:g} degrees: beyond, slip would make energy",
+                expected=f"an angle from 0 to {phi:g} degrees: slip would generate energy beyond",
             )
         friction = tan(radians(phi))
         if tension * friction > cohesion * (1 + 1e-9):

@@ -18,8 +18,8 @@ def warn_of_leaning(
         kind,
         f"{title} out of the plane",
         when=when,
-        reason=f"the {of} of material '{{owner.id}}' lean: the body would shear out of its plane, "
-        "which {scene.d}D prevents",
+        reason=f"the {of} of material '{{owner.id}}' are inclined: the body would shear out of its "
+        "plane, which {scene.d}D prevents",
         cure=cure,
     )
 

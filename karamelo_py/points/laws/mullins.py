@@ -76,7 +76,7 @@ class Mullins(NamedTuple):
     ) -> Any:
         if not r > 1:
             raise ScriptError(
-                f"r = {r:g} would leave less than no stress", argument="r", expected="above 1"
+                f"r = {r:g} would reverse the stress", argument="r", expected="above 1"
             )
         return cls(elastic.whole, r, m, beta)
 

@@ -371,7 +371,7 @@ def _checked(arrays: ArraysByName, name: str, expected: np.ndarray, *, read: boo
 
 def _misfit(reason: str) -> ScriptError:
     return ScriptError(
-        f"its state is not one of this scene: {reason}",
+        f"its state does not fit this scene: {reason}",
         expected="a file that the same scene has written: the same solids, materials and method",
     )
 

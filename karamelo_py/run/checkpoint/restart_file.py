@@ -319,7 +319,7 @@ def check(hub: Hub, restart: Restart) -> None:
         if mine == theirs or (name == "boundary" and "reflect" not in (mine, theirs)):
             continue
         if mine is None or theirs is None:
-            difference = f"{name}, which {'is not here' if mine is None else 'it does not have'}"
+            difference = f"{name}, which only {'that scene' if mine is None else 'this one'} has"
         elif name.startswith("solid") and mine.rsplit(",")[0] == theirs.rsplit(",")[0]:
             difference = f"other points in {name}"
         else:

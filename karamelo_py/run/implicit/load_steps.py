@@ -220,7 +220,7 @@ class LoadSteps:
             if cavitates and simulation.hub.update.first_time("cavitation"):
                 simulation.hub.warn(
                     f"{self._now()}: the water is in tension beyond 1 bar, where it boils",
-                    hint="pore_water(..., suction=1000): pores that empty",
+                    hint="pore_water(..., suction=1000) lets pores empty",
                 )
         finish(control)
         simulation.steps.anew()
@@ -233,7 +233,7 @@ class LoadSteps:
         except Singular:
             raise self._error(
                 "temperatures have no solution: some conductivity is not finite",
-                "look at conductivities and heat capacities",
+                "check conductivities and heat capacities",
             ) from None
 
     def _forces(self, hooks: Tag) -> np.ndarray:
@@ -314,7 +314,7 @@ class LoadSteps:
             simulation.hub.warn(
                 f"{self._now()}: the equilibrium is unstable (the determinant of the stiffness "
                 "is negative): the body can buckle, or is beyond a limit load",
-                hint="a small imperfection, or scheme(newmark), shows its motion",
+                hint="add a small imperfection, or use scheme(newmark), to follow its motion",
             )
         release(newton.kept)
         self.cached = equations.cached()

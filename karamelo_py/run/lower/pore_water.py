@@ -68,7 +68,7 @@ class PoreWater(NamedTuple):
         if Tv < UNDRAINED:
             state = (
                 "undrained: less than 2 % of the water flows; a dry material of the saturated "
-                f"density, with a bulk modulus {self.stiffness:.3g} larger, would do"
+                f"density, with a bulk modulus {self.stiffness:.3g} larger, is enough"
             )
         elif Tv > DRAINED:
             state = "drained: the dry soil with its weight in water is enough"

@@ -133,7 +133,7 @@ def report_lines(simulation: Simulation, ranks: int) -> list[str]:
     if simulation.tiles.direct:
         lines.append("  so few points are not distributed: the first process has them all")
     elif over > MAY_CHANGE:
-        lines.append("  tiles are not cut: fewer processes would wait less for the largest part")
+        lines.append("  tiles are not divided: fewer processes would wait less")
     acting = (fix for pairs in simulation.fixes.lasting.in_python.values() for fix, _ in pairs)
     if fix := next((fix for fix in acting if not fix.point_by_point), None):
         blocks = simulation.setup.blocks

@@ -212,7 +212,7 @@ class ContactMinimizePenetration(PairContact):
         self.rubs(hub, float(mu or 0.0))
         if mu is not None and hub.domain.dimension > 1:
             hub.warn(
-                f"friction {mu:g} does not act as given: surfaces of balls brake a sliding body "
+                f"friction {mu:g} does not act as given: surfaces of balls slow a sliding body "
                 "with about 0.2 of the normal force for a coefficient of 0, 0.5 for any above "
                 "0.3, and more if faces are inclined to the grid",
                 hint="method(ulmpm/contacts, ...) with fix contact/friction has smooth surfaces, "

@@ -351,7 +351,7 @@ class RigidBody(Fix):
         position = self._spread(pivot, range(d)) if pivot.numbers() else []
         if velocity is not None or any(self.led[k] is not None for k in range(d)):
             message = (
-                "the pivot holds the body, and velocity, motion or fixed moves or holds it too"
+                "the pivot already holds the body: velocity, motion and fixed cannot do so, too"
             )
             raise _wrong(pivot.argument, message, "spin=..., turning=... or fixed=(rx, ...)")
         self.led[:d] = [Expression(0.0)] * d

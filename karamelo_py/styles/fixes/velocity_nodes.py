@@ -138,7 +138,7 @@ class VelocityNodes(Fix):
         if mu is not None and mu.is_constant:
             judge_friction(hub, mu.constant)
         if mu is not None and None not in self.formulas:
-            message = "nodes that are held in all directions cannot rub"
+            message = "friction cannot act on nodes that are held in all directions"
             expected = "NULL for the directions along the wall, or no mu"
             raise ScriptError(message, argument="mu", expected=expected)
         self.bound = self._one_bound()
@@ -191,7 +191,7 @@ class VelocityNodes(Fix):
                 count = plural(len(shared), "node")
                 self.hub.warn(
                     f"fix '{other.id}' (line {other.mark.line}) gives {count} of this group a "
-                    f"different {names}: this fix decides there",
+                    f"different {names}: this fix applies there",
                     hint="groups that have no nodes in common, or NULL for one of the components",
                 )
 

@@ -209,6 +209,6 @@ known_failure(
     "velocities of '{other.id}' and '{part.id}'",
     when=lambda fix, scene: list(_conflicts(fix, scene.simulation)),
     reason="fix '{other.id}' (line {other.mark.line}) gives {points} of this group a different "
-    "{axes}: this fix decides{more}",
+    "{axes}: this fix applies{more}",
     cure="{apart}, or NULL for one of the components",
 )

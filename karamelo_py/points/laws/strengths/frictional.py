@@ -234,7 +234,7 @@ def peak_and_residual(soil: Soil, surface_of: Callable) -> tuple[float, ...]:
         raise ScriptError(
             f"the angle of dilatancy psi = {psi:g} is impossible with phi = {phi:g}",
             argument="psi",
-            expected=f"an angle from 0 to {phi:g} degrees: beyond, flow would make energy",
+            expected=f"an angle from 0 to {phi:g} degrees: flow would generate energy beyond",
         )
     if cohesion == 0 and phi == 0:
         raise ScriptError(
