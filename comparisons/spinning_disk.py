@@ -22,9 +22,7 @@ def compare(run, axes, full):
         yield Row(f"angular momentum, {transfer}", pi / 2, log.Lz_z[0], 0.04, "exact")
         kept = log.Lz_z[-1] / log.Lz_z[0]
         source = "exact" if transfer == "APIC" else "bounds"
-        yield Row(
-            f"final / initial angular momentum, {transfer}", momentum, kept, within, source
-        )
+        yield Row(f"final / initial angular momentum, {transfer}", momentum, kept, within, source)
         energy = log.Ek + log.Es
         kept = energy[-1] / energy[0]
         yield Row(f"final / initial energy, {transfer}", energies, kept, 0.001, "bounds")

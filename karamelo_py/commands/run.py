@@ -30,8 +30,8 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 def carry_out(hub: Hub, **length: Any) -> None:
     """Run for `length` (see `RunLoop`), unless the script is only read or resumed.
 
-    In a rehearsal, the run is only recorded; ``check`` prints its report instead; a Python program
-    stops before it (`Pause`). A resumed script skips runs that were complete.
+    A rehearsal only records the run, ``check`` prints a report instead of it, and a Python program
+    pauses before it (`Pause`). A resumed script skips runs that were complete.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)

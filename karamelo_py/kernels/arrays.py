@@ -103,7 +103,7 @@ class Tiling(NamedTuple):
     # (3,) int64: number of occupied tiles; of parts of the points; of parts for other processes
     count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
-    order: np.ndarray  # (T + 1,) int64: occupied tiles in the order of visits
+    order: np.ndarray  # (T + 1,) int64: occupied tiles in the order in which threads take them
     range: np.ndarray  # (T + 1, 2) int64: points of the k-th occupied tile
     grid: np.ndarray  # (T + 1,) int64: grid of the k-th occupied tile
     number: np.ndarray  # (T + 1,) int64: number of the k-th occupied tile
@@ -353,7 +353,7 @@ HEAT = np.dtype([
     ("hottest", np.float64),
     ("T_low", np.float64),  # extremes at the last check
     ("T_high", np.float64),
-    ("own_heat", np.float64),  # largest rise of a point by dissipation
+    ("own_heat", np.float64),  # largest temperature rise of a point by dissipation
     ("set_low", np.float64),  # extremes set by fixes at nodes
     ("set_high", np.float64),
     ("rise", np.float64),  # largest heating rate by fixes

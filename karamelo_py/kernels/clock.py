@@ -141,7 +141,7 @@ def take_reports(control: Control) -> None:
 
 
 def all_well(s: Setup, take: Any = take_reports) -> bool:
-    """Take the reports of a sweep; return False if a point failed."""
+    """Read the reports of a sweep; return False if a point failed."""
     read_reports(s)
     take(s.control)
     return s.control.motion[0].wrong == 0

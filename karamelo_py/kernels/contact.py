@@ -65,7 +65,7 @@ SCATTER = 0.003  # scatter of a plane face
 EDGE = 0.03  # above it, a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
-MEMORY = 100  # steps after a contact in which shapeless bodies approach a wall slowly
+MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
 
 
@@ -443,9 +443,9 @@ def _last_contact(bodies, pair):
 
 @noinline
 def closing_part(bodies, pair, x, h):
-    """Return the part of a gap that may close in a step while a contact is remembered.
+    """Return the fraction of a gap that may close in a step, up to `MEMORY` steps after a contact.
 
-    There is a gap in a liquid only where the points do not fill the cells around the nodes.
+    A liquid has a gap only where its points do not fill the cells around the nodes.
     """
     (contact, kin, nodes), (n, m) = bodies, pair
     a, b = n // contact.stride, m // contact.stride
@@ -466,7 +466,7 @@ def _excess_of(bodies, pair, where):
     if not approach > 0:
         return 0.0
     memory = max(contact.memory[pair.n // contact.stride], contact.memory[pair.m // contact.stride])
-    closing = 1.0  # part of a gap that may close in this step
+    closing = 1.0  # fraction of a gap that may close in this step
     if pair.wall and memory > 1:
         last = _last_contact(bodies, pair)
         # With three bodies, a pair may have touched earlier in this step.
@@ -581,7 +581,7 @@ def _touch_pair(bodies, control, i, j, where):
         return  # both velocities are prescribed
     push = share * excess / compliance
     left = _left(pair, push / size)
-    # Friction has no effect on the remaining approach, which closes the gap.
+    # Friction does not act on the normal velocity that closes the gap.
     slide = left - dot(pair.outward, left) / (size * size) * pair.outward
     rub, sticks = 0.0, False
     around = around_of(kin, contact, nodes, pair, False)

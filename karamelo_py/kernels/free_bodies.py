@@ -41,7 +41,7 @@ class TouchingSurface(NamedTuple):
     slot: int  # slot of the force on points
     torque: int  # slot of the torque, or 0
     area: int  # slot of the area of contact
-    lost: int  # address of the function for points without a way out
+    lost: int  # address of a function for points from which no direction leads out of the shape
 
 
 def _stencil_of(s, points, p):
@@ -153,7 +153,7 @@ def _list_point(body, surface, s, block, p):
 
 @noinline
 def _recall(grip, control, state, contact):
-    """Set the friction state of a point that touched in the last step."""
+    """Restore the friction state of a point that also touched in the last step."""
     contact.usual = contact.spare = 0.0
     for c in range(3):
         contact.hold[c] = 0.0

@@ -447,7 +447,7 @@ def _change_update(members, call, c, q):
         before = _take_over(call, q, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still move a free node, a rigid body any node.
+    # Contact may still change the velocity of a free node, and rigid bodies that of any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     is_taken = rigid is not None and rigid[n, arrays.MASS] > 0
@@ -662,7 +662,7 @@ def _act_on_motion(members, task, call, count):
             continue
         _evaluate_now_and_before(call, c, count)
         slot = hooks.table[h].slot
-        # The force of the hook moves a point from its initial velocity.
+        # The work counts from the velocity that the hook prescribed one step earlier.
         leads = hooks.table[h].stage == arrays.POST_ADVANCE_PARTICLES
         leads = leads and hooks.table[h].uses_before > 0
         for q in range(count):
@@ -680,7 +680,7 @@ def _act_on_motion(members, task, call, count):
                 y[d + d * corner + c, p] += position - y[c, p]
             y[c, p] = position
             for moment in members.moments:
-                # otherwise nodes and strains follow the grid velocity of the point
+                # set to 0, otherwise nodes and strains follow the grid velocity of the point
                 for k in range(d if leads else 0):
                     moment[d * c + k, p] = 0
                 for k in range(d * d + c if leads else moment.shape[0], moment.shape[0], d):

@@ -36,7 +36,7 @@ def rows_of(scheme: Any, visits: Any) -> list[Any]:
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """List the rows before the first fused step: the scatter of its last pass."""
+    """List the rows before the first fused step, which make the nodal sums that it needs."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]

@@ -10,7 +10,7 @@ from contourpy import contour_generator
 
 FINE = 300  # steps along the longest side of a tool's outline
 # For sections of 3D tools: search points per axis, steps along a section, bisections to find the
-# ends of the tool, sections between the ends.
+# ends of the tool, and number of sections between the ends.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of angles between face normals
 # Smallest and largest number of points from which the spacing is measured; distances per batch.

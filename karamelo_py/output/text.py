@@ -2,8 +2,9 @@
 
 The nine digits of x are the digits of x 10^k, computed in twice the precision of a double. Within
 `DOUBT` of a tie the last digit is undecided, unless 10^k is exact (0 <= k <= 22). Python formats
-undecided and extreme numbers; without compilation or on big-endian machines, it formats all.
-Surplus digits are written and then overwritten, which is faster than branching.
+numbers whose last digit is undecided and very large or small numbers; without compilation or on
+big-endian machines, it formats all. Surplus digits are written and then overwritten, which is
+faster than branching.
 """
 
 import sys
@@ -17,7 +18,7 @@ from numba import config, types
 from karamelo_py.compiler import fma, index, intrinsic, kernel, llvm
 
 ROWS = 1024
-# -1.23456789e-308 or -4611686018427387903, a blank, and surplus digits.
+# Enough for -1.23456789e-308 or -4611686018427387903, a blank, and the surplus digits.
 NUMBER_BYTES = 32
 
 DIGITS = 9

@@ -40,7 +40,7 @@ def spatial_increment(frame, kin, dl, f):
 
 
 def of_places_before(frame, kin, dl):
-    """Convert `dl` after a move to the positions before it."""
+    """Convert `dl`, computed with the gradient after a move, to positions before the move."""
     # The gradient at old positions is dl (I - dl)^-1, so F is multiplied by (I - dl)^-1.
     return dl @ inv(I - dl) if frame.moves else dl
 

@@ -268,7 +268,7 @@ class Point:
         return full
 
     def _turned(self, angle: float, dt: float) -> np.ndarray:
-        """Return dt grad v (3, 3) of a rotation about z that a law takes as rigid.
+        """Return the dt grad v (3, 3) that a law regards as a rigid rotation about z.
 
         To first order it is skew. The second-order part depends on how the law computes strain and
         volume: strain from the symmetric part and volume from det F, or both from F.

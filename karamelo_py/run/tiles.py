@@ -252,9 +252,9 @@ class Tiles:
     def _parts_to_sum(self, s: Setup) -> tuple[np.ndarray, ...]:
         """Return spans and ranges of the nodes that boxes reach, and the parts to sum.
 
-        Each set of nodes is ordered like the set of points that reaches most of it, so that a
-        thread finds its contributions in its own caches. Fetching them from other caches takes
-        longer than summing.
+        The sets of nodes are ordered like the sets of points, and each node belongs to the set from
+        which most of its sums come, so that a thread finds these in its own caches. Fetching them
+        from other caches takes longer than summing.
         """
         boxes, reached = self._reached(self._boxes(s))
         first, steps = self._number(s, boxes)

@@ -30,7 +30,7 @@ class Pieces(NamedTuple):
     number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
     fraction: np.ndarray  # (n,) of the box volume
-    # (m,) fraction of each box in smallest sub-boxes whose surface is not plane
+    # (m,) fraction of each box that lies in smallest sub-boxes with a surface that is not plane
     rough: np.ndarray
 
     def missed(self, size: float) -> float:
@@ -172,7 +172,7 @@ def surface(region: Region, x: np.ndarray, size: float) -> tuple[np.ndarray, np.
         covered = []
         for side in (-0.5, 0.5):
             at = x[:, None, None, :] + np.insert(on_face, k, side, axis=2) * size
-            # A box face that lies in the surface counts as covered for neither of its two boxes.
+            # A face between two boxes that lies in the surface counts as uncovered for both.
             depth = region.depth(at.reshape(-1, d), 2 * size) - NOTHING * size
             depth = np.ascontiguousarray(depth.reshape(-1, len(ends)).T)
             slopes = (ends - 0.5).T @ depth * 2.0 ** (3 - d)

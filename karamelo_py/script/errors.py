@@ -66,7 +66,7 @@ class ScriptError(Exception):
     argument: str | int | None = None
     expected: str | None = None
     hint: str | None = None
-    # A command, and marks of included files, which precede the message.
+    # The command, printed before the message, and the lines of `include`, printed after it.
     command: str | None = None
     included: list[Mark] = field(default_factory=list)
     others: "list[ScriptError]" = field(default_factory=list)

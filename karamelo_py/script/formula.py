@@ -18,7 +18,7 @@ UNIFORM = 1 << 16
 
 # Push a constant, a published value, or a row of `points` (x y z x0 y0 z0).
 CONSTANT, GLOBAL, POINT = 0, 1, 2
-# Expand the number that is `operand` below the top of the stack to a row.
+# Expand the number that lies `operand` places below the top of the stack to a row.
 SPREAD = 3
 # Pop the top of the stack into the stored row `operand`; push the stored row `operand`.
 KEEP, KEPT = 150, 151

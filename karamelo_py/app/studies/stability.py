@@ -526,7 +526,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle cell of the parts of an edge that have no run."""
+    """Yield length and middle cell of each stretch of an edge between classes that has no run."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])

@@ -27,7 +27,7 @@ def per_mass(nodes: Nodes, n: Index, template: Number) -> Number:
 
 
 def unlimited(seen, n, mass, light):
-    """Return the fraction of a node's velocity change that gradients get; light nodes have < 1."""
+    """Return the fraction of a node's velocity change that enters gradients, below 1 if light."""
     if seen is None:
         return real(1, mass)
     square = mass * mass

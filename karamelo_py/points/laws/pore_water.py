@@ -91,7 +91,7 @@ def _trace(law, kin, state, slow):
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # Slightly above the larger eigenvalue of the two phases, without a root; drag slows waves down.
+    # A bound of the larger eigenvalue of the two phases that needs no root; drag slows waves.
     slow = laws.wave_speed_squared(law.law, kin, state.skeleton)
     trace = _trace(law, kin, state, slow)
     return trace - slow * law.K_of_waves / (law.rho * trace)

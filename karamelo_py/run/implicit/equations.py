@@ -228,7 +228,7 @@ class Equations:
         return max((float(response.furthest.max()) for _, response in self.parts), default=0.0)
 
     def furthest_into(self, u: np.ndarray, fixed: np.ndarray) -> float:
-        """Return the largest displacement, in cells, of a node into nodes that move differently.
+        """Return the largest displacement, in cells, of a node towards nodes that move differently.
 
         A node moves differently if its displacement (m, d) differs by more than a step's rotation
         or strain allows, or if it is `fixed` (nodes, d) and has no points.

@@ -61,7 +61,7 @@ def bisected(places: np.ndarray, work: np.ndarray, parts: int, rows: float = 1) 
 
 
 IMBALANCE = 1.1  # factor by which a new division must reduce the largest work
-# Factor by which long tiles must be longer along rows to be cut there: short rows make loops slow.
+# Short rows make loops slow: long tiles are cut along rows only if longer there by this factor.
 ROWS = 4
 OF_TILES = ("number", "range", "grid", "box", "rows")
 FINE = 1000  # the cost of a tile is an integer, in this fraction of a unit

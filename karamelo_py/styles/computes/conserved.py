@@ -153,7 +153,7 @@ class LostByContact(Compute):
 
 
 class Drift:
-    """Change of a value since its first one, relative to the largest scale so far."""
+    """Change of a value since its first call, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 

@@ -77,7 +77,7 @@ class VtkDump(TableDump):
         """Add the cells of the latest points to `vtu`, or append data for `complete` to `kept`."""
 
     def complete(self, vtu: Vtu, kept: list[np.ndarray]) -> None:
-        """Add cells that need all points."""
+        """Add the cells that can only be made when all points are known."""
 
 
 class Vtk(OfPoints, VtkDump):

@@ -125,7 +125,7 @@ def gradient(
 
     They are central differences over `step`.
 
-    At points that have not moved, x and x0 are varied together.
+    At points that have not moved, x0 is varied together with x.
     """
     out = np.zeros_like(x, float)
     # The tolerance allows for rounding in single precision.

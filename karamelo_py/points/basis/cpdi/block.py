@@ -1,4 +1,4 @@
-"""Sums over the corners of a 2D domain at its 3 x 3 nodes, so that each is visited once.
+"""Sums over the corners of a 2D domain at its 3 x 3 nodes, so that each node is loaded once.
 
 In 3D, with 27 nodes and eight corners, this would cost more than it saves.
 """

@@ -23,7 +23,8 @@ from karamelo_py.points.laws.parameters import AboveZero, ByName, FromZero
 from karamelo_py.points.laws.viscosity import artificial_viscosity
 from karamelo_py.script.errors import ScriptError
 
-LONG = 6.0, 0.5  # run / time to fall by the liquid's size; revolutions. Dam breaks take 4
+# Longest run / time to fall by the liquid's size (dam breaks: 4); longest path / this size.
+LONG = 6.0, 0.5
 FRONT = 1.5  # cells that the front moves while a point burns
 STEP, STRONG = 2.0, 20.0  # pressure ratio above which there is a shock, and a strong shock
 

@@ -180,7 +180,7 @@ def grown(strength, memory, flow):
 
 @point_function(otherwise=True)
 def most_recovered(strength, memory):
-    """Return the largest elastic volume ratio after a step / the ratio of the trial."""
+    """Return the largest possible (elastic volume ratio after a step) / (ratio of the trial)."""
     return inf
 
 
