@@ -447,7 +447,7 @@ def _change_update(members, call, c, q):
         before = _take_over(call, q, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still change the velocity of a free node, and rigid bodies that of any node.
+    # Contact may still change the velocities of free nodes, rigid bodies those at any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     is_taken = rigid is not None and rigid[n, arrays.MASS] > 0

@@ -1,7 +1,4 @@
-"""Terminal output.
-
-Rich draws a progress bar on a terminal; pipes and files get plain lines.
-"""
+"""Terminal output: a progress bar by Rich, or plain lines in pipes and files."""
 
 import contextlib
 import os

@@ -121,7 +121,7 @@ class Simulation(SceneArrays):
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)
-        # The energy balance and the rate are those of the last step, even if a run begins here.
+        # Energy balance and rate still belong to the last step, even if a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored

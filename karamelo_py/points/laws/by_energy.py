@@ -354,9 +354,8 @@ def _wave_speed_squared_of_invariants(law, kin, state):
 
 
 def stiffness_of_matrix(law, b, at):
-    # Bound each term of l^2 d2W/dl^2 (`along_direction`) and of the shear stiffness,
-    # 2 x_a (W_1 + x_c W_2): squared principal stretches x lie within Gershgorin's bounds and
-    # above J^2/I2.
+    # Bound each term of l^2 d2W/dl^2 (`along_direction`) and of the shear stiffness, 2 x_a (W_1
+    # + x_c W_2): squared stretches x lie within Gershgorin's bounds and above J^2/I2.
     I1, I2, J, *_ = at
     high = b.largest_row_sum()
     W1, W2, _ = [evaluated(code, law, at) for code in law.first]

@@ -46,10 +46,7 @@ READ_AT_ONCE = 1 << 22  # bytes read at a time
 
 
 class Restarts(Rhythmic):
-    """Writes restart files during a run.
-
-    The step number replaces the first ``*`` in the name.
-    """
+    """Writes restart files during a run; the step number replaces the first ``*`` of the name."""
 
     mark: Mark | None = None
     style = ""
