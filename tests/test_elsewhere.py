@@ -1,13 +1,13 @@
 """Studies on other machines: Dask, MPI; workers that are lost; what travels with a case."""
 
 import json
+import multiprocessing
 import os
 import shutil
 import signal
 import socket
 import subprocess
 import sys
-import sysconfig
 import threading
 import time
 from argparse import Namespace
@@ -18,6 +18,7 @@ from pathlib import Path
 
 import pandas
 import pytest
+from selection import few
 from test_sampling import SCRIPT
 
 from karamelo_py.app.cli import main
@@ -31,8 +32,10 @@ OF_MACHINES = [*TIMES, "wall_s", "folder", "machine"]
 REAL = sys.executable  # before tests replace it
 WORDS = ["-var", "a=1:2:3", "-record", "v_x", "-jobs", "2"]
 
-distributed = pytest.importorskip("distributed")
-pytestmark = pytest.mark.xdist_group("machines")
+pytestmark = [
+    pytest.mark.xdist_group("machines"),
+    pytest.mark.skipif(find_spec("distributed") is None, reason="no Dask"),
+]
 
 
 @pytest.fixture
@@ -43,26 +46,31 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def _dask():
+    """Address of a scheduler, and a way to start processes that have Dask at hand."""
+    from distributed import LocalCluster
+    from machines import work
+
+    servers = multiprocessing.get_context("forkserver")
+    servers.set_forkserver_preload(["distributed", "karamelo_py.app.studies.elsewhere"])
+    with LocalCluster(n_workers=0, dashboard_address=None, silence_logs=60) as cluster:
+        yield cluster.scheduler_address, lambda *args: servers.Process(target=work, args=args)
+
+
 @pytest.fixture
-def scheduler(tmp_path_factory):
-    """Address of a scheduler with two workers; each has folders and a cache of its own."""
-    dask = str(Path(sysconfig.get_path("scripts")) / "dask")
-    folder = tmp_path_factory.mktemp("machines")
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    address = f"tcp://127.0.0.1:{port}"
-    words = ["--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    started = [subprocess.Popen([dask, "scheduler", *words], **quiet)]
-    words = [dask, "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+def scheduler(_dask, tmp_path, _forking):
+    """Address of a scheduler with two workers."""
+    address, worker = _dask
+    folder, workers = tmp_path / "machines", []
     for place in (folder / "one", folder / "two"):
-        place.mkdir()
-        own = {"KARAMELO_PY_CACHE": str(place / "cache"), "TMPDIR": str(place)}
-        started.append(subprocess.Popen(words, cwd=place, env=os.environ | own, **quiet))
-    yield Namespace(address=address, workers=started[1:], folder=folder)
-    for process in started:
+        place.mkdir(parents=True)
+        workers.append(worker(address, str(place), _forking))
+        workers[-1].start()
+    yield Namespace(address=address, workers=workers, folder=folder)
+    for process in workers:
         process.kill()
-        process.wait()
+        process.join()
 
 
 def numbers(path):
@@ -106,15 +114,17 @@ def test_a_killed_worker_changes_nothing(folder, scheduler, monkeypatch, capsys,
     assert "; 3 were known" in capsys.readouterr().out
 
 
-def test_a_pool_of_mpi(folder):
+@pytest.mark.usefixtures("starts_are_cheap")
+@pytest.mark.parametrize("size", few((2, 3), 2))
+def test_a_pool_of_mpi(folder, size):
     pytest.importorskip("mpi4py")
-    start = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or "mpiexec"
+    start = shutil.which("mpiexec", path=str(Path(REAL).parent)) or "mpiexec"
     if not shutil.which(start):
         pytest.skip("no mpiexec")
     program = "from karamelo_py.app.start import main\nif __name__ == '__main__':\n    main()\n"
     (folder / "program.py").write_text(program, encoding="utf-8")
     root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
-    command = [start, *root, "--oversubscribe", "-n", "3", sys.executable, "-m"]
+    command = [start, *root, "--oversubscribe", "-n", str(size), REAL, "-m"]
     command += ["mpi4py.futures", "program.py", "sweep", "in.lin", *WORDS, "-on", "mpi"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -149,6 +159,7 @@ def test_a_queue_of_jobs(folder, monkeypatch, queue, submit, cancel):
     monkeypatch.setenv("PATH", f"{folder / 'bin'}:{os.environ['PATH']}")
     dask.config.refresh()  # defaults of dask-jobqueue that the end of an earlier set has removed
     job = {"cores": 1, "memory": "1GB", "interface": "lo", "python": REAL, "death-timeout": 30}
+    job["worker-extra-args"] = ["--no-nanny"]  # which would start a second process
     with dask.config.set({f"jobqueue.{queue}.{name}": value for name, value in job.items()}):
         assert main(["sweep", "in.lin", *WORDS, "-jobs", "1", "-on", queue, "-o", "far.csv"]) == 0
     (script,) = folder.glob("job.*.sh")
@@ -158,16 +169,19 @@ def test_a_queue_of_jobs(folder, monkeypatch, queue, submit, cancel):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
-@pytest.mark.parametrize(("where", "end"), [(None, "KILL"), ("local", "KILL"), ("local", "INT")])
-def test_a_study_that_is_killed_leaves_no_process(folder, where, end):
-    """SIGKILL of the study alone; Ctrl-C of its group ends within seconds."""
+@pytest.mark.parametrize("end", ["KILL", "INT"])
+def test_a_study_that_is_killed_leaves_no_process(folder, end):
+    """SIGKILL of the study alone; Ctrl-C of its group ends within seconds.
+
+    Without Dask: test_who_writes.py.
+    """
     text = SCRIPT.replace("run(1)", "run(1000000000)").replace("a + 2*b", "1e-12*a")
     (folder / "in.long").write_text(text, encoding="utf-8")
-    words = ["sweep", "in.long", "-var", "a=1,2", "-record", "v_x", "-jobs", "2"]
+    words = ["sweep", "in.long", "-var", "a=1,2", "-record", "v_x", "-jobs", "1", "-on", "local"]
     code = "from karamelo_py.app.start import main; raise SystemExit(main())"
     study = subprocess.Popen(
-        [REAL, "-c", code, *words, *(["-on", where] if where else [])], start_new_session=True,
-        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        [REAL, "-c", code, *words], start_new_session=True, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
     )  # fmt: skip
 
     known = study.pid, os.getpid()
