@@ -337,10 +337,12 @@ def test_a_terminal_shows_what_runs(folder, monkeypatch):
     """A line for each run that has ended, and below a bar with what goes on."""
     import pty
 
+    import rich
+
     text = """
         import os, time
         def wait(points):
-            for _ in range(1000):
+            for _ in range(250):
                 if os.path.exists("seen"):
                     break
                 time.sleep(0.02)
@@ -367,6 +369,7 @@ def test_a_terminal_shows_what_runs(folder, monkeypatch):
     seeing.start()
     monkeypatch.setenv("TERM", "xterm")
     with open(write, "w", encoding="utf-8") as terminal, monkeypatch.context() as patch:
+        patch.setattr(rich, "_console", None)  # which knows whether it is a terminal
         patch.setattr(sys, "stdout", terminal)
         patch.setattr(sys, "stderr", terminal)
         assert main(["sweep", "in.flight", "-var", "speed=1e-5,2e-5", "-jobs", "1"]) == 0
