@@ -90,7 +90,7 @@ def serve(path: str) -> None:
 
     import karamelo_py.app.cli
     import karamelo_py.commands
-    import karamelo_py.run.loop
+    import karamelo_py.run.loop  # noqa: F401
     from karamelo_py.script.parser import parse
 
     parse("run(1)")  # which reads the grammar

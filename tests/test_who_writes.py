@@ -19,10 +19,10 @@ LONG = "E = 1\n" + block(
 )  # fmt: skip
 
 
-def started(folder: Path, *words: str, **more) -> subprocess.Popen:
+def started(folder: Path, *words: str, python: str = sys.executable, **more) -> subprocess.Popen:
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     return subprocess.Popen(
-        [sys.executable, "-m", "karamelo_py.app.cli", *words], cwd=folder, env=environment,
+        [python, "-m", "karamelo_py.app.cli", *words], cwd=folder, env=environment,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **more,
     )  # fmt: skip
 
@@ -47,7 +47,7 @@ def writers(folder: Path) -> list[int]:
 
 @linux
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGKILL])
-def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
+def test_the_runs_of_a_study_end_with_it(tmp_path, _forking, sent):
     """Also if the study is killed; while it runs, a second one in the same folder is refused."""
     (tmp_path / "in.a").write_text(LONG)
     words = ("sweep", "in.a", "-var", "E=1,2", "-jobs", "1", "-record", "Step")
@@ -55,7 +55,7 @@ def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
     try:
         wait_for(tmp_path / "sweep" / "E=1" / "log.mpm")
         if sent == signal.SIGTERM:
-            other = started(tmp_path, *words)
+            other = started(tmp_path, *words, python=_forking)
             assert "another study runs in sweep" in other.communicate(timeout=60)[1]
             assert other.returncode == 1
         study.send_signal(sent)
@@ -71,20 +71,20 @@ def test_the_runs_of_a_study_end_with_it(tmp_path, sent):
 
 
 @posix
-def test_two_runs_in_one_folder(tmp_path):
+def test_two_runs_in_one_folder(tmp_path, _forking):
     """The second is refused even with another log, since both would write the same dumps."""
     (tmp_path / "in.a").write_text(LONG)
     first = started(tmp_path, "in.a", "-log", "a.mpm")
     try:
         wait_for(tmp_path / "a.mpm")
         first.send_signal(signal.SIGSTOP)  # it holds the folder, and takes no time
-        second = started(tmp_path, "in.a", "-log", "b.mpm")
+        second = started(tmp_path, "in.a", "-log", "b.mpm", python=_forking)
         assert f"another run is writing to {tmp_path}" in second.communicate(timeout=60)[1]
         assert second.returncode == 1
         (tmp_path / "other").mkdir()
         short = LONG.replace("100000000", "2")
         (tmp_path / "in.b").write_text(short)
-        third = started(tmp_path, "in.b", "-out", "other")
+        third = started(tmp_path, "in.b", "-out", "other", python=_forking)
         assert (third.communicate(timeout=60), third.returncode)[1] == 0
     finally:
         first.kill()
@@ -123,7 +123,7 @@ def test_a_folder_that_is_gone(tmp_path):
 
 
 @posix
-def test_a_study_without_room(tmp_path):
+def test_a_study_without_room(tmp_path, _forking):
     """A limit on file sizes stands in for a full disk."""
     (tmp_path / "in.a").write_text(LONG.replace("100000000", "2"))
     limited = (
@@ -133,7 +133,7 @@ def test_a_study_without_room(tmp_path):
         "sys.exit(main(['sweep', 'in.a', '-var', 'E=1,2', '-record', 'Step']))"
     )
     done = subprocess.run(
-        [sys.executable, "-c", limited], cwd=tmp_path, capture_output=True, text=True, check=False,
+        [_forking, "-c", limited], cwd=tmp_path, capture_output=True, text=True, check=False,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
     )  # fmt: skip
     assert done.returncode == 1
