@@ -1,4 +1,10 @@
-"""What the tests share: scripts run through the real command line, and read back."""
+"""What the tests share: scripts run through the real command line, and read back.
+
+What takes long to import is imported where it is used: the process that only hands out tests needs
+none of it.
+"""
+
+from __future__ import annotations
 
 import gc
 import itertools
@@ -16,21 +22,20 @@ from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from textwrap import dedent
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 # Threads of OpenBLAS wait in loops, and each process of tests has one processor.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # LLVM's passes take longer than the steps of most tests, and change no bit (test_identical.py).
 os.environ.setdefault("KARAMELO_PY_OPTIMISATION", "0")
 
-import numpy as np
 import pytest
 from hypothesis import settings
 
-from comparisons.results import Result
-from karamelo_py.app.cli import main
-from karamelo_py.app.studies import case
-from karamelo_py.styles.dumps.pyplot import PyPlot
+if TYPE_CHECKING:
+    import numpy as np
+
+    from comparisons.results import Result
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -73,6 +78,23 @@ with suppress(ImportError):
     from hypothesis.internal.conjecture import providers
 
     providers._get_local_constants = lambda: providers._local_constants
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Tests that are over are forgotten: pytest-xdist 3.8 goes through all of them at each end."""
+    if config.getvalue("dist") != "loadgroup":
+        return None
+    from xdist.scheduler import LoadGroupScheduling
+
+    class Scheduling(LoadGroupScheduling):
+        def mark_test_complete(self, node: Any, item_index: int, duration: float = 0) -> None:
+            units = self.assigned_work[node]
+            name = self._split_scope(self.registered_collections[node][item_index])
+            super().mark_test_complete(node, item_index, duration)
+            if all(units[name].values()):
+                del units[name]
+
+    return Scheduling(config, log)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -138,6 +160,9 @@ def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
 
     Of a path, dump pyplot writes nothing; test_dumps.py draws.
     """
+    from comparisons.results import Result
+    from karamelo_py.app.cli import main
+    from karamelo_py.styles.dumps.pyplot import PyPlot
 
     def run(script: str | Path, *options: str, status: int = 0, folder: str = "run") -> Result:
         place = tmp_path / folder
@@ -201,6 +226,7 @@ def run_interpreted(tmp_path, _interpreter) -> Callable[..., Result]:
 
     With ``status=None`` it may end as it likes; ``command="check"`` is that of the command line.
     """
+    from comparisons.results import Result
 
     def run(
         script: str | Path,
@@ -226,6 +252,7 @@ def state_interpreted(tmp_path, _interpreter) -> Callable[..., dict[str, np.ndar
     with ``ranks=N`` so many share them. Files are kept in `out`. Of a script that ``fails`` it is
     the message.
     """
+    import numpy as np
 
     def run(
         script: str,
@@ -310,6 +337,8 @@ def compiling() -> Iterator[str]:
 @pytest.fixture
 def starts_are_cheap(_forking, monkeypatch) -> Iterator[None]:
     """Runs and code, interpreted, start as forks of a process that has the program at hand."""
+    from karamelo_py.app.studies import case
+
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     monkeypatch.setattr(sys, "executable", _forking)
     python, case.PROGRAM[0] = case.PROGRAM[0], _forking
