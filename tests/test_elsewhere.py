@@ -390,7 +390,7 @@ def test_kernels_of_one_machine_reach_another_once(folder, monkeypatch):
 
 @pytest.mark.parametrize("answer", [b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n\r\n", b""])
 def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, answer):
-    monkeypatch.setattr(elsewhere, "PATIENCE", 0.5)
+    monkeypatch.setattr(elsewhere, "PATIENCE", 0.1)
     with socket.create_server(("127.0.0.1", 0)) as server:
         held = []
 
@@ -418,7 +418,7 @@ def test_something_else_than_a_scheduler_answers(folder, monkeypatch, capsys, an
 )
 def test_places_that_are_refused(folder, capsys, monkeypatch, where, says):
     """Ctrl-C remains the program's: dask-jobqueue takes it over when it is imported."""
-    monkeypatch.setattr(elsewhere, "PATIENCE", 1)
+    monkeypatch.setattr(elsewhere, "PATIENCE", 0.3)
     interrupt = signal.getsignal(signal.SIGINT)
     assert main(["sweep", "in.lin", *WORDS, "-on", where]) == 1
     assert signal.getsignal(signal.SIGINT) is interrupt
