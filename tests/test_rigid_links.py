@@ -23,8 +23,8 @@ run({steps})
 g, ALPHA = 9.81, radians(20)
 
 
-def body(ID, shape, given="", material="steel"):
-    solid = f"region({ID}, {shape})\nsolid({ID}, region, {ID}, 4, {material}, 1)\n"
+def body(ID, shape, given="", material="steel", ppc=2):
+    solid = f"region({ID}, {shape})\nsolid({ID}, region, {ID}, {ppc}, {material}, 1)\n"
     return solid, f"fix({ID}, rigid_body, {ID}, mass=1, {given})\n".replace(", )", ")")
 
 
@@ -141,7 +141,7 @@ def test_a_box_on_a_slope(run_interpreted, mu):
 def test_nothing_passes_a_thin_wall(run_interpreted, speed, e):
     """A ball of one cell and a held wall of 0.2 cells, up to 0.5 cells per step."""
     ball = body("a", "cylinder, 4, 5, 0.5", f"velocity=({speed}, 0)")
-    wall = body("w", "block, 6, 6.2, 3, 7", "motion=(0, 0), turning=0")
+    wall = body("w", "block, 6, 6.2, 3, 7", "motion=(0, 0), turning=0", ppc=4)
     more = f"fix(t, contact/bodies, a, w, restitution={e})\n"
     log = run_interpreted(scene([ball, wall], more, "a_x, a_vx", steps=18)).log
     assert log.a_x.max() <= 5.5 + 2e-6 * speed

@@ -52,10 +52,10 @@ def test_every_row_has_a_script_and_a_part_of_the_page():
 
 
 def crossing_forces(run, **variables):
-    """Forces over stress at inner nodes (50 places) of a bar that moves by one cell."""
-    result = run("cell_crossing", **variables)
+    """Forces over stress at inner nodes (26 places) of a bar that moves by half a cell."""
+    result = run("cell_crossing", steps=26, **variables)
     forces = []
-    for step in range(1, 51):
+    for step in range(1, 27):
         grid = read_dump(result.folder / f"grid.{step}.LAMMPS")[-1]
         # Nodes whose functions (4 cells at most) lie within the bar all the time.
         forces.append(grid.fx[(grid.x > 4.9) & (grid.x < 8.1)] / 3)
@@ -108,24 +108,25 @@ def test_flip_keeps_a_sawtooth_pic_and_xpic_take_it_away(run):
     """Hammerquist & Nairn 2017: a sawtooth of two points per cell is nothing on the nodes.
 
     FLIP never changes it; PIC and XPIC take it away in a step. Of the first mode PIC loses most
-    in 10 steps, and XPIC the less the higher its order.
+    in 5 steps, and XPIC the less the higher its order.
     """
-    assert kept(run, 0, 10) == pytest.approx(1, abs=1e-6)
-    assert kept(run, 1, 10) == pytest.approx(1, abs=1e-4)
+    assert kept(run, 0, 5) == pytest.approx(1, abs=1e-6)
+    assert kept(run, 1, 5) == pytest.approx(1, abs=1e-4)
     modes = []
     for cure in ({"transfer": "PIC", "order": "mechanical"}, {"cure": 1, "order": 2}, {"cure": 1}):
         assert abs(kept(run, 0, 1, **cure)) < 1e-9
-        modes.append(kept(run, 1, 10, **cure))
-    assert modes[0] < 0.985
+        modes.append(kept(run, 1, 5, **cure))
+    assert modes[0] < 0.9925
     assert modes[0] < modes[1] < modes[2] < 1
-    assert modes[2] > 0.998
+    assert modes[2] > 0.999
 
 
 def test_flip_rings_behind_a_wave(run):
     """Where two bars have met they are at rest: FLIP leaves a fifth of the velocity there."""
-    assert run("flip_noise").log.noise[-1] > 0.15
-    assert run("flip_noise", cure=1).log.noise[-1] < 0.1
-    assert run("flip_noise", transfer="XPIC", order=5).log.noise[-1] < 0.1
+    noise = partial(run, "flip_noise", L=8, CFL=0.8)
+    assert noise().log.noise[-1] > 0.15
+    assert noise(cure=1).log.noise[-1] < 0.1
+    assert noise(transfer="XPIC", order=5).log.noise[-1] < 0.1
 
 
 @pytest.mark.full
@@ -300,9 +301,10 @@ def test_what_a_light_node_is_depends_on_the_points_near_it(state_interpreted):
 
 
 def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1", status=0):
-    """Energy of a small free body, shaken a little, after 100 steps over the one at the start.
+    """Energy of a small free body, shaken a little, after 60 steps over the one at the start.
 
-    With `status` 1 what is said where the watch over the energy stops it.
+    A twentieth above the stable step the largest vibration with usl grows by a fifth in each. With
+    `status` 1 what is said where the watch over the energy stops it.
     """
     result = run_interpreted(f"""
         method({method})
@@ -317,7 +319,7 @@ def shaken(run_interpreted, scheme, ppc, factor, method="tlmpm, FLIP, linear, 1"
         dt_factor({factor})
         set_output(1000)
         log_modify(custom, step, Ek, Es)
-        run(100)
+        run(60)
     """, folder=f"{scheme}{ppc}{factor}", status=status)  # fmt: skip
     if status:
         return result.err
@@ -385,8 +387,8 @@ def test_what_cannot_go_well_is_stopped(run, what):
 
 
 def test_pic_loses_angular_momentum_and_apic_keeps_it(run):
-    lost, kept = (run("angular_momentum", cure=cure, turns=0.1).log.L_z for cure in (0, 1))
-    assert lost[-1] < 0.1 * lost[0]
+    lost, kept = (run("angular_momentum", cure=cure, turns=0.05).log.L_z for cure in (0, 1))
+    assert lost[-1] < 0.3 * lost[0]
     assert kept == pytest.approx(np.full(len(kept), kept[0]), rel=1e-9)
 
 
@@ -429,8 +431,8 @@ def test_one_point_a_cell_does_not_feel_hourglasses(run):
 
     u_x changes by 1e-3 (2 - 4 y) between nodes: a strain of 1e-3 at y = 1/4, and so along y.
     """
-    assert run("hourglass").log.share == pytest.approx(np.zeros(21), abs=1e-12)
-    assert run("hourglass", cure=1).log.share[1] == pytest.approx(1, rel=0.01)
+    assert run("hourglass", steps=5).log.share == pytest.approx(np.zeros(6), abs=1e-12)
+    assert run("hourglass", cure=1, steps=1).log.share[1] == pytest.approx(1, rel=0.01)
 
 
 def test_one_point_a_cell_is_too_few_where_points_cross(run):
@@ -483,8 +485,8 @@ def test_finer_cells_are_early_by_less(run):
 
 def test_a_free_axis_spoils_the_hoop_strain(run):
     """Held on the axis, radial and hoop strain of the cell at the axis are the same, exactly."""
-    assert run("axis").log.ratio[1] > 2
-    assert run("axis", cure=1).log.ratio[1] == pytest.approx(1, rel=1e-9)
+    assert run("axis", steps=1).log.ratio[1] > 2
+    assert run("axis", steps=1, cure=1).log.ratio[1] == pytest.approx(1, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -582,11 +584,11 @@ def test_bodies_that_meet_on_the_axis_push_along_it(run_interpreted):
 
 
 def test_the_jaumann_rate_swings_in_shear(run):
-    """Dienes 1979: mu sin(gamma), and mu gamma for neo-Hookean, to first order in steps of 0.02."""
-    log = run("jaumann").log
-    assert log.stress == pytest.approx(np.sin(log.strain), abs=0.03)
+    """Dienes 1979: mu sin(gamma), and mu gamma for neo-Hookean, to first order in steps of 0.04."""
+    log = run("jaumann", step=0.04).log
+    assert log.stress == pytest.approx(np.sin(log.strain), abs=0.06)
     assert log.stress.min() < -0.9
-    log = run("jaumann", cure=1, top=1).log
+    log = run("jaumann", cure=1, top=1, step=0.04).log
     assert log.stress == pytest.approx(log.strain, rel=0.01)
 
 
