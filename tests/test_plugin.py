@@ -20,7 +20,7 @@ from selection import few
 pytestmark = [pytest.mark.xdist_group("plugin"), pytest.mark.usefixtures("starts_are_cheap")]
 PYTHON = sys.executable  # before it is a fork
 
-# One period of the first mode of a bar with fixed ends.
+# A quarter of a period of the first mode of a bar with fixed ends.
 VIBRATION = """
 L = 10
 E = 100
@@ -43,7 +43,7 @@ compute(Es, strain_energy, all)
 log_modify(custom, time, Ek, Es)
 set_dt(0.04)
 set_output(5)
-run_time(L/c)
+run_time(0.5*L/c)
 """
 
 # What the example script leaves out: the fix whose hook is compiled.
@@ -185,15 +185,16 @@ compute(p, momentum, all)
 compute(hard, probe, all, R)
 log_modify(custom, step, hard, p_x, air_x, settle_x)
 dump(points, all, particle, 100, points.*.LAMMPS, ep, R, seq)
-dump(picture, all, pyplot, 100, picture.*.png, 200, 200, R)
 run(100)
 """
+PICTURE = "dump(picture, all, pyplot, 100, picture.*.png, 200, 200, R)\n"
 
 
 @pytest.mark.parametrize("compiled", few((False, True), True))
 def test_a_strength_shows_its_own_number(site, compiling, tmp_path, compiled):
     recovery = 4e3
-    (tmp_path / "in.pull").write_text(PULL.replace("{recovery}", str(recovery)))
+    script = PULL.replace("{recovery}", str(recovery)).replace("run(", PICTURE + "run(")
+    (tmp_path / "in.pull").write_text(script)
     done = karamelo_py(site, tmp_path, "in.pull", compiling=compiling * compiled)
     assert done.returncode == 0, done.stderr
     rows = np.loadtxt(tmp_path / "points.100.LAMMPS", skiprows=11)
@@ -259,7 +260,7 @@ fix(wind, air_drag, all, 0.1)
 compute(p, linear_momentum, all)
 log_modify(custom, step, time, p_x, p_y, wind_x, wind_y)
 set_dt(0.002)
-set_output(100)
+set_output(50)
 run({steps})
 """
 
@@ -267,7 +268,7 @@ run({steps})
 @pytest.mark.parametrize("style", few(("air_drag", "node_drag"), "air_drag"))
 def test_a_force_by_the_whole_velocity(run_interpreted, style):
     """dv/dt = -c |v| v: v = v0/(1 + c |v0| t), of first order in dt."""
-    done = run_interpreted(AIR.format(steps=100).replace("air_drag", style))
+    done = run_interpreted(AIR.format(steps=50).replace("air_drag", style))
     _, time, *p, fx, fy = read_log(done.folder)
     assert "energy" in done.out + done.err  # the work of the force is added up
     slower = 1 / (1 + 0.1 * 5 * time)
@@ -279,7 +280,7 @@ def test_compiled_hooks_do_what_interpreted_ones_do(site, compiling, tmp_path, r
     """On two threads, of points and of nodes."""
     lines = "fix(wind, air_drag, all, 0.1)\nfix(reeds, node_drag, all, 0.2)"
     scene = AIR.format(steps=20).replace("fix(wind, air_drag, all, 0.1)", lines)
-    scene = scene.replace("set_output(100)", "set_output(10)").replace("p_y,", "p_y, reeds_x,")
+    scene = scene.replace("set_output(50)", "set_output(10)").replace("p_y,", "p_y, reeds_x,")
     (tmp_path / "in.air").write_text(scene)
     done = karamelo_py(site, tmp_path, "in.air", "--threads", "2", compiling=compiling)
     assert done.returncode == 0, done.stderr
@@ -326,10 +327,10 @@ class Others(OfNodes):
     published = ("d", "c", "b", "a")
 """
 PUBLISHING = """
-method(ulmpm, FLIP, linear, 0.99)
+method(ulmpm, FLIP, linear, 1)
 dimension(2, 0, 1, 0, 1, 0.2)
 region(box, block, 0.2, 0.8, 0.2, 0.8)
-material(rubber, neo-hookean, 1000, 1000, 0.3)
+material(rubber, linear, 1000, 1000, 0.3)
 solid(body, region, box, 2, rubber, 0.2, 0)
 fix(p, many/points, all)
 fix(n, many/nodes, all)
@@ -472,9 +473,9 @@ fix(dust, charged, all, {k}, {leak})
 compute(c, probe, all, charge)
 compute(x, center_of_mass, all)
 log_modify(custom, step, time, c, x_x, x_y)
-set_dt(0.002)
-set_output(50)
-run(200)
+set_dt(0.004)
+set_output(25)
+run(100)
 """
 
 
@@ -575,7 +576,7 @@ def test_a_field_of_a_fix_and_its_column(run_interpreted, cut):
 FLYING = """
 method(ulmpm, FLIP, linear, 1)
 dimension(2, 0, 6, 0, 2, 0.25)
-region(bar, block, 1, 1.5, 0.75, 1.25)
+region(bar, block, 1, 1.5, 0.75, 1)
 material(m, linear, 3, 100, 0.3)
 solid(bar, region, bar, 2, m, 0.25)
 fix(start, initial_velocity_particles, all, 10, 0)
@@ -588,7 +589,7 @@ dump(o, all, grid/hdf5, 15, o.h5, peak)
 restart(6, r.*.h5)
 """
 LATE = """
-region(late, block, 1, 1.5, 0.75, 1.25)
+region(late, block, 1, 1.5, 0.75, 1)
 solid(late, region, late, 2, m, 0.25)
 """
 GROWING = f"run(15){LATE}run(15)"
@@ -601,7 +602,7 @@ def test_a_field_of_nodes_and_its_column(state_interpreted, run_interpreted, tmp
     goes_on(run_interpreted, FLYING + cut)
     rows = np.loadtxt(tmp_path / "whole" / "n.30.LAMMPS", skiprows=11, ndmin=2)
     _, _, x, y, _, peak, mass = rows.T
-    passed = (x > 0.75) & (x < 4.75) & (y > 0.5) & (y < 1.5)
+    passed = (x > 0.75) & (x < 4.75) & (y > 0.5) & (y < 1.25)
     np.testing.assert_allclose(peak, np.where(passed, 10, 0), rtol=1e-9)  # ten digits
     assert (mass[passed] == 0).any()
     state_interpreted(FLYING + cut, out="one", boxes=True)
@@ -735,7 +736,7 @@ def test_a_damage_and_a_temperature(run_interpreted, part):
     script = PULL.replace("recovering, 25e6, 20e3, 1e6, {recovery}", law)
     script = script.replace("bulk, hot)", "bulk, hot, d)")
     column = "damage" if "worn" in part else "T"
-    script = script.replace("ep, R, seq", f"ep, {column}, seq").replace("200, 200, R", "200, 200")
+    script = script.replace("ep, R, seq", f"ep, {column}, seq")
     script = script.replace("compute(hard, probe, all, R)", f"compute(hard, probe, all, {column})")
     done = run_interpreted(script)
     ep, number, q = np.loadtxt(done.folder / "points.100.LAMMPS", skiprows=11)[:, -3:].T
@@ -837,7 +838,7 @@ def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
         "material(energy, hyperelastic, 1000, mu/2*(I2/J^2 + 2*J - 5), mu=3e5)",
     ]
     for name, ends in paths.items():
-        lines += [f"load_path({name}, 5, {ends})"]
+        lines += [f"load_path({name}, 2, {ends})"]
         lines += [f"element({law}_{name}, {law}, {name})" for law in ("own", "energy")]
     (tmp_path / "in.file").write_text("\n".join(lines) + "\n", "utf-8")
     done = karamelo_py(site, tmp_path, "in.file")

@@ -95,9 +95,9 @@ def test_a_cycle_of_stiffening_rubber_dissipates_its_work(run_interpreted):
     script = """
     material(y, yeoh, 1100, 2e7, 5e5, -1e4, 2e3)
     viscosity(prony, y, g=0.3, tau=0.5)
-    load_path(pull, 50, exx=1.1, syy=0, szz=0)
-    load_path(back, 50, exx=0, syy=0, szz=0)
-    load_path(rest, 50, sxx=0, syy=0, szz=0, duration=10)
+    load_path(pull, 25, exx=1.1, syy=0, szz=0)
+    load_path(back, 25, exx=0, syy=0, szz=0)
+    load_path(rest, 25, sxx=0, syy=0, szz=0, duration=10)
     element(e, y, pull, back, rest)"""
     folder = run_interpreted(script).folder
     d = np.genfromtxt(folder / "element_e.txt", names=True)

@@ -494,16 +494,16 @@ def test_gravity_beside_a_fix_in_python(run_interpreted):
 def test_the_work_of_impulses_of_contact_is_known(run_interpreted):
     """With v*, of which the points take a part, a tenth of the energy seemed to be lost."""
     fix = "contact/minimize_penetration/plane, body, 0.28, 0, 0, 1, 0, 0, 0"
-    (share,), said = balance(run_interpreted, fix, 0.002)
+    (share,), said = balance(run_interpreted, fix, 0.002, 0.15)
     assert abs(float(share)) < 4 and "spurious" not in said
 
 
-def balance(run_interpreted, fix, dt=0.004):
+def balance(run_interpreted, fix, dt=0.004, T=0.2):
     """By how much the balance of energy does not close, in per cent, and what is said."""
     text = block(
         2, "region(end, block, 0.55, 1, INF, INF)", "group(grip, particles, region, end, all)",
         *["fix(v, initial_velocity_particles, all, -0.5, 0)"] * ("velocity" not in fix),
-        f"fix(F, {fix})", f"set_dt({dt})", "run_time(0.2)", size=(0.3, 0.1),
+        f"fix(F, {fix})", f"set_dt({dt})", f"run_time({T})", size=(0.3, 0.1),
     ).replace("method(ulmpm", "method(tlmpm")  # fmt: skip
     result = run_interpreted(text)
     assert "is not monitored" not in result.out
@@ -619,7 +619,7 @@ def test_damped_bodies_in_contact_rest_with_their_weight(run_interpreted):
     """
     fixes = "fix(f, velocity_nodes, f, 0)\nlog_modify(custom, step, ContactForce_b_x, f_x)\n"
     text = BARS.format(kind="ulmpm/contacts", law="elastic", fixes=fixes + DAMPED)
-    result = run_interpreted(text.replace("run(50)", "run(200)"))
+    result = run_interpreted(text.replace("run(50)", "run(100)"))
     assert result.log.ContactForce_b_x[-1] == pytest.approx(600 * 9.81, rel=1e-3)
     assert result.log.f_x[-1] == pytest.approx(1200 * 9.81, rel=1e-3)
     assert abs(float(re.search(r"^ +energy +(\S+) %", result.out, re.M)[1])) < 3
