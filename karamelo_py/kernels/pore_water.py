@@ -39,14 +39,14 @@ def share_forces(s):
 
 
 def make_flux(s):
-    return pores.MakeFlux(_rim(s))
+    return pores.MakeFlux(_rim(s), pores.Mapped())
 
 
 OF_MASS = Company(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
 OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
 BEFORE_LOADS = Company(before=(NodeTask(pores.SplitMomentum()),))
-OF_MOVE = Company(before=(NodeTask(pores.DragWater()),), then=(pores.MoveWater(),))
-OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWaterOfStep()),))
+OF_MOVE = Company(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
+OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWater(pores.OfStep())),))
 COMPANIES = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
@@ -83,7 +83,7 @@ def _add_pressure(s):
 
 
 def _make_flux_of_step(s):
-    return pores.MakeFluxOfStep(_rim(s))
+    return pores.MakeFlux(_rim(s), pores.OfStep())
 
 
 # Nodal velocities that fixes hold are known before the pressure is solved for.
@@ -104,7 +104,7 @@ COMPANIES_OF_SOLUTION = (
     (
         Strain,
         Company(
-            before=(NodeTask(pores.MakeFluxOfStep, make=_make_flux_of_step),),
+            before=(NodeTask(pores.MakeFlux, make=_make_flux_of_step),),
             first=(pores.Seep(),),
         ),
     ),

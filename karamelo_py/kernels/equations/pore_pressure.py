@@ -163,7 +163,7 @@ class Foresee(NamedTuple):
             before = held if held == held else v
             by_force = dt * on_water * per_mass - (new - before)
             w = drag.left * (w + drag.left * (v - before)) + drag.taken * by_force
-            update[n, k] = before  # for `DragWaterOfStep`
+            update[n, k] = before  # for `DragWater`
             out[n, V_ * d + k] = new
             out[n, S_ * d + k] = share * w
             out[n, MOBILE * d + k] = real(0, dt) if held == held else dt / drag.whole

@@ -10,8 +10,9 @@ nodes that are not open.
 The flux is j = m / V (v_w - v_s) at nodes. Pressure rate and force use the same gradients: with a
 linear basis at the cell centre (one pressure rate per cell), otherwise at the points. With splines,
 volume strains e and pressures p in the null space of the grid would grow. Therefore in each step R
-(1 - S)^2 e is subtracted from e, in soil and pores, and R (1 - S)^2 p from p, in pores only, where
-R = 1/20 and S maps to the nodes and back.
+(1 - S)^2 e is subtracted from e, in soil and pores, where R = 1/5 and S maps to the nodes and back,
+and R / (1 + b) (1 - S)^2 p from p, in pores only, with b as below. At edges S does not reproduce a
+linear pressure. The flow of water restores it; undrained soil (large b) follows e alone.
 
 Velocities of nodes are means by the mass of soil and water, relative velocities of the water by its
 mass. Hence undrained points have no flux, also if their water contents differ, and the momentum of
@@ -67,7 +68,7 @@ from karamelo_py.points.laws.pore_water import (
 from karamelo_py.points.transfers import nodal_momentum, updated_velocity
 
 RIM = 0.5  # |B| / (V / h) above which a spline's node is at the surface
-SMOOTHING = 0.05  # R
+SMOOTHING = 0.2  # R
 WAYS = "xlo", "xhi", "ylo", "yhi", "zlo", "zhi", "surface", "volume"
 SMALL = 1e-4  # below this b, (1 - exp(-b)) / b is a series
 
@@ -227,7 +228,7 @@ def pores(pt):
     kin, J = pt.kin, laws.jacobian(law, pt.kin, state)
     V0 = eq.mass(pt) * laws.specific_volume(law)
     V, n, p = V0 * J, porosity(law, kin, state), pore_pressure(law, kin, state)
-    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V, V, V))
+    strains = () if isinstance(pt.w.basis, Linear) else pt.load(VolumeStrain, (V,) * 3)
     area = V0 * force_stress(pt.w.frame, kin, nothing(kin) + J * I, f)
     drag = V * drag_at(law.permeability, law, n)
     strain, unseen = _times(V, strains[:1]), _times(V, strains[1:])
@@ -537,128 +538,108 @@ class ShareForces(NamedTuple):
         share_forces(task, kin, nodes, n, dt)
 
 
-def _drag_water(task, kin, nodes, n, dt):
-    out, d = field(nodes.fields, WaterUpdate), kin.dimension
-    if not is_wet_node(nodes, kin, n):
-        put_at(out, n, 0, (0,) * (2 * d))
-        return
-    water = field(nodes.fields, WaterSums)
-    m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
-    both = m_s + water[n, arrays.MASS]
-    per_mass, per_whole = 1 / water[n, arrays.MASS], 1 / nodes.sums[n, arrays.MASS]
-    out[n, 2 * d] = left
-    for k in range(d):
-        of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
-        dv = nodes.update[n, arrays.of_change(kin) + k]
-        before = nodes.update[n, k] - dv
-        # Water next to a fix that holds the soil slips past it unless drag holds it, too.
-        beyond = nodes.sums[n, of_momentum] * per_whole - before
-        w = water[n, of_momentum] * per_mass + left * beyond
-        further = before - out[n, k] if task.of_step else real(0, dt)
-        by_force = dt * water[n, of_force] * per_mass - dv - further
-        new = left * (w + left * further) + taken * by_force
-        out[n, k] = new
-        out[n, d + k] = new - w
-        out[n, 2 * d + 1 + k] = beyond
-        water[n, of_force] = 0
-        nodes.sums[n, of_momentum] *= both * per_whole
-    nodes.sums[n, arrays.MASS] = both
+class Mapped(NamedTuple):
+    """The flux follows velocities that points map to the nodes after the move."""
+
+
+class OfStep(NamedTuple):
+    """The flux follows v* and w*; open nodes let water in, too.
+
+    Before `DragWater`, `WaterUpdate` begins with the soil's velocity before the step (d,).
+    """
 
 
 @node_task
 class DragWater(NamedTuple):
     """Updates the relative velocity with the soil's velocity change; resets the mass."""
 
-    of_step = False
+    velocity: arrays.Tag  # Mapped or OfStep
+
     says = "drag"
     goes_through = ("sums", "update", "water sums", "water update")
 
     def at_node(task, kin, nodes, n, dt):
-        _drag_water(task, kin, nodes, n, dt)
-
-
-@node_task
-class DragWaterOfStep(NamedTuple):
-    """Like `DragWater`, with the soil's velocities before the step (d,) from `WaterUpdate`."""
-
-    of_step = True
-    says = DragWater.says
-    goes_through = DragWater.goes_through
-
-    def at_node(task, kin, nodes, n, dt):
-        _drag_water(task, kin, nodes, n, dt)
-
-
-def _make_flux(task, kin, nodes, n, dt):
-    flux, d = field(nodes.fields, Flux), kin.dimension
-    across = real(0, dt)
-    if not is_wet_node(nodes, kin, n):
-        put_at(flux, n, 0, (0,) * (d + 6))
-        if field(nodes.fields, GivenFlux) is not None:
-            put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
-        return
-    water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
-    out, of_V, of_area = field(nodes.fields, WaterUpdate), of_volumes(kin), of_pressure(kin) + d
-    m, V = water[n, arrays.MASS], water[n, of_V]
-    pushed, p = _by_pressure(nodes, kin, n, task.rim)
-    per_mass, per_volume = 1 / m, 1 / V
-    for k in range(d):
-        if task.of_step:
-            again[n, k] = m * out[n, k]
-        else:
-            again[n, k] += m * out[n, 2 * d] * out[n, 2 * d + 1 + k]
-        j = again[n, k] * per_volume
-        flux[n, k] = j
-        across += j * water[n, of_area + k]
-    drained = is_open(nodes, n)
-    if not task.of_step:
-        enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
-        drained = drained and not enters
-    closed = not drained and _is_rim(nodes, kin, n, task.rim)
-    supply = mass_given(nodes, kin, n, True)
-    stays = across + supply if closed else supply
-    leaves = across + supply if drained else real(0, dt)
-    columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
-    means = [water[n, column] * per_volume for column in columns]
-    put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
-    # With the mean relative velocity in the step, the remaining work is the work of weight
-    # minus the work of drag, and the work of pressure on water that enters or leaves.
-    work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
-    for k in range(d):
-        beyond = out[n, 2 * d + 1 + k]
-        dragged = beyond if task.of_step else out[n, 2 * d] * beyond
-        w = 0.5 * ((water[n, arrays.of_momentum(kin) + k] + again[n, k]) * per_mass + dragged)
-        dv = nodes.update[n, arrays.of_change(kin) + k] + out[n, d + k]
-        work += (w + beyond - dragged) * m * dv - w * dt * pushed[k]
-    field(nodes.fields, WorkAtNodes)[n, 0] += work
+        out, d = field(nodes.fields, WaterUpdate), kin.dimension
+        if not is_wet_node(nodes, kin, n):
+            put_at(out, n, 0, (0,) * (2 * d))
+            return
+        water = field(nodes.fields, WaterSums)
+        m_s, left, taken = row(out, n, 2 * d, (dt, dt, dt))
+        both = m_s + water[n, arrays.MASS]
+        per_mass, per_whole = 1 / water[n, arrays.MASS], 1 / nodes.sums[n, arrays.MASS]
+        out[n, 2 * d] = left
+        for k in range(d):
+            of_force, of_momentum = arrays.of_force(kin) + k, arrays.of_momentum(kin) + k
+            dv = nodes.update[n, arrays.of_change(kin) + k]
+            before = nodes.update[n, k] - dv
+            # Water next to a fix that holds the soil slips past it unless drag holds it, too.
+            beyond = nodes.sums[n, of_momentum] * per_whole - before
+            w = water[n, of_momentum] * per_mass + left * beyond
+            further = before - out[n, k] if isinstance(task.velocity, OfStep) else real(0, dt)
+            by_force = dt * water[n, of_force] * per_mass - dv - further
+            new = left * (w + left * further) + taken * by_force
+            out[n, k] = new
+            out[n, d + k] = new - w
+            out[n, 2 * d + 1 + k] = beyond
+            water[n, of_force] = 0
+            nodes.sums[n, of_momentum] *= both * per_whole
+        nodes.sums[n, arrays.MASS] = both
 
 
 @node_task
 class MakeFlux(NamedTuple):
-    """Computes the flux of the velocities that were mapped again."""
+    """Computes the flux of the water."""
 
     rim: float
+    velocity: arrays.Tag  # Mapped or OfStep
 
-    of_step = False
     says = "flux of the water"
-    goes_through = ("sums", "velocity", "water sums", "water again", "flux")
+    goes_through = (
+        "sums", "velocity", "water sums", "water update", "water again", "flux",
+    )  # fmt: skip
 
     def at_node(task, kin, nodes, n, dt):
-        _make_flux(task, kin, nodes, n, dt)
-
-
-@node_task
-class MakeFluxOfStep(NamedTuple):
-    """Computes the flux of the velocities v* and w*; open nodes let water in, too."""
-
-    rim: float
-
-    of_step = True
-    says = MakeFlux.says
-    goes_through = ("sums", "velocity", "water sums", "water update", "water again", "flux")
-
-    def at_node(task, kin, nodes, n, dt):
-        _make_flux(task, kin, nodes, n, dt)
+        flux, d = field(nodes.fields, Flux), kin.dimension
+        of_step, across = isinstance(task.velocity, OfStep), real(0, dt)
+        if not is_wet_node(nodes, kin, n):
+            put_at(flux, n, 0, (0,) * (d + 6))
+            if field(nodes.fields, GivenFlux) is not None:
+                put_at(field(nodes.fields, GivenFlux), n, 0, (0,) * (2 * d + 2))
+            return
+        water, again = field(nodes.fields, WaterSums), field(nodes.fields, WaterAgain)
+        out, of_V, of_area = field(nodes.fields, WaterUpdate), of_volumes(kin), of_pressure(kin) + d
+        m, V = water[n, arrays.MASS], water[n, of_V]
+        pushed, p = _by_pressure(nodes, kin, n, task.rim)
+        per_mass, per_volume = 1 / m, 1 / V
+        for k in range(d):
+            if of_step:
+                again[n, k] = m * out[n, k]
+            else:
+                again[n, k] += m * out[n, 2 * d] * out[n, 2 * d + 1 + k]
+            j = again[n, k] * per_volume
+            flux[n, k] = j
+            across += j * water[n, of_area + k]
+        drained = is_open(nodes, n)
+        if not of_step:
+            enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
+            drained = drained and not enters
+        closed = not drained and _is_rim(nodes, kin, n, task.rim)
+        supply = mass_given(nodes, kin, n, True)
+        stays = across + supply if closed else supply
+        leaves = across + supply if drained else real(0, dt)
+        columns = of_V + 3, of_unseen(kin), of_V + 2, of_unseen(kin) + 1
+        means = [water[n, column] * per_volume for column in columns]
+        put_at(flux, n, d, (real(0, dt) if drained else stays * per_volume, *means, leaves))
+        # With the mean relative velocity in the step, the remaining work is the work of weight
+        # minus the work of drag, and the work of pressure on water that enters or leaves.
+        work = dt * (supply - leaves) * p * water[n, of_V + 1] * per_mass
+        for k in range(d):
+            beyond = out[n, 2 * d + 1 + k]
+            dragged = beyond if of_step else out[n, 2 * d] * beyond
+            w = 0.5 * ((water[n, arrays.of_momentum(kin) + k] + again[n, k]) * per_mass + dragged)
+            dv = nodes.update[n, arrays.of_change(kin) + k] + out[n, d + k]
+            work += (w + beyond - dragged) * m * dv - w * dt * pushed[k]
+        field(nodes.fields, WorkAtNodes)[n, 0] += work
 
 
 class MoveWater(eq.Task):
@@ -744,10 +725,11 @@ class Seep(eq.Task):
         pores = old.pores * grown + (1 - law.n) * (grown - 1)
         if len(means):
             mean, again, p, p_again = means
-            strain, unseen, p_unseen = pt.load(VolumeStrain, (mean, mean, mean))
-            change = real(SMOOTHING, mean) * (again - unseen)
+            strain, unseen, p_unseen = pt.load(VolumeStrain, (mean,) * 3)
+            change, n = real(SMOOTHING, mean) * (again - unseen), porosity(law, kin, old)
+            b = pt.dt * drag_at(law.permeability, law, n) / (n * law.rho)
             pores = pores + change * (pores + (1 - law.n))
-            pores = pores * (1 + real(SMOOTHING, mean) / law.K * (p_unseen - p_again))
+            pores = pores * (1 + SMOOTHING / (1 + b) / law.K * (p_unseen - p_again))
             store(pt.of(VolumeCorrection), pt.p, (change,))
             later = strain + (1 + strain) * (grown * (1 + change) - 1)
             p_unseen = pore_pressure(law, kin, old) - p

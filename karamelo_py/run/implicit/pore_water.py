@@ -17,7 +17,7 @@ import scipy.sparse as sp
 
 from karamelo_py.compiler.fields import field
 from karamelo_py.compiler.tuples import record
-from karamelo_py.kernels.arrays import MASS, Block, Tag, of_force
+from karamelo_py.kernels.arrays import MASS, Block, Tag, matter_of, of_force
 from karamelo_py.kernels.equations.pore_water import (
     Flux,
     GivenFlux,
@@ -25,10 +25,11 @@ from karamelo_py.kernels.equations.pore_water import (
     RelativeVelocity,
     WaterSums,
 )
+from karamelo_py.kernels.export import export
 from karamelo_py.kernels.pore_water import AT_WATER
 from karamelo_py.kernels.step import take_rows
 from karamelo_py.points.laws import initial_state, specific_volume, wave_speed_squared
-from karamelo_py.points.laws.pore_water import State, drag_per_volume, porosity
+from karamelo_py.points.laws.pore_water import State, drag_per_volume, pore_pressure, porosity
 from karamelo_py.run.implicit.equations import Equations, interpolation, valid
 from karamelo_py.run.implicit.solvers import direct
 from karamelo_py.scene.modify import Fix
@@ -98,13 +99,14 @@ class Seepage:
             M = np.array([_modulus(one.law, kin) for one in records])[of]
             numbers = [law.n, law.K, law.rho, law.suction, mobility, M, grids.spacing[points.grid]]
             content = state.content / law.rho  # volume of the water
-            columns.append((per_mass * points.mass, content, state.pores, *numbers))
+            before = np.empty(len(content))
+            export(pore_pressure.tag, False, matter_of(kin, block), before)
+            columns.append((per_mass * points.mass, content, state.pores, before, *numbers))
         every = (np.concatenate(one).astype(float) for one in zip(*columns, strict=True))
-        self.V0, self.content, self.pores, self.n, self.K, self.rho, *more = every
-        self.suction, self.mobility, M, h = more
+        self.V0, self.content, self.pores, self.before, self.n, self.K, *more = every
+        self.rho, self.suction, self.mobility, M, h = more
         self.drains = self.suction < self.K
         ratio = self.content / self.pores
-        self.before = self._scale(ratio - 1) * np.log(ratio)
         # Use weight and mobility of water that fills the pores.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
