@@ -1,5 +1,6 @@
 """Water in the pores, against exact solutions and balances."""
 
+import json
 import re
 from math import pi
 
@@ -8,7 +9,7 @@ import pytest
 from conftest import INPUTS
 from selection import few
 
-from comparisons.results import read_log
+from comparisons.results import read_dump, read_log
 
 COLUMN = """
     N = 16
@@ -374,6 +375,17 @@ def test_an_undrained_column_carries_its_load_with_water(run_script):
         assert abs(log[name][-1] / exact - 1) < 1e-6
 
 
+def test_pressures_that_do_not_converge_end_the_run(run_interpreted):
+    """Walls that enclose incompressible water and move leave no solution."""
+    script = column("semi-implicit").replace("N = 16", "N = 4").replace("1e-2)", "1e-2, K=1e30)")
+    script = script.replace("bottom, 0)", "bottom, 1e-3)") + "fix(lid, velocity_nodes, top, 0)\n"
+    result = run_interpreted(script + "run(2)", status=1)
+    assert "the pressures of the pore water do not converge" in result.err
+    assert "walls that enclose incompressible water" in result.err
+    assert result.err.count("error:") == 1 and "Traceback" not in result.err
+    assert json.loads((result.folder / "run.json").read_text("utf-8"))["status"] == "failed"
+
+
 @pytest.mark.parametrize(("K", "courant"), [("2.2e9", 0.9), ("1e6", 0.65)])
 def test_the_semi_implicit_step_is_stable(run_interpreted, K, courant):
     """Soft water damps less: with 0.9 h/c, this drained block would break."""
@@ -578,6 +590,79 @@ def test_an_undrained_column_fails_at_its_stability_number(run_script):
         moved[S] = log["runout"][-1] - log["runout"][0]
     assert moved["3.6"] < 0.05  # elastic
     assert moved["4.4"] > 0.15
+
+
+REST = """
+    method({method}, FLIP, {basis}, 0.99)
+    N = 16
+    dimension(2, 0, 1/N, 0, 1 + 2/N, 1/N)
+    region(column, block, 0, 1/N, 0, 1)
+    eos(clay, linear, 1590, 1e7)
+    strength(clay, mohr-coulomb, 5e6, 1e6, 30, 0)
+    material(clay, eos-strength, clay, clay)
+    pore_water(clay, n=0.4, permeability={k})
+    solid(column, region, column, 2, clay, 1/N)
+    region(left, block, -INF, 0, -INF, INF)
+    region(right, block, 1/N, INF, -INF, INF)
+    region(sides, union, left, right)
+    region(bottom, block, -INF, INF, -INF, 1e-6)
+    region(top, block, -INF, INF, 1, INF)
+    group(sides, nodes, region, sides, all)
+    group(bottom, nodes, region, bottom, all)
+    group(top, nodes, region, top, all)
+    fix(sides, velocity_nodes, sides, 0, NULL)
+    fix(base, velocity_nodes, bottom, 0, 0)
+    fix(drain, pore_pressure, top, 0)
+    fix(weight, body_force, all, 0, -9.81)
+    fix(water, initial_pore_pressure, all, 9810*(1 - y0))
+    s = -990*9.81*(1 - y0)
+    fix(soil, initial_stress, all, s, s, s, 0, 0, 0)
+    compute(p, probe, all, pore_pressure, x=0, y=0)
+    dt_factor(0.5)
+    log_modify(custom, step, p, base_y)
+    set_output({steps}/5)
+    run({steps})
+"""
+
+
+@same_kernels
+@pytest.mark.parametrize(
+    ("k", "method", "basis", "steps"),
+    [
+        ("1e-12", "ulmpm", "quadratic-spline", 20000),
+        *(
+            pytest.param(k, method, f"{basis}-spline", 160000, marks=pytest.mark.full)
+            for k in ("1e-12", "1e-9", "1e-6")
+            for method in ("ulmpm", "tlmpm")
+            for basis in ("quadratic", "cubic")
+        ),
+    ],
+)
+def test_a_column_at_rest_keeps_its_pore_pressure(run_script, k, method, basis, steps):
+    """Hydrostatic pressure with a free surface above and impermeable walls."""
+    log = run_script(REST.format(k=k, method=method, basis=basis, steps=steps)).log
+    p = log["p"] / (9810 * (1 - 1 / 64))
+    assert np.abs(p - 1).max() < 0.012
+    assert np.ptp(p[1:]) < 0.005  # nodes at walls and surface find their balance first
+    assert abs(log["base_y"][-1] / (1990 * 9.81 / 16) - 1) < 1e-3
+
+
+@same_kernels
+def test_a_collapse_without_drainage_has_little_noise(run_script):
+    """Undrained, effective pressures stay; run-out as without water, 1.30 (in.wet_column)."""
+    columns = "id, s11, s22, s33"
+    text = (INPUTS / "in.wet_column").read_text("utf-8")
+    result = run_script(
+        text.replace(
+            "run_time(T)", f"dump(d, all, particle, 3000, d.*.txt, {columns})\nrun_time(T)"
+        )
+    )
+    assert last(result)["runout"] == pytest.approx(1.30, abs=0.03)
+    p0 = 2000 * 9.81 * 0.1 / 8 / 0.5
+    for step in (3000, 6000):
+        points = read_dump(result.folder / f"d.{step}.txt")[-1]
+        p = -(points["s11"] + points["s22"] + points["s33"]) / 3
+        assert np.sqrt(np.mean((p - p0) ** 2)) < 0.03 * p0
 
 
 @pytest.mark.full

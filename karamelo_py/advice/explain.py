@@ -5,6 +5,7 @@ import numpy as np
 from karamelo_py.advice import energy
 from karamelo_py.advice.step_size import own_step_instead, step_by_script
 from karamelo_py.compiler.tuples import record
+from karamelo_py.kernels.clock import NOT_SOLVED
 from karamelo_py.kernels.step import ABOVE_LIMIT, GAINED, HEATED, SHRUNK
 from karamelo_py.language.rules import code_of
 from karamelo_py.output.point_table import PointTable
@@ -34,6 +35,13 @@ def trouble(hub: Hub, simulation: Simulation, status: int, smaller: str = "") ->
         result = result._replace(fix=smaller) if too_large else result
     elif status == SHRUNK:
         result = _shrunk(hub, simulation)
+    elif simulation.control.motion[0].wrong == NOT_SOLVED:
+        message = f"the pressures of the pore water do not converge ({when(simulation, 1)})"
+        cause = (
+            "walls that enclose incompressible water, or cells whose stiffnesses differ too much"
+        )
+        fix = f"a K of water such as 2.2e9 Pa, a drain with fix pore_pressure, or {smaller}"
+        return Trouble(message, fix, "no-pressure", cause)
     elif simulation.failure:
         message = f"{simulation.failure} ({when(simulation, 1)})"
         fix = "smaller load steps; above the limit load there is no equilibrium"

@@ -305,7 +305,7 @@ MOTION = np.dtype([
     ("pace", np.float64),  # largest move in a step since points were sorted
     ("path", np.float64),  # longest path of a point
     ("now", np.int64),  # index of present locations
-    ("wrong", np.int64),  # 1 if a point failed
+    ("wrong", np.int64),  # 1 if a point failed, or NOT_SOLVED
 ])  # fmt: skip
 # Energy monitor (`kernels.watch`, `run.energy`)
 ENERGY = np.dtype([

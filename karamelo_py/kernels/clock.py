@@ -44,6 +44,7 @@ ROUNDING = 1e-6  # fraction of a step: round-off of a million additions
 # If dt drops suddenly (set_dt), the dt of the contact stiffness decreases by this fraction of the
 # new dt per step, so that loaded springs stiffen over several periods.
 FOLLOWING = 0.01
+NOT_SOLVED = 2  # value of `motion.wrong` if no solution for the pressure was found
 STILL = 0.25  # path in cells after which the smaller stable step for crossing cells applies
 # Cells that a point may move in a step if the step ignores a common drift.
 STRIDE = 0.65

@@ -95,7 +95,7 @@ def _each_point(row, s, step):
 
 @take.on(table.Once, Processor)
 def _once(row, s, step):
-    row.function(s)
+    return row.function(s)
 
 
 @take.on(table.Repeated, Processor)

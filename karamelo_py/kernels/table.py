@@ -111,7 +111,7 @@ class EachPoint(NamedTuple):
 
 
 class Once(NamedTuple):
-    """Calls ``function(s)`` between two loops."""
+    """Calls ``function(s)`` between two loops; a result of False stops the run."""
 
     function: Any
 

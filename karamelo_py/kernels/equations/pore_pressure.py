@@ -32,7 +32,7 @@ from karamelo_py.compiler.fields import StepField, SummedField, field, numbers
 from karamelo_py.compiler.tuples import flat, record
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels import equations as eq
-from karamelo_py.kernels.clock import step_size
+from karamelo_py.kernels.clock import NOT_SOLVED, step_size
 from karamelo_py.kernels.equations import pore_water as pores
 from karamelo_py.kernels.equations.node_updates import node_task
 from karamelo_py.kernels.records import put_at
@@ -455,6 +455,7 @@ def _scatter(system):
 
 @kernel
 def _solve(system):
+    """Solve for the increments; return False if the residual remains too large."""
     _begin(system)
     _assemble(system)
     _factor(system)
@@ -469,14 +470,19 @@ def _solve(system):
         share = size / before
         number += 1
     _scatter(system)
+    # NaN in the first residual is reported with the velocities of points.
+    return size <= goal or goal != goal
 
 
 def solve(s):
-    """Add the forces of the increments of pressure to `NodeResponse`."""
+    """Add the forces of the increments of pressure to `NodeResponse`; return False on failure."""
     kinds = pores.WaterSums, CellSums, CellPressures, NodeResponse, pores.WaterUpdate
     of_fields = [field(s.nodes.fields, kind) for kind in kinds]
     step = s.control.values[arrays.TIMESTEP] + 1
-    _solve(System(s.kin, s.grids, s.spans, *of_fields, step_size(s), step))
+    solved = _solve(System(s.kin, s.grids, s.spans, *of_fields, step_size(s), step))
+    if not solved:
+        s.control.motion[0].wrong = NOT_SOLVED
+    return solved
 
 
 @node_task
