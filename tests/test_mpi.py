@@ -354,7 +354,7 @@ def test_a_process_is_killed_at_the_end(tmp_path):
     assert status == 128 + signal.SIGKILL, err + out
     assert "Run finished" in out
     assert err.count("error: ") == 1 and "process 2 of 2 (pid " in err
-    assert "when the runs were over: all files are complete" in err
+    assert "after the last run: all files are complete" in err
 
 
 def _pids(launcher: int) -> list[int]:

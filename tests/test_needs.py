@@ -768,7 +768,7 @@ def test_output_that_takes_longer_than_the_steps(lowered):
     assert not [*output(hub, simulation)]
     hub.output.log.every = 1
     ((said, _),) = output(hub, simulation)
-    assert said.startswith("output takes some 2e+01 s of a core, and the steps 1 s: 35000 lines")
+    assert said.startswith("output takes about 2e+01 s on one core, and the steps 1 s: 35000 lines")
     assert said.endswith("140 tables of points, 1 picture")
 
 

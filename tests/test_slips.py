@@ -47,7 +47,7 @@ OF = "material(rubber, eos-strength, e, s"
          "flow stress at a plastic strain of 1 is 5e+12, above its modulus", "in the units of"),
         ([], "eos(e, linear, 8000, 160e9)\n"
          "strength(s, johnson_cook, 80e9, 4e8, 5e8, 0.3, 1, 10, 0, 300, 1300)",
-         "rises by 10 times itself for e times the rate", "0.01"),
+         "rises by 10 times its value if the rate rises by a factor of e", "0.01"),
         ([], "eos(e, linear, 2000, 1e8)\nstrength(s, mu-i, 1e7, 20, 38, 0.279, 5e-4, 2450)",
          "its coefficient of friction is 20", "tangents"),
         (["fix(e, erosion, all, ep > 0.1 && x > 0)"], "",

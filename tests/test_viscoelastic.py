@@ -419,7 +419,7 @@ def test_relaxation_below_the_step_is_reported(run_interpreted, more):
         ("prony, damper, g=0.3, tau=1", "has viscosity prony already"),
         ("prony, thick, g=0.3, tau=1", "before viscosity(newtonian, ...)"),
         ("prony, nothing, g=0.3, tau=1", "unknown material"),
-        ("prony, rubber, g=0.3, tau=1, wlf=(17, 52, 300)", "no temperature that could shift times"),
+        ("prony, rubber, g=0.3, tau=1, wlf=(17, 52, 300)", "no temperature, which wlf needs"),
         ("prony, warm, g=0.3, tau=1, wlf=(17, 52)", "'(17, 52)' is not a shift"),
         ("prony, warm, g=0.3, tau=1, wlf=(17, -52, 300)", "above 0"),
         ("newtonian, rubber", "mu is missing"),

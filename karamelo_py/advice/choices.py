@@ -57,7 +57,7 @@ CHOICES = (
         lambda s: s.implicit and s.alone and not s.soil,
         ("method(tlmpm, FLIP, linear, 1)",),
         "load steps of a thin metal sheet that flows",
-        "a sheet is free to become thinner, so nothing locks",
+        "a sheet can become thinner, so it does not lock",
         ("in.disk",),
     ),
     Choice(
@@ -113,14 +113,14 @@ CHOICES = (
         lambda s: s.liquid and s.sag > 0,
         ("method({grid}, AFLIP, quadratic-spline, 1)",),
         "a liquid under its weight",
-        "surface waves and fronts lose least with AFLIP",
+        "surface waves and fronts lose the least energy with AFLIP",
         ("in.slosh", "in.dam_ritter"),
     ),
     Choice(
         lambda s: s.liquid,
         ("method({grid}, APIC, quadratic-spline)",),
         "a liquid",
-        "vortices lose little, and angular momentum is conserved",
+        "vortices lose little energy, and angular momentum is conserved",
         ("in.taylor_green", "in.couette"),
     ),
     Choice(

@@ -161,8 +161,8 @@ def cause_of_loss(hub: Hub) -> tuple[str, str]:
 def collides(hub: Hub) -> tuple[str, str] | None:
     if any(fix.impulsive for fix in hub.fixes.values()):
         return (
-            "contact that removes penetrations within one step: the grid carries only the part of "
-            "such impulses that it resolves, less with a shorter time step",
+            "contact that removes penetrations within one step: the grid resolves only a part of "
+            "such impulses, less with a shorter time step",
             "impenetrablesurface, indent or contact/hertz, whose forces grow with the depth",
         )
     if hub.update.method.fields_per_solid and hub.update.scheme.traits.implicit:

@@ -195,7 +195,7 @@ def _sphere(hub: Hub, solids: list[Solid], middle: Middle) -> tuple[str, str]:
     many = _points_by_radius(solids, middle)
     part = ("", "half ", "quarter ", "eighth of ")[int(np.abs(middle.sides).sum())]
     return (
-        f"{part}spheres about one centre, and all acts along the radius: about {many:.2g} times "
+        f"{part}spheres about one centre, with loads along the radius: about {many:.2g} times "
         f"the points of a line{cost(hub, many, 1)}",
         f"dimension(1, 0, {far:g}, {hub.domain.h:g}) and spherical(true), x the distance from the "
         "centre; masses, forces and energies of a steradian",

@@ -83,7 +83,7 @@ def _output(hub: Hub, simulation: Simulation) -> Words:
     if output > max(WORTHWHILE, stepping):
         lines, tables = round(times(hub.output.log)), round(sum(map(times, files)))
         yield (
-            f"output takes some {output:.1g} s of a core, and the steps {stepping:.1g} s: "
+            f"output takes about {output:.1g} s on one core, and the steps {stepping:.1g} s: "
             f"{plural(lines, 'line')} of the log, {plural(tables, 'table')} of points, "
             f"{plural(round(pictures), 'picture')}",
             "less often, or none if a study runs the scene many times (errors over the history "

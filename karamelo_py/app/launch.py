@@ -218,7 +218,7 @@ class Launcher:
         by = f" by {signal.Signals(sent).name}" if sent in signal.valid_signals() else ""
         who = f"process {one['rank'] + 1} of {self.ranks} (pid {one['pid']}) was ended{by}"
         if self.over:
-            return render_message("error", f"{who} when the runs were over: all files are complete")
+            return render_message("error", f"{who} after the last run: all files are complete")
         signalled = sent in ENDING
         hint = None if signalled else "the system ends processes that take too much memory"
         who += ", and the run with it: files are complete up to there"

@@ -556,7 +556,7 @@ def _refuse_copies() -> None:
     if rank > 0:
         sys.exit()
     raise SimulationError(
-        f"{size} processes were started, but a scene in Python uses one: all would do the same",
+        f"{size} processes were started, and each would run the same scene",
         expected=f"mpiexec -n {size} karamelo-py SCRIPT, which distributes a scene",
         hint="Simulation(..., alone=True) to run a separate scene on each",
     )

@@ -199,7 +199,7 @@ class _Writer:
                 if not self.free:
                     raise ScriptError(
                         "the formula is too long",
-                        expected=f"at most {programs.MAX_KEPT} results that wait for their use",
+                        expected=f"at most {programs.MAX_KEPT} intermediate results",
                     )
                 self.rows[k] = self.free.pop()
                 self._append(formula.KEEP, self.rows[k], self.uniform[k])

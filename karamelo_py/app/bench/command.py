@@ -37,7 +37,7 @@ workloads:
 
 def add_options(parser: ArgumentParser) -> None:
     parser.add_argument("workloads", nargs="*", metavar="WORKLOAD")
-    add_variables(parser, "set a variable of the scenes, such as N, their fineness")
+    add_variables(parser, "set a variable of the scenes, such as N, which refines them")
     parser.add_argument(
         "--threads", type=threads_option, default=1, metavar="N",
         help="threads to use (default: 1)",
@@ -53,7 +53,7 @@ def add_options(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--gpu", action="store_true",
-        help="measure an NVIDIA GPU, at 1, 4 and 16 million points unless -var says how fine "
+        help="measure an NVIDIA GPU, with 1, 4 and 16 million points unless -var refines the scene "
         f"(default workloads: {', '.join(on_card.USUAL)})",
     )  # fmt: skip
     parser.add_argument("-o", type=Path, metavar="FILE", help="write the measurements as JSON")

@@ -120,7 +120,7 @@ class RunPage(Rhythmic, Listener):
             left = time.perf_counter() if self.server.watched else left
             if time.perf_counter() - left > GRACE:
                 self._paused = False
-                self.hub.console.say("the live page that paused the run is closed: it continues")
+                self.hub.console.say("the page that paused the run is closed: the run continues")
             if shown != self._column:
                 shown = self._column
                 self._take_again()

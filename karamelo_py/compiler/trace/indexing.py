@@ -210,7 +210,7 @@ def item_of_tuple(lowering: Any, things: tuple, index: Value) -> Any:
     kinds = [types.unliteral(lowering.kind_of(thing)) for thing in things]
     kind, builder = lowering.unify(*kinds), lowering.builder
     if kind is None:
-        raise Untraceable("items of several types at a place that only a run knows")
+        raise Untraceable("items of different types at an index that is known only at run time")
     values = [lowering.lowered(thing, kind) for thing in things]
     index = _index(lowering, index, llvm.I64(len(values)))
     room = llvm.room(builder, ir.ArrayType(llvm.memory_type(kind), len(values)))

@@ -100,7 +100,7 @@ def _doubts_of_parts(law: Any, state: Any) -> Iterator[tuple[str, str]]:
         )
     if (rate := parameter(parameter(strength, "rate"), "C")) > 1:
         yield (
-            f"its flow stress rises by {rate:g} times itself for e times the rate",
+            f"its flow stress rises by {rate:g} times its value if the rate rises by a factor of e",
             "C is about 0.01 for metals",
         )
     if parameter(strength, "mu_s") > COEFFICIENT:

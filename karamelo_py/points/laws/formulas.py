@@ -82,7 +82,7 @@ def check_operations(formula: Term, argument: str, allowed: set[str] = KNOWN) ->
     for one in terms.in_order(formula):
         if one.operation not in allowed:
             raise ScriptError(
-                f"{one.operation} has no derivative that a stress could come from"
+                f"{one.operation} has no derivative, which the stress needs"
                 if allowed is not KNOWN
                 else f"{one.operation} is not possible in a law",
                 argument=argument,

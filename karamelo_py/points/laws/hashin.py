@@ -93,7 +93,7 @@ class Hashin(NamedTuple):
         elastic, *strengths, angle, tilt, spin, residual = self
         if not (St := self.St) > (Y := self.Y) / 2:
             raise ScriptError(
-                f"with Y = {Y:g} and St = {St:g} equal tension across would never break the matrix",
+                f"with Y = {Y:g} and St = {St:g} a tension T22 = T33 would never break the matrix",
                 argument="St",
                 expected="a shear strength across the fibres above half of Y",
             )

@@ -186,7 +186,7 @@ class Viscoelastic(NamedTuple):
         cls, material: ElasticMaterial, *, g: Positives, tau: Positives, wlf: Wlf | None = None
     ) -> "Viscoelastic":
         if wlf and not is_warm(material.whole):
-            message = f"material '{material.id}' has no temperature that could shift times"
+            message = f"material '{material.id}' has no temperature, which wlf needs"
             raise ScriptError(message, argument="wlf", expected="an elastic law with cp and kappa")
         if len(g) != len(tau):
             message = f"there are {plural(len(g), 'fraction')} g and {plural(len(tau), 'time')} tau"

@@ -102,7 +102,7 @@ known_failure(
     "loose points",
     when=lambda asflip, scene: asflip.beta > SEPARATE and scene.moves and bool(scene.elastic),
     reason="ASFLIP separates points that are not compressed, and solid '{scene.elastic[0].id}' "
-    "sustains tension: its points lose their order (two bouncing rings retain 10 % of their "
+    "sustains tension: its points become disordered (two bouncing rings retain 10 % of their "
     "speed; with beta = 0.1 as much as with AFLIP)",
     cure=f"AFLIP instead of ASFLIP, or beta = {SEPARATE:g} after the FLIP coefficient",
 )

@@ -231,8 +231,8 @@ class Reference(Compared, Compute):
         points, compared as a function of a coordinate.
     file
         Columns separated by commas, semicolons or blanks, with names in the first row (else 1, 2,
-        ...); # begins a comment line. For a value, the first column is the time. For points its name
-        must be a column of points, such as x, y0 or T: the abscissa of the curve.
+        ...); # begins a comment line. The first column is the time, or for points a
+        coordinate or another column of points, such as x, y0 or T.
     column
         The column of the file to compare with. For points, the name must also be a column of
         points, such as s11 or vx.

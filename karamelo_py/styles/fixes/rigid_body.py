@@ -208,7 +208,7 @@ class RigidBody(Fix):
             if wanted != value:
                 is_fixed = fixed is not None and WAYS[k] in [part.text for part in fixed.listed()]
                 name = "fixed" if is_fixed else ("motion", "turning")[k // 3]
-                message = f"it begins with {wanted:g} for {WAYS[k]}, and {name} says {value:g}"
+                message = f"it begins with {wanted:g} for {WAYS[k]}, but {name} sets {value:g}"
                 raise _wrong(components.argument, message, f"NULL or {value:g} for {WAYS[k]}")
 
     @property

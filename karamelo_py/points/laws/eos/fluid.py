@@ -97,10 +97,10 @@ known_failure(
     Tait,
     "liquids with a linear basis",
     when=_swings,
-    reason="a liquid sloshes or rotates for long, and {scene.transfer_name} with a linear basis "
-    "gives spurious forces where points cross cells: waves in a tank are 8 % too slow and lose 20 "
-    "% of their height in two periods (FLIP), velocities in a vortex are wrong by 25 %, and the "
-    "level of a liquid at rest falls by 4 % in 15 sqrt(L/g), 15 % in 30",
+    reason="a liquid sloshes or rotates for a long time, and {scene.transfer_name} with a linear "
+    "basis gives spurious forces where points cross cells: waves in a tank are 8 % too slow and "
+    "lose 20 % of their height in two periods (FLIP), velocities in a vortex are wrong by 25 %, "
+    "and the level of a liquid at rest falls by 4 % in 15 sqrt(L/g), 15 % in 30",
     cure="method(ulmpm, APIC, quadratic-spline): 1 % and 3 % for waves, 6 % for vortices",
 )
 known_failure(
@@ -251,7 +251,7 @@ known_failure(
     "sound in a gas",
     when=_sound,
     reason="while points stay in their cells, their volumes change but cell volumes do not: with "
-    "the basis {scene.basis_name}, sound has {speed:.2g} of its speed",
+    "the basis {scene.basis_name}, sound travels at {speed:.2g} of its speed",
     cure="ugimp, cpgimp or quadratic-spline, or method tlmpm",
 )
 

@@ -143,7 +143,7 @@ class Gurson(NamedTuple):
 
     def checked(self):
         if not self.f0 < min(self.fc, 1 / self.q1):
-            message = f"with a void fraction of {self.f0:g} the metal fails at first"
+            message = f"with a void fraction of {self.f0:g} the metal has failed from the start"
             raise ScriptError(message, argument="f0", expected="below fc and 1/q1")
         if not self.ff > self.fc:
             message = f"failure at {self.ff:g} is not above fc = {self.fc:g}"
