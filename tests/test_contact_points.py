@@ -259,4 +259,4 @@ def test_solids_without_contact_are_told(run_interpreted):
 def test_friction_that_balls_cannot_give_is_told(run_interpreted, mu, told):
     """Of `sliding`: braked by 0.19, 0.49, 0.53, 0.46 of the weight with mu 0, 0.3, 0.5, 1."""
     script = sliding(0.5).replace("run_time(0.5)", "run(0)").replace("base, 0.5)", f"base{mu})")
-    assert run_interpreted(script).err.count("surfaces of balls brake") == told
+    assert run_interpreted(script).err.count("surfaces of balls slow") == told

@@ -291,7 +291,7 @@ def test_a_failed_load_step_is_told_what_may_change(run_interpreted):
 def test_a_share_of_a_step_that_has_no_limit(run_interpreted):
     """Warned of at its line, where set_dt does not say so already."""
     result = run_interpreted(coarse().replace("run(4)", "dt_factor(0.5)\n    run(1)"))
-    assert result.err.count("warning:") == 1 and "dt_factor has no effect: load steps" in result.err
+    assert result.err.count("warning:") == 1 and "dt_factor has no effect: set_dt" in result.err
 
 
 def test_a_load_that_is_full_in_the_first_step(run_interpreted):

@@ -207,10 +207,10 @@ MISTAKES = {
     "spin=1": ("inertia=-1", "no body has", "above 0"),
     "fixed=(x)": ("fixed=(z)", "no direction 'z'", "some of x, y, rz"),
     "gravity=(0, -1)": ("gravity=(0, 0, -1)", "3 components", "2 formulas"),
-    "gravity=(0, 1)": ("pivot=(2, 3), velocity=(1, 0)", "pivot holds the body", "spin=..."),
+    "gravity=(0, 1)": ("pivot=(2, 3), velocity=(1, 0)", "pivot already holds the body", "spin=..."),
     "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
-    "velocity=(0, 1)": ("velocity=(0, 1), motion=(NULL, 2)", "motion says 2", "NULL or 2 for y"),
-    "spin=2": ("spin=2, fixed=(rz)", "fixed says 0", "NULL or 0 for rz"),
+    "velocity=(0, 1)": ("velocity=(0, 1), motion=(NULL, 2)", "motion sets 2", "NULL or 2 for y"),
+    "spin=2": ("spin=2, fixed=(rz)", "fixed sets 0", "NULL or 0 for rz"),
     "turning=1": ("", "no load acts on the body 'body'", "gravity=(...)"),
     "scheme(musl, start=half)": (
         "scheme(newmark)", "newmark does not support fix rigid_body", "scheme(musl)"),

@@ -312,7 +312,7 @@ def test_a_list_does_not_change_on_both_ways():
     def caller(x):
         return listed(x)
 
-    with pytest.raises(CannotCompile, match="a list would change on all"):
+    with pytest.raises(CannotCompile, match="a list cannot be changed on one"):
         kernel(caller)(1.0)
 
 

@@ -85,7 +85,7 @@ def test_friction_acts_against_the_motion_in_space(run_interpreted):
 
 def test_mistakes(run_interpreted):
     held = scene().replace("NULL, geq0, mu", "0, 0, mu")
-    assert "held in all directions cannot rub" in run_interpreted(held, status=1).err
+    assert "nodes that are held in all directions" in run_interpreted(held, status=1).err
     negative = scene().replace("mu=0.3", "mu=-1")
     assert "a number or a formula of at least 0" in run_interpreted(negative, status=1).err
 
