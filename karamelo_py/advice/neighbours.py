@@ -79,7 +79,7 @@ def parting(facts: BasicFacts) -> dict[str, Any] | None:
 
 
 def uneven(facts: BasicFacts) -> Uneven:
-    """Return the touching pair of elastic bodies with the worst step.
+    """Return the touching pair of elastic bodies that limits the step most.
 
     Because of a heavy point at a node of mostly light mass, the stable step is shorter by the
     factor sqrt(rho_light / rho_heavy).

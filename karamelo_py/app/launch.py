@@ -324,7 +324,7 @@ def together(
         sys.stdout.flush()
         if not stays:
             comm.abort(status)
-        # The launcher has the exit status already; mpiexec would comment on it.
+        # The launcher already has the exit status; mpiexec would print a message about it.
         return 0 if _link is not None and comm is not None else status
 
     status, text = outcome_of(act, debugging=debugging)

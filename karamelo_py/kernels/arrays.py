@@ -111,7 +111,7 @@ class Tiling(NamedTuple):
     # (T + 1, r, 2) int16: first and last node in each row of the box (in 3D, row i ny + j), counted
     # from the start of the row; last < first if the row is empty; r = 0 if boxes are not refined
     rows: np.ndarray
-    # (T + 1, 5) int64: rows of its records in the buffers; Grid.first, step_x and step_y there
+    # (T + 1, 5) int64: rows of the tile in the buffers; Grid.first, step_x and step_y of its box
     buffer: np.ndarray
     # (T + 1, 14): largest move, largest rate, failed point + 1; in energy checks also kinetic and
     # stored energy, number of the solid (-1: several), mass, momentum, elastic energy, and elastic

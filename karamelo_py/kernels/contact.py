@@ -70,13 +70,13 @@ REPEATS = 16  # iterations for more than two fields; each at least halves the re
 
 
 class ContactImpulse(StepField):
-    """Impulse of contact on a node in this step; its moment, around an axis."""
+    """Impulse of contact on a node in this step, and its moment about an axis."""
 
     shape = unknowns
 
 
 class StrainingChange(Field):
-    """Change of the velocity with which a node strains points, by the last active contact."""
+    """Change of a node's straining velocity by the last active contact."""
 
     shape = staticmethod(lambda kin: kin.dimension)
 
@@ -663,7 +663,7 @@ def _count_impulses(bodies, control, place, now):
 
 @noinline
 def _count_strain(bodies, control, place):
-    """Count half of the stress work that is lost as contact changes the straining velocity.
+    """Sum half of the stress work lost because contact changes the straining velocity.
 
     Stress does work with the mean of the straining velocities before and after the forces.
     """

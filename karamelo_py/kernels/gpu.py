@@ -264,7 +264,7 @@ class Stage:
         return sum_node
 
     def age(self) -> Callable:
-        """Return the function of a node that ages its mark: 2 in use, 1 to be cleared, 0 unused."""
+        """Return the function that lowers a node's mark: 2 in use, 1 to be cleared, 0 unused."""
         only_if_more = self.row.only_if_more
 
         def age_node(i, fate, s, use):

@@ -88,7 +88,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
-        # Whole boxes make stair-steps, and a mass that differs from the mass of a shape in a file.
+        # Whole boxes would make stair-steps, and the mass of a shape from a file would be wrong.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):

@@ -106,8 +106,8 @@ class AstFunction:
         self.__code__ = code = function.__code__
         self.body = source_of(code)
         self.generates = bool(code.co_flags & inspect.CO_GENERATOR)
-        # For each loop and everything that determines its code: types of initial literals by name,
-        # or None if it is unrolled.
+        # By loop, and by all that determines its code: the types of initial literals by name, or
+        # None for an unrolled loop.
         self.loops: dict[tuple, dict | None] = {}
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__

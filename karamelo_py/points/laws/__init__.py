@@ -298,7 +298,7 @@ def wave_speed_bound(law, kin, state):
 
 @point_function(otherwise=True)
 def meeting(law, state, speed):
-    """Return the state with the viscous pressure of a shock, if a cell closes with a speed."""
+    """Return the state with the viscous pressure of a shock in a cell that closes at `speed`."""
     return state
 
 

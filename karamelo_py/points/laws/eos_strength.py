@@ -398,7 +398,7 @@ def present(law, m):
 def rotated_with_point(law, kin, state, dl):
     s = state.s
     if isinstance(law.strain, Absent):
-        # Fluids have the stress of the strain at the end of the step, which is not rotated.
+        # The stress of a fluid follows from the strain at the end of the step and is not rotated.
         elastic = law_traits(law.strength).rebounds
         return s.turned(dl), dl.strain_at_end() if elastic else sym(dl)
     e = symmetric_tensor(kin, strengths.shear_strain(present(law, state.m), kin, s))

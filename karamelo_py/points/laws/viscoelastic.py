@@ -115,7 +115,7 @@ DECADES = 30.0  # largest shift, as the formula has a pole at T = Tr - C2
 
 
 def shifted(shift, dt, T):
-    """Return the step dt / shift of times at temperature T."""
+    """Return dt / (shift factor of relaxation times at the temperature T)."""
     if isinstance(shift, Absent):
         return dt
     above = T - shift.Tr

@@ -175,7 +175,7 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, as functions that list numbers in the mesh, since a deck may have many sets."""
+    """Sets by name, stored as functions that return numbers in the mesh, as there may be many."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)

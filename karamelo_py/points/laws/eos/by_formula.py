@@ -1,4 +1,4 @@
-"""Eos formula, stiffened-gas and mie-grueneisen, with pressure by volume and internal energy."""
+"""Eos formula, stiffened-gas, mie-grueneisen: pressure from volume and internal energy."""
 
 from collections import namedtuple
 from math import isfinite

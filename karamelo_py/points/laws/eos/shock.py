@@ -160,7 +160,7 @@ def _bulk_modulus_shock(eos, j, memory, heat):
 
 @compression_energy.on(Shock)
 def _compression_energy_shock(eos, j, memory):
-    # constant beyond the volume ratio at which cold material reaches its tension
+    # The energy is constant beyond the volume ratio at which cold material spalls.
     most = min(eos.tension, eos.modulus)
     bounded = most < eos.modulus
     whole = where(bounded, eos.modulus / where(bounded, eos.modulus - most, 1), inf)
