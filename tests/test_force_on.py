@@ -16,7 +16,7 @@ BOX = """
     region(left, block, 0, 0.8, 0, 0.7)
     region(edge, block, 0, 2, 0.55, 0.6)
     material(rubber, linear, 1000, 1e5, 0.3)
-    solid(box, region, box, 2, rubber, 0.1)
+    solid(box, region, box, {ppc}, rubber, 0.1)
     {solids}
     group(box, particles, region, box, solid, box)
     group(low, nodes, region, half, all)
@@ -33,7 +33,7 @@ BOX = """
     log_modify(custom, step, F_x, F_y, F_tz, p_x, p_y, L_z)
     run(4)
 """
-MATE = """solid(mate, region, mate, 2, rubber, 0.1)
+MATE = """solid(mate, region, mate, 1, rubber, 0.1)
     translate_particles(mate, region, mate, 0, 0.004)"""
 LED = "material(steel, rigid, 1000)\n" + MATE.replace("rubber", "steel")
 FREE = LED + "\nfix(m, rigid_body, mate, velocity=(0, 1))"
@@ -41,7 +41,7 @@ RUBBER = "material(rubber, linear, 1000, 1e5, 0.3)"
 WATER = """eos(water, fluid, 1000, 1e5, 7)
     strength(water, fluid, 10)
     material(rubber, eos-strength, water, water)"""
-GRID, PLANE = "ulmpm/contacts", "0, 0.61, 0, 0.1, 1, 0"
+GRID, PLANE = "ulmpm/contacts", "0, 0.7, 0, 0.1, 1, 0"
 # For each way its line, and where others than these: the parts, the further solid, the method.
 USUAL = "", "w", "", "ulmpm"
 WAYS = {
@@ -78,13 +78,17 @@ WAYS = {
     "body at a wall": (
         "velocity_nodes, left, 0, NULL)\nfix(v, contact/rigid_body, all, mate", "w, box", FREE),
 }  # fmt: skip
+# Tools that the centres of points reach only if these lie near the surface of the box.
+NEAR = "cutting tool", "plane", "hard plane", "ball"
 
 
 def scene_of(way, extra=""):
     """The scene of a way, and its line and method."""
     line, parts, solids, method = (*WAYS[way], *USUAL[len(WAYS[way]) :])
     lines = f"fix(w, {line})" + extra
-    text = BOX.format(method=method, lines=lines, parts="w" if extra else parts, solids=solids)
+    ppc = 2 if way in NEAR else 1
+    parts = "w" if extra else parts
+    text = BOX.format(method=method, lines=lines, parts=parts, solids=solids, ppc=ppc)
     return (text.replace(RUBBER, WATER) if "water" in way else text), line, method
 
 
@@ -100,7 +104,7 @@ def test_the_force_is_the_change_of_momentum(run_interpreted, way):
     force = np.stack([log.F_x, log.F_y, log.F_tz])[:, 2:]
     momentum = np.stack([log.p_x, log.p_y, log.L_z]) / 1e-3
     change, size = np.diff(momentum)[:, 1:], np.abs(force).max()
-    assert np.abs(force - [[180], [-433.5], [-463.0]]).max() > 1
+    assert np.abs(force[:2] - [[180], [-433.5]]).max() > 0.9  # more than the load acts
     exact = 1e-9 * max(size, np.abs(momentum).max())
     assert force[:2] == pytest.approx(change[:2], abs=exact)
     if way == "grip":  # its torque lacks what affine transfers store within points
@@ -288,7 +292,7 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_what_cannot_be_summed_is_refused(run_interpreted, case):
     lines, message = WRONG[case]
-    head = BOX.format(method="ulmpm", solids=MATE, lines="", parts="").partition("    compute(")[0]
+    head = BOX.format(method="ulmpm", solids=MATE, lines="", parts="", ppc=1).partition("    compute(")[0]
     line = "fix(start, initial_velocity_particles, box, 1, 0)"
     done = run_interpreted(f"{dedent(head)}{line}\n{lines}\n", status=1)
     assert message in done.err

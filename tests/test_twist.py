@@ -417,12 +417,12 @@ def test_torque_times_time_is_angular_momentum(state_interpreted, tmp_path, load
     set_dt(0.02)
     log_modify(custom, Ek, Es, L_y, load_z)
     log(1)
-    run(20)""")  # fmt: skip
+    run(10)""")  # fmt: skip
     work = state_interpreted(script, "work", out="run")["work"]
     log = read_log(tmp_path / "run" / "log.mpm")
     assert log["load_z"][1:] == pytest.approx(torque, rel=0.02)
     assert -log["L_y"][-1] == pytest.approx(0.02 * log["load_z"].sum(), rel=1e-8)
-    assert log["Ek"][-1] + log["Es"][-1] == pytest.approx(work, rel=1e-3)
+    assert log["Ek"][-1] + log["Es"][-1] == pytest.approx(work, rel=2e-3)  # in 10 steps
 
 
 BY_TORQUE = """
