@@ -292,7 +292,8 @@ WRONG = {
 @pytest.mark.parametrize("case", WRONG)
 def test_what_cannot_be_summed_is_refused(run_interpreted, case):
     lines, message = WRONG[case]
-    head = BOX.format(method="ulmpm", solids=MATE, lines="", parts="", ppc=1).partition("    compute(")[0]
+    text = BOX.format(method="ulmpm", solids=MATE, lines="", parts="", ppc=1)
+    head = text.partition("    compute(")[0]
     line = "fix(start, initial_velocity_particles, box, 1, 0)"
     done = run_interpreted(f"{dedent(head)}{line}\n{lines}\n", status=1)
     assert message in done.err

@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 from conftest import INPUTS
-from selection import few
+from selection import parameters
 
 from comparisons.results import read_dump, read_log
 
@@ -57,12 +57,12 @@ def last(result):
 
 
 @same_kernels
-@pytest.mark.parametrize("k", few(("1e-3", "1e-9"), "1e-9"))
-def test_consolidation_is_that_of_terzaghi(run_script, k):
+@pytest.mark.parametrize(("k", "Tv"), parameters([("1e-9", 0.5)], [("1e-3", 1), ("1e-9", 1)]))
+def test_consolidation_is_that_of_terzaghi(run_script, k, Tv):
     """Scaled densities: the drag of 1e-9 m/s is as fast as that of 1e-3, and the step the same."""
-    log = run_script(INPUTS / "in.terzaghi", "-var", "k", k, "-var", "Tv", "1").log
-    assert log["Step"][-1] < 58500
-    for T in (0.02, 0.1, 0.5, 1.0):
+    log = run_script(INPUTS / "in.terzaghi", "-var", "k", k, "-var", "Tv", f"{Tv}").log
+    assert log["Step"][-1] < 58500 * Tv
+    for T in (t for t in (0.02, 0.1, 0.5, 1.0) if t <= Tv):
         at = np.argmin(abs(log["T"] - T))
         U, p = terzaghi(log["T"][at], 1 - 1 / 64)
         assert abs(log["U"][at] - U) < (0.0045 if T < 0.1 else 0.002)
