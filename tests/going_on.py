@@ -425,12 +425,12 @@ dump(d4, all, hdf5, time(0.01), points.h5, x, y, s11)
 dump(d5, all, grid/hdf5, 3, nodes.h5, vx, mass, occupied=true)
 dump(raster, all, heights, 2, all.*.asc, 0.2)
 dump(d6, all, vtk, 4, p.*.vtu, vx)
-dump(d7, all, movie, 3, m.gif, 300, 300, vx)
+dump(d7, all, movie, 3, m.gif, 60, 60, vx)
 dump(d8, all, grid, 3, g.*.txt, vx, fx, mass)
 dump(d9, all, grid/gz, 3, g.*.gz, vx, mass)
 dump(e1, all, grid/bin, 3, g.*.bin, vx, mass)
 dump(e2, all, grid/vtk, 4, g.*.vtu, vx)
-dump(e3, all, pyplot, 5, p.*.png, 1, 1, vx)
+dump(e3, all, pyplot, 8, p.*.png, 1, 1, vx)
 """
 FLY = block(2, "fix(v, initial_velocity_particles, all, sin(9*x0), 0)", "set_dt(0.001)", "run(4)",
             size=(0.2, 0.1))  # fmt: skip

@@ -213,7 +213,7 @@ class Picture:
         """Draw lines around points (n, 3) of bodies, and around tools."""
 
     def _entitle(self, text: str) -> None:
-        self.title.set_text(text)
+        self.title.set(text=text, fontsize=self.options.fontsize)
         whole = self.figure.bbox.width - 2 * MARGIN
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
