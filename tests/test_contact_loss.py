@@ -21,9 +21,10 @@ fix(f, contact/friction, a, b, 0.4)
 compute(E, kinetic_energy, all)
 compute(A, kinetic_energy, a)
 compute(L, contact_loss, all)
+compute(T, transfer_loss, all)
 set_dt(0.3)
 set_output(1)
-log_modify(custom, step, E, A, L{more})
+log_modify(custom, step, E, A, L, T{more})
 run(4)
 """
 
@@ -39,7 +40,7 @@ THROWN = "fix(v, initial_velocity_particles, b, 0.2 - 0.1*(y0 - 5.2), -0.9 + 0.1
 LED = "fix(v, velocity_particles, b, 0.2, -0.9)"
 
 
-@pytest.mark.parametrize("scheme", ["musl", "usavg"])
+@pytest.mark.parametrize("scheme", ["musl", "usavg", "usf", "usl"])
 @pytest.mark.parametrize("basis", ["linear", "quadratic-spline"])
 @pytest.mark.parametrize(
     ("law", "motion", "more"),
@@ -57,4 +58,4 @@ def test_contact_takes_what_the_bodies_lose(run_interpreted, law, motion, more, 
         energy = log.A
         work = 0.3 * np.cumsum(0.2 * log.f_x - 0.9 * log.f_y)
     assert log.L[-1] > 0.05 * energy[0] + 0.01
-    assert energy + log.L - work == pytest.approx(np.full(5, energy[0]), rel=1e-7, abs=1e-8)
+    assert energy + log.L + log.T - work == pytest.approx(np.full(5, energy[0]), rel=1e-7, abs=1e-8)

@@ -151,6 +151,7 @@ def test_one_thread_or_two(state, d, transfer, scheme, laws):
     # USL needs small steps where bodies reach nodes with next to no mass (benchmark C6).
     factor = "dt_factor(0.05)" if scheme == "usl" else "dt_factor(0.4)"
     acting = {"FLIP": AT_NODES, "PIC": (*AT_NODES, *AT_POINTS), "APIC": ()}[transfer]
+    factor += "\ncompute(lost, transfer_loss, all)"
     script = crossing(d, *acting, factor, "run(60)", transfer=transfer, scheme=scheme, laws=laws)
     assert same_bits(state(script), state(script, threads=2))
 

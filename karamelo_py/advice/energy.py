@@ -117,9 +117,14 @@ def taken_by(hub: Hub) -> list[str]:
         takers.append(f"scheme {registry.name_of('scheme', type(scheme))} with {damping}")
     # Motion within cells is lost, because nodal velocities do not contain it.
     if flip_coefficient(transfer) < 1:
-        coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
-        takers.append(f"transfer {registry.name_of('transfer', type(transfer))}{coefficient}")
+        takers.append(f"transfer {words_of_transfer(hub)}")
     return takers
+
+
+def words_of_transfer(hub: Hub) -> str:
+    transfer = hub.update.transfer
+    coefficient = f" {transfer.alpha:g}" if transfer.traits.retains else ""
+    return f"{registry.name_of('transfer', type(transfer))}{coefficient}"
 
 
 def words_of_loss(hub: Hub, simulation: Simulation) -> Trouble | None:
@@ -171,27 +176,35 @@ def collides(hub: Hub) -> tuple[str, str] | None:
     return None
 
 
-def words_of_contact(simulation: Simulation) -> dict[str, str]:
+def words_of_losses(simulation: Simulation) -> dict[str, str]:
+    fields, words = simulation.hub.fields, {}
     largest = float(simulation.energy_watch.watch.largest_energy)
-    lost = simulation.hub.fields.lost_by_contact()
-    if not abs(lost) > LEAST * largest:
-        return {}
-    much = f"{100 * abs(lost) / largest:.3g} % of the largest"
-    if lost < 0:
-        return {"gained in contact": f"{much}, e.g. by points that begin inside a body"}
-    return {"lost by contact": f"{much}, by inelastic contact and friction (in the work above)"}
+    by_contact, by_transfer = fields.lost_by_contact(), fields.lost_by_transfer() or 0.0
+    much = "{:.3g} % of the largest".format
+    if by_contact < -LEAST * largest:
+        inside = f"{much(-100 * by_contact / largest)}, e.g. by points that begin inside a body"
+        words["gained in contact"] = inside
+    elif by_contact > LEAST * largest:
+        inelastic = "by inelastic contact and friction (in the work above)"
+        words["lost by contact"] = f"{much(100 * by_contact / largest)}, {inelastic}"
+    if abs(by_transfer) > LEAST * largest:
+        name = words_of_transfer(simulation.hub)
+        words["lost by transfer"] = f"{much(100 * by_transfer / largest)}, by {name}"
+    return words
 
 
 def words_of_change(hub: Hub, fraction: float) -> str:
-    takers, by = taken_by(hub), ""
-    words = "the largest since the first step (kinetic + stored + dissipated - work)"
+    takers, counted = taken_by(hub), hub.fields.lost_by_transfer() is not None
+    dissipated = "dissipated + lost by transfer" if counted else "dissipated"
+    words = f"the largest since the first step (kinetic + stored + {dissipated} - work)"
+    by, of_transfer = "", f"transfer {words_of_transfer(hub)}"
+    if counted:
+        takers = [taker for taker in takers if taker != of_transfer]
     if takers and fraction < -1:
-        transfer = hub.update.transfer
-        often = flip_coefficient(transfer) < 1 and not transfer.traits.per_time
         if collides(hub):
             takers.append("collisions")
-        by = f"; {' and '.join(takers)} {'takes' if len(takers) == 1 else 'take'} some"
-        by += ", the transfer more with shorter steps" * often
+        by = f"; {' and '.join(takers)} {'dissipates' if len(takers) == 1 else 'dissipate'} energy"
+        by += " (compute transfer_loss measures it)" * (of_transfer in takers)
     # The sum of losses may exceed the largest energy.
     fraction = round(fraction, 2) + 0.0  # prints no -0.00
     much = f"{fraction:+.2f} % of" if fraction > -100 else f"{fraction / 100:+.2f} times"

@@ -160,6 +160,7 @@ class Narrator(Listener):
             "time": simulation.time,
             "energy_change_percent": simulation.energy_watch.change(),
             "lost_by_contact": self.hub.fields.lost_by_contact(),
+            "lost_by_transfer": self.hub.fields.lost_by_transfer(),
             "path_cells": inf if simulation.implicit else float(simulation.control.motion[0].path),
             "point_steps_per_s": steps * simulation.count / in_steps if in_steps > 0 else 0.0,
             "processor_s_in_steps": float(worked),
@@ -171,7 +172,7 @@ class Narrator(Listener):
         of_energy = {}
         if change is not None:
             of_energy = {"energy": energy.words_of_change(self.hub, change)}
-            of_energy |= energy.words_of_contact(simulation)
+            of_energy |= energy.words_of_losses(simulation)
         self.hub.console.summary(
             {
                 "wall time": f"{wall:.3g} s",

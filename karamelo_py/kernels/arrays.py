@@ -113,9 +113,9 @@ class Tiling(NamedTuple):
     rows: np.ndarray
     # (T + 1, 5) int64: rows of the tile in the buffers; Grid.first, step_x and step_y of its box
     buffer: np.ndarray
-    # (T + 1, 14): largest move, largest rate, failed point + 1; in energy checks also kinetic and
-    # stored energy, number of the solid (-1: several), mass, momentum, elastic energy, and elastic
-    # energy times velocity
+    # (T + 1, 15): largest move, largest rate, failed point + 1; in energy checks also kinetic and
+    # stored energy, loss in the transfer, number of the solid (-1: several), mass, momentum,
+    # elastic energy, and elastic energy times velocity
     report: np.ndarray
 
 
@@ -314,6 +314,9 @@ ENERGY = np.dtype([
     ("work", np.float64),  # work of fixes
     ("kinetic", np.float64),
     ("stored", np.float64),  # includes dissipated energy
+    ("lost_by_transfer", np.float64),
+    ("lost_with_deleted", np.float64),  # part of points that have been deleted
+    ("lost_before", np.float64),  # one step earlier
     ("born_with", np.float64),  # initial internal energy of gases
     ("stored_before", np.float64),  # one step earlier
     ("moving_before", np.float64),  # kinetic energy minus work one step earlier
@@ -325,6 +328,10 @@ ENERGY = np.dtype([
     ("sum_of_balance", np.float64),  # sum over a window
     ("last_balance", np.float64),  # balance at the previous check
     ("last_but_one", np.float64),
+    ("first_lost", np.float64),  # lost in the transfer, at the same times
+    ("lost_now", np.float64),
+    ("last_lost", np.float64),
+    ("lost_but_one", np.float64),
     ("first_few", np.float64),  # mean of the first checks
     ("first_mean", np.float64),  # mean of the first window
     ("largest_mean", np.float64),

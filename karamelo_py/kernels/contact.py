@@ -29,7 +29,7 @@ from typing import NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import kernel, noinline, point_function
-from karamelo_py.compiler.fields import Field, StepField, field, unknowns
+from karamelo_py.compiler.fields import Field, field
 from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels.arrays import (
     DT,
@@ -45,7 +45,7 @@ from karamelo_py.kernels.arrays import (
     vector_at,
 )
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
-from karamelo_py.kernels.equations.mass_momentum import Centre, Normal
+from karamelo_py.kernels.equations.mass_momentum import Centre, ContactImpulse, Normal
 from karamelo_py.kernels.table import AtNodes, Once, each_node
 from karamelo_py.kernels.totals import (
     CONTACT_LOSS,
@@ -67,12 +67,6 @@ FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly
 REPEATS = 16  # iterations for more than two fields; each at least halves the remaining approach
-
-
-class ContactImpulse(StepField):
-    """Impulse of contact on a node in this step, and its moment about an axis."""
-
-    shape = unknowns
 
 
 class StrainingChange(Field):

@@ -8,6 +8,7 @@ from math import sqrt
 from karamelo_py.compiler.fields import field
 from karamelo_py.kernels import contact
 from karamelo_py.kernels.arrays import MASS
+from karamelo_py.kernels.equations.mass_momentum import ContactImpulse
 from karamelo_py.kernels.equations.twist import AngularVelocity, SumsAround, UpdateAround
 from karamelo_py.kernels.totals import CONTACT_LOSS, add_to, counts
 from karamelo_py.points.kinematics.twist import Twisted
@@ -45,7 +46,7 @@ def _take_around_twisted(kin, bodies, control, sides, impulse):
         slot = fields.prescribed[side.n, AROUND]
         _change(bodies, side.n, side.i, sign * impulse, r)
         if not slot:
-            field(nodes.fields, contact.ContactImpulse)[side.n, AROUND] += sign * r * impulse
+            field(nodes.fields, ContactImpulse)[side.n, AROUND] += sign * r * impulse
         if counts(control.ranks, side.n):
             torque = sign * r * impulse / control.step[0].kick
             add_to(control.totals, fields.torque[side.field] + 1, torque)
@@ -59,7 +60,7 @@ def _take_around_twisted(kin, bodies, control, sides, impulse):
 def _work_around_twisted(kin, nodes, n):
     """Return the work, with the mean of the angular velocity before the step and w*."""
     sums, update = field(nodes.fields, SumsAround), field(nodes.fields, UpdateAround)
-    impulse = field(nodes.fields, contact.ContactImpulse)[n, AROUND]
+    impulse = field(nodes.fields, ContactImpulse)[n, AROUND]
     return float(0.5 * impulse * (sums[n, 1] / sums[n, 0] + update[n, 0]))
 
 

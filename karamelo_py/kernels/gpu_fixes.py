@@ -20,6 +20,7 @@ from karamelo_py.kernels.clock import checked_move, kick, move_check, step_size
 from karamelo_py.kernels.contact import SeparateFields
 from karamelo_py.kernels.equations.internal_force import Force
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.kernels.gpu import CHUNK, MOVED, STATUS, goes_wrong, is_last
 from karamelo_py.kernels.heat import heat_of
 from karamelo_py.kernels.step import GAINED
@@ -229,13 +230,15 @@ def add_energies(i, fate, s, block, copies):
     threads = -(-points.mass.size // CHUNK)
     copy = copies[index(i % len(copies))]
     firsts, first_row = s.control.firsts, s.control.values.size
-    kinetic = stored = 0.0
+    kinetic = stored = lost = 0.0
+    gone = field(block.points.fields, TransferLoss)
     solid, begin, behind = -1, 0, 0
     total, of_all = (0.0,) * (1 + kin.dimension), (0.0,) * (1 + kin.dimension)
     for p in range(i, points.mass.size, threads):
         mass, v, of_motion, elastic, of_strain = watch.energies_of(kin, points, laws, index(p))
         kinetic += of_motion
         stored += of_strain
+        lost += float(gone[0, p]) if gone is not None else 0.0
         if not begin <= points.id[p] < behind:
             _add_all(copy, first_row, solid, total)
             total = (0.0,) * (1 + kin.dimension)
@@ -247,6 +250,7 @@ def add_energies(i, fate, s, block, copies):
         of_all = tuple([old + x for old, x in more])
     totals.add_to(copy, totals.KINETIC, kinetic)
     totals.add_to(copy, totals.STORED, stored)
+    totals.add_to(copy, totals.TRANSFER_LOSS, lost)
     _add_all(copy, first_row, solid, total)
     _add_all(copy, first_row, firsts.size - 1, of_all)
 

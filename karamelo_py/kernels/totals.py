@@ -24,7 +24,7 @@ MAGNITUDE = 0x7FFFFFFFFFFFFFFF  # all bits but the sign; ordered like the number
 WHOLE = 1.5 * 2.0**52
 WHOLE_BITS = int(np.float64(WHOLE).view(np.int64))
 # Rows of totals, in slots whose published values (time, timestep, dt, none) are not sums.
-KINETIC, STORED, WORK, CONTACT_LOSS = 0, 1, 2, 3
+KINETIC, STORED, WORK, CONTACT_LOSS, TRANSFER_LOSS = 0, 1, 2, 3, 4
 SINCE_START = slice(WORK, CONTACT_LOSS + 1)
 
 

@@ -10,7 +10,7 @@ could hide vibrations. The checks also count the cells through which stressed ma
 from math import exp, inf, sqrt
 
 from karamelo_py.compiler import all_lanes, at_hand, kernel, noinline, real
-from karamelo_py.compiler.fields import field, load_vector, store
+from karamelo_py.compiler.fields import field, load, load_vector, store
 from karamelo_py.compiler.lanes import added, of_present
 from karamelo_py.compiler.threads import shared_out
 from karamelo_py.kernels import totals
@@ -18,6 +18,7 @@ from karamelo_py.kernels.arrays import TIME, TIMESTEP, first_from, known_to_laws
 from karamelo_py.kernels.equations.internal_force import WorkOfForces
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes
 from karamelo_py.kernels.equations.pore_water import RelativeVelocity
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.lanes import lanes_with, points_from
 from karamelo_py.kernels.records import put_at
@@ -44,7 +45,7 @@ DRIFTING = 1e-3  # smallest unit / drift energy; relevant vibrations exceed it
 BOUND = 10.0  # gain / (initial energy + work of loads) above which a run stops
 ROUND_OFF = 1e-14  # fraction of m c^2 below which energy is noise
 COARSE = 1000.0  # strain in units of round-off below which it is noise
-ENERGIES, OF_SOLID = 3, 5  # columns of tile reports
+ENERGIES, OF_SOLID = 3, 6  # columns of tile reports
 HEAT_NOISE = 1e-4  # tolerated fraction of a uniform temperature
 OVERSHOOT = 0.1  # overshoot / range of source temperatures above which a run stops
 # Tolerated step / stable step of conduction, up to which null-space temperatures decay
@@ -68,7 +69,7 @@ def energies_of(kin, points, laws, p):
 
 
 @shared_out
-def _look_at_shares(matter, tiling, firsts, k):
+def _look_at_shares(matter, gone, tiling, firsts, k):
     (kin, points, laws), tiling = at_hand(matter), at_hand(tiling)
     lanes = lanes_with((), laws, points.mass)
     for position in range(tiling.share[k], tiling.share[k + 1]):
@@ -76,26 +77,29 @@ def _look_at_shares(matter, tiling, firsts, k):
         start, end = tiling.range[t, 0], tiling.range[t, 1]
         solid = solid_of(firsts, points.id[start])
         begin, behind = firsts[solid], firsts[solid + 1]
-        kinetic = stored = 0.0
+        kinetic = stored = lost = 0.0
         total = (0.0,) * (2 + 2 * kin.dimension)
         for q in range(start, end, lanes.width):
             p = points_from(lanes, q, end)
             mass, v, of_motion, elastic, of_strain = energies_of(kin, points, laws, p)
             kinetic, stored = added(kinetic, of_motion), added(stored, of_strain)
+            for one in load(gone, p, (mass,)):
+                lost = added(lost, real(of_present(p, one), 0.0))
             weighed = (mass, *[mass * x for x in v], elastic, *[elastic * x for x in v])
             more = zip(total, weighed, strict=True)
             total = tuple([added(old, x) for old, x in more])
             if not all_lanes((points.id[p] >= begin) & (points.id[p] < behind)):
                 solid = -1
-        put_at(tiling.report, t, ENERGIES, (kinetic, stored, solid, *total))
+        put_at(tiling.report, t, ENERGIES, (kinetic, stored, lost, solid, *total))
 
 
 @kernel
-def _sum_energies(mode, matter, tiling, control):
-    _look_at_shares(mode, tiling.count[1], matter, tiling, control.firsts)
+def _sum_energies(mode, matter, gone, tiling, control):
+    _look_at_shares(mode, tiling.count[1], matter, gone, tiling, control.firsts)
     for t in range(tiling.count[0]):
         totals.add_to(control.totals, totals.KINETIC, tiling.report[t, ENERGIES])
         totals.add_to(control.totals, totals.STORED, tiling.report[t, ENERGIES + 1])
+        totals.add_to(control.totals, totals.TRANSFER_LOSS, tiling.report[t, ENERGIES + 2])
 
 
 MORE = VelocityAround, RelativeVelocity, WorkOfForces
@@ -149,9 +153,11 @@ def _take_work_at_nodes(spans, work, control):
 def sum_energies(s, mode):
     """Sum kinetic, stored plus dissipated energy, and work in the clock, without rigid solids."""
     s.control.totals[: totals.WORK] = 0
+    s.control.totals[totals.TRANSFER_LOSS] = 0
     for block in s.blocks:
         if not is_rigid(block.laws):
-            _sum_energies(mode, matter_of(s.kin, block), block.tiling, s.control)
+            gone = field(block.points.fields, TransferLoss)
+            _sum_energies(mode, matter_of(s.kin, block), gone, block.tiling, s.control)
         if any(more_of(block)):
             _add_more(s.kin, known_to_laws(block.points), more_of(block), s.control)
     at_nodes = field(s.nodes.fields, WorkAtNodes)
@@ -161,11 +167,12 @@ def sum_energies(s, mode):
 
 
 def take_energies(s):
-    totals.collect(s.control.ranks, s.control, totals.KINETIC, 3)
+    totals.collect(s.control.ranks, s.control, totals.KINETIC, 5)
     energy, answer = s.control.energy[0], s.control.answer
     energy.kinetic = answer[totals.KINETIC]
     energy.stored = answer[totals.STORED] + energy.born_with
     energy.work = answer[totals.WORK]
+    energy.lost_by_transfer = energy.lost_with_deleted + answer[totals.TRANSFER_LOSS]
 
 
 @kernel
@@ -261,6 +268,7 @@ def _sum_before(s, mode, step):
 def note_before(energy, step):
     energy.stored_before = energy.stored
     energy.moving_before = energy.kinetic - energy.work
+    energy.lost_before = energy.lost_by_transfer
     energy.stored_at = step
 
 
@@ -287,12 +295,17 @@ def judge(control):
     moving = energy.kinetic - energy.work
     balance = moving + energy.level * (energy.moving_before - moving)
     balance += energy.stored_before + energy.level * (energy.stored - energy.stored_before)
+    # Growth is judged without the loss in the transfer, which also removes noise as it appears.
+    lost = energy.lost_by_transfer
+    lost += energy.level * (energy.lost_before - lost)
     if energy.looks == 0:
+        energy.first_lost = lost
         energy.first_balance = balance
         energy.first_work = energy.work
     energy.looks += 1
     energy.last_but_one, energy.last_balance = energy.last_balance, energy.balance
     energy.balance = balance
+    energy.lost_but_one, energy.last_lost, energy.lost_now = energy.last_lost, energy.lost_now, lost
     energy.supplied = max(energy.supplied, abs(energy.work - energy.first_work))
     energy.largest_energy = max(
         energy.largest_energy,

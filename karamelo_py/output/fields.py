@@ -10,6 +10,7 @@ import numpy as np
 from karamelo_py.compiler import fields
 from karamelo_py.kernels.arrays import Block, Setup, arrays_of, joined_points, matter_of, some_of
 from karamelo_py.kernels.equations.internal_force import ContactLoss
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.kernels.equations.twist import VelocityAround
 from karamelo_py.kernels.export import export
 from karamelo_py.kernels.totals import CONTACT_LOSS, LIMBS, add_all, add_rows, values_of
@@ -102,6 +103,14 @@ class Fields(PointTable):
         """Return the energy that contact at points and nodes has dissipated since the start."""
         at_nodes = self.comm.allreduce(self.setup.control.totals[CONTACT_LOSS].copy())
         return self.total("contact loss") + float(values_of(at_nodes[None])[0])
+
+    def lost_by_transfer(self) -> float | None:
+        """Return the energy lost in the transfer since the start; None if it is not counted."""
+        blocks = self.setup.blocks
+        if all(fields.field(block.points.fields, TransferLoss) is None for block in blocks):
+            return None
+        deleted = float(self.setup.control.energy[0].lost_with_deleted)
+        return deleted + self.total("transfer loss")
 
     def rows_of(self, group: PointGroup | None) -> Iterator[tuple[Block, np.ndarray]]:
         for block in self.setup.blocks:
@@ -303,6 +312,7 @@ SUMMED = {
     "born with": _born_with,
     "bounces": _of_field(Bounces),
     "contact loss": _of_field(ContactLoss),
+    "transfer loss": _of_field(TransferLoss),
 }
 
 

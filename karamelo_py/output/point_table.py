@@ -231,7 +231,8 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
     materials = [solid.material for solid in hub.solids.values()]
     if hub.domain is not None:
         owners += rotating(hub.domain.kin, update.transfer)
-    owners += [hub.domain, *hub.fixes.values(), update, update.scheme, *others]
+    owners += [hub.domain, *hub.fixes.values(), *hub.computes.values()]
+    owners += [update, update.scheme, *others]
     return [*owners, *(part for one in materials for part in (one.law, one.fluid))]
 
 

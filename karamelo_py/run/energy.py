@@ -142,7 +142,10 @@ class EnergyWatch:
         """Return (energy lost since the first step) / (largest energy); negative for a gain."""
         watch = self.watch
         mean = (watch.balance + watch.last_balance + watch.last_but_one) / FEW
-        return -growth(watch.first_balance, mean, max(watch.largest_energy, watch.energy_floor))
+        return -growth(watch.first_balance, mean, self._largest())
+
+    def _largest(self) -> float:
+        return max(self.watch.largest_energy, self.watch.energy_floor)
 
     def is_sound(self) -> bool:
         """Return True if neither the energy nor the last step shows a fault in the state."""
@@ -166,7 +169,9 @@ class EnergyWatch:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
         # Relative to the first balance, which `forget_growth` leaves unchanged.
-        return -100 * self.lost_fraction()
+        watch = self.watch
+        lost = (watch.lost_now + watch.last_lost + watch.lost_but_one) / FEW - watch.first_lost
+        return 100 * (float(lost / self._largest()) - self.lost_fraction())
 
     def forget_growth(self) -> None:
         """Measure growth from the present state, after a warning."""

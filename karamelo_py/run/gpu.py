@@ -21,7 +21,7 @@ from karamelo_py.kernels.hook_loop import ACT, LOADS, LOADS_AGAIN, RUB, moving_p
 from karamelo_py.kernels.hooks import HEAT_FUNCTION, NODE_FUNCTION, POINT_FUNCTION
 from karamelo_py.kernels.step import DONE, first_rows, rows_of
 from karamelo_py.kernels.table import take
-from karamelo_py.kernels.totals import CONTACT_LOSS, WORK
+from karamelo_py.kernels.totals import CONTACT_LOSS, TRANSFER_LOSS, WORK
 from karamelo_py.kernels.walls import FRICTION
 from karamelo_py.kernels.watch import LOOK, more_of
 from karamelo_py.points.basis import support
@@ -332,7 +332,8 @@ class StepsOnCard:
     def _looks(self) -> tuple[list[KernelLaunch], list[KernelLaunch]]:
         s, sums = self.s, self.s.control.totals
         copies, solids = self.copies, (len(s.control.values), len(sums))
-        launches = [*self._clear(0, WORK), *self._clear(*solids)]
+        of_points = (0, WORK), (TRANSFER_LOSS, TRANSFER_LOSS + 1), solids
+        launches = [launch for rows in of_points for launch in self._clear(*rows)]
         for block in s.blocks:
             if not is_rigid(block.laws):
                 threads = -(-block.points.mass.size // gpu.CHUNK)
@@ -341,7 +342,7 @@ class StepsOnCard:
                 launches.append(self.of_points(fixes.add_more, block, copies))
         if field(s.nodes.fields, WorkAtNodes) is not None:
             launches.append(self.launch(fixes.add_work_at_node, self.nodes, s, copies))
-        launches += [*self.collect(0, CONTACT_LOSS + 1), *self.collect(*solids)]
+        launches += [*self.collect(0, TRANSFER_LOSS + 1), *self.collect(*solids)]
         before, behind = (
             self.launch(function, 1, s) for function in (fixes.look_before, fixes.look_behind)
         )

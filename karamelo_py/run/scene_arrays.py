@@ -61,7 +61,7 @@ def scene_key(hub: Hub) -> tuple:
         update.thermal,
         update.anti_locking,
         update.boundary,
-        fields.declared(hub.fixes.values(), "point_fields"),
+        fields.declared([*hub.fixes.values(), *hub.computes.values()], "point_fields"),
         fields.declared(hub.fixes.values(), "node_fields"),
         hub.fields.rate_is_asked_for(),
         update.method is not None and warms_by_friction(hub),

@@ -118,6 +118,7 @@ class Simulation(SceneArrays):
         if self.comm.leads:
             add_to(self.control.totals, WORK, -(kinetic + stored))
         self.energy_watch.without(stored)
+        self.control.energy[0].lost_with_deleted += self.points.total("transfer loss", group)
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)

@@ -109,7 +109,7 @@ class Tiles:
             box=np.zeros((self.count + 1, 2 * self.dimension), np.int64),
             rows=np.zeros((self.count + 1, self._most_in_box, 2), np.int16),
             buffer=np.zeros((self.count + 1, 5), np.int64),
-            report=np.zeros((self.count + 1, 14)),
+            report=np.zeros((self.count + 1, 15)),
         )
 
     def empty_buffers(self, nodes: Nodes, blocks: int) -> Buffers:

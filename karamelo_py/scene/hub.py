@@ -17,6 +17,7 @@ from karamelo_py.output.console import Console
 from karamelo_py.output.fields import Fields
 from karamelo_py.output.record import RunRecord
 from karamelo_py.output.schedule import Output
+from karamelo_py.points.transfers import flip_coefficient, stores_moment
 from karamelo_py.scene.comm import SerialComm
 from karamelo_py.scene.domain import Domain, no_domain
 from karamelo_py.scene.lattice import Lattice
@@ -148,7 +149,19 @@ class Update:
 
     @property
     def point_fields(self) -> tuple[type, ...]:
-        return (VelocityBefore,) if self.half_start else ()
+        before = (VelocityBefore,) if self.half_start else ()
+        return (*before, self.scheme.traits.loss) if self.loses_in_transfer else before
+
+    @property
+    def loses_in_transfer(self) -> bool:
+        """Return True if the loss of the transfer is counted without being asked for."""
+        transfer = self.transfer
+        if transfer is None or self.scheme.traits.implicit:
+            return False
+        # Other losses need a further loop over the nodes of each point.
+        further = stores_moment(transfer) or self.scheme.traits.loss.work_with_update
+        further = further or transfer.traits.series
+        return not further and flip_coefficient(transfer) < 1
 
     @property
     def words(self) -> str:

@@ -60,6 +60,9 @@ class Publisher:
     published: tuple[str, ...] = SUFFIXES
     has_published = False
     unit = NUMBER  # unit of the published values
+    # Declared fields (`compiler.fields`); `Force` if ``initial_integrate`` sets forces on points.
+    point_fields: tuple[type, ...] = ()
+    node_fields: tuple[type, ...] = ()
     restrictions: Restrictions | None = None  # options of a scene that it does not support
 
     def publish(self, name: str, value: float) -> None:
@@ -114,9 +117,6 @@ class Fix(Publisher):
     held_directions: tuple[int, ...] = ()
     # Friction coefficient (formula) of this wall in directions without a formula, or None.
     wall_friction: Any = None
-    # Declared fields (`compiler.fields`); `Force` if ``initial_integrate`` sets forces on points.
-    point_fields: tuple[type, ...] = ()
-    node_fields: tuple[type, ...] = ()
     by_sizes = False  # computes point sizes from volumes, for a thickness of 1
     impulsive = False  # removes a penetration within one step
     leads_points = False  # prescribes velocities of points

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.language.rules import Restrictions
 
 DEFAULT_SHARE = 0.9  # fraction of the stable step
@@ -40,5 +41,7 @@ class SchemeTraits(NamedTuple):
     damps: bool = False
     # solves for the pore pressure at the end of a step
     solves_pressure: bool = False
+    # energy that points lose in the transfer (`kernels.equations.transfer_loss`)
+    loss: type = TransferLoss
     # returns the parameters that damp vibrations, as text
     damping: Callable[[Any], str] = lambda scheme: ""

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.strain import Strain
+from karamelo_py.kernels.equations.transfer_loss import LossByUpdate
 from karamelo_py.schemes.traits import SchemeTraits
 
 
@@ -25,6 +26,7 @@ class USF(NamedTuple):
 
     traits = SchemeTraits(
         strained_before=1.0,
+        loss=LossByUpdate,
         conserving=((0.9, 0.6), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
     )
     rows = (

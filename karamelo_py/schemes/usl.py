@@ -5,6 +5,7 @@ from typing import NamedTuple
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.node_updates import SquaredMass, UpdateToVelocity
 from karamelo_py.kernels.equations.strain import Strain
+from karamelo_py.kernels.equations.transfer_loss import LossOfStrain
 from karamelo_py.kernels.table import NodeTask, any_node, light_node
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.transfers import gradient_weight
@@ -34,7 +35,7 @@ class USL(NamedTuple):
     scheme(usl)
     """
 
-    traits = SchemeTraits(courant=(0.65, 0.4), damps=True, leading=MUSL())
+    traits = SchemeTraits(courant=(0.65, 0.4), damps=True, leading=MUSL(), loss=LossOfStrain)
     node_fields = (SquaredMass,)
     rows = (
         table.BEGIN,
@@ -86,7 +87,7 @@ class USLUnlimited(NamedTuple):
     scheme(usl/unlimited)
     """
 
-    traits = SchemeTraits(courant=USL.traits.courant, leading=MUSL())
+    traits = SchemeTraits(courant=USL.traits.courant, leading=MUSL(), loss=LossOfStrain)
     rows = tuple(
         NodeTask(UpdateToVelocity, make=any_node) if row == LIMITED else row for row in USL.rows
     )

@@ -20,7 +20,7 @@ class Values:
     """Named numbers in an array that kernels read and write.
 
     The array is never reallocated. Slots 0, 1 and 2 are time, timestep (the step number) and dt;
-    slot 3 has no name (`kernels.totals`).
+    slots 3 and 4 have no names (`kernels.totals`).
     """
 
     def __init__(self) -> None:
@@ -33,7 +33,7 @@ class Values:
         self.torques = np.zeros(CAPACITY, np.int64)
         for name in ("time", "timestep", "dt"):
             self.publish(name)
-        self._reserve(1)
+        self._reserve(2)
 
     def publish(self, name: str, value: float = 0.0) -> int:
         """Publish a number and return its slot. A known name retains its slot."""

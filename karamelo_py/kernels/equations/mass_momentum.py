@@ -1,6 +1,6 @@
 """Nodal mass and momentum: m_i = sum_p N_ip m_p, (m v)_i = sum_p N_ip m_p v_p(X_i)."""
 
-from karamelo_py.compiler.fields import SummedField, field, vector
+from karamelo_py.compiler.fields import StepField, SummedField, field, unknowns, vector
 from karamelo_py.compiler.lanes import of_present
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.equations.loss import BROUGHT, energy_of
@@ -20,6 +20,12 @@ class Centre(SummedField):
     """Nodal sum of mass times position, to find gaps between solids."""
 
     shape = vector
+
+
+class ContactImpulse(StepField):
+    """Impulse of contact on a node in this step; its moment, around an axis."""
+
+    shape = unknowns
 
 
 @eq.reads()

@@ -9,6 +9,7 @@ from karamelo_py.kernels.equations import Report, Task
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.equations.loss import in_company, warm, warm_by_friction
 from karamelo_py.kernels.equations.strain import further_reach
+from karamelo_py.kernels.equations.transfer_loss import count_loss
 from karamelo_py.kernels.views import location_at
 from karamelo_py.points import kinematics, laws, transfers
 from karamelo_py.points.basis import carried, carrier, carry
@@ -60,6 +61,7 @@ class Move(Task):
         warm_by_friction(pt)
         warm(pt, v_pic - dv)
         moment = towards_walls(pt, in_company(pt, moment))
+        count_loss(pt, v, dv, moment)
         y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
         increase(pt.of(Bounces), pt.p, hits)
         store(pt.of(VelocityBefore), pt.p, old)

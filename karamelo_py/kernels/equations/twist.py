@@ -33,6 +33,7 @@ from karamelo_py.kernels.equations.loss import OnePoint
 from karamelo_py.kernels.equations.mass_momentum import for_second_mapping
 from karamelo_py.kernels.equations.node_updates import WorkAtNodes, node_task
 from karamelo_py.kernels.equations.strain import increment, increment_at, velocity_gradient
+from karamelo_py.kernels.equations.transfer_loss import count_rotation
 from karamelo_py.kernels.records import row
 from karamelo_py.points import transfers
 from karamelo_py.points.kinematics import Line, tensor, vector
@@ -240,6 +241,7 @@ class Rotate(eq.Task):
         (at_nodes, change, moment), r = total, pt.of(RadiusAfterMove)[0, pt.p]
         old = pt.of(VelocityAround)[0, pt.p] / r
         new = transfers.updated_velocity(pt.w.transfer, old, at_nodes, change)
+        count_rotation(pt, r, change, old, new)
         store(pt.of(VelocityAround), pt.p, (r * r * new / pt.y[0],))
         store(pt.of(RadiusAfterMove), pt.p, (pt.y[0],))
         store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
