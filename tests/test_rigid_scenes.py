@@ -72,8 +72,8 @@ def test_a_ball_comes_to_rest_in_grains(run_script, change, within):
 
 def test_the_energy_of_a_ball_and_grains_closes(run_script):
     text = (INPUTS / "in.crater").read_text("utf-8").replace("refine = 1", "refine = 2/3")
-    result = run_script(text, "-var", "alpha", "1", "-var", "T", "0.03")
-    assert abs(closing(result)) < 1
+    result = run_script(text, "-var", "T", "0.03")
+    assert abs(closing(result)) < 1.5
     assert float(re.search(r"lost by contact +(\S+) %", result.out)[1]) > 10
 
 
@@ -91,8 +91,9 @@ def test_a_t_bar_in_clay(run_script, refine, mu, within):
     """
     words = ("-var", "refine", f"{refine}", "-var", "mu", f"{mu}", "-var", "far", "0.15")
     exact = 4 * np.sqrt(2) + 2 * np.pi if mu else 6 + np.pi
-    log = run_script(INPUTS / "in.penetrometer", *words).log
-    assert late(log, "N", 0.6) == pytest.approx(exact, rel=within)
+    result = run_script(INPUTS / "in.penetrometer", *words)
+    assert late(result.log, "N", 0.6) == pytest.approx(exact, rel=within)
+    assert abs(closing(result)) < 1
 
 
 @pytest.mark.parametrize(
@@ -105,8 +106,9 @@ def test_a_t_bar_in_clay(run_script, refine, mu, within):
 def test_a_cone_in_clay(run_script, refine, stiff, far, within):
     """Teh & Houlsby 1991; other solutions differ from theirs by 10 to 15 %."""
     words = ("-var", "refine", f"{refine}", "-var", "Ir", f"{stiff}", "-var", "far", f"{far}")
-    log = run_script(INPUTS / "in.cone", *words).log
-    assert late(log, "N", 0.7) == pytest.approx(log.law[-1], rel=within)
+    result = run_script(INPUTS / "in.cone", *words)
+    assert late(result.log, "N", 0.7) == pytest.approx(result.log.law[-1], rel=within)
+    assert abs(closing(result)) < 1
 
 
 @pytest.mark.parametrize(
@@ -128,7 +130,9 @@ def test_a_sphere_sinks_in_a_viscous_liquid(run_script, refine, within):
 def test_a_sphere_heaves(run_script, refine, period):
     """Zeros after 1.152, 3.414 and 5.609 s: CFD of NREL in IEA OES Task 10 (Wendt et al. 2017)."""
     words = ("-var", "refine", f"{refine}", *(() if period else ("-var", "T", "1.5")))
-    log = run_script(INPUTS / "in.heave", *words).log
+    result = run_script(INPUTS / "in.heave", *words)
+    log = result.log
+    assert abs(closing(result)) < 1
     zeros = log.Time[np.flatnonzero(np.diff(np.sign(log.heave)))]
     assert zeros[0] == pytest.approx(1.152, rel=0.15)
     if period:

@@ -10,7 +10,7 @@ from conftest import INPUTS
 from scenes import SCHEMES, block
 from selection import covering, few, parameters
 
-from karamelo_py.advice.energy import words_of_change
+from karamelo_py.advice.energy import words_of_error
 from karamelo_py.app.cli import main
 from karamelo_py.app.studies import keeping, stability
 from karamelo_py.kernels.arrays import new_control
@@ -96,7 +96,7 @@ def test_no_change_has_no_sign_of_a_loss():
     hub = Hub(Console(quiet=True))
     hub.interpreter = Interpreter(hub)
     hub.interpreter.run_text("method(ulmpm, FLIP, linear, 1)\n", "in.scene")
-    assert words_of_change(hub, -0.001).startswith("+0.00 % of")
+    assert words_of_error(hub, -0.001, False).startswith("+0.00 % of")
 
 
 def test_a_short_run_is_told(run_script):

@@ -193,8 +193,9 @@ def words_of_losses(simulation: Simulation) -> dict[str, str]:
     return words
 
 
-def words_of_change(hub: Hub, fraction: float) -> str:
-    takers, counted = taken_by(hub), hub.fields.lost_by_transfer() is not None
+def words_of_error(hub: Hub, fraction: float, counted: bool) -> str:
+    """Describe the error of the balance; `counted`: it includes the loss in the transfer."""
+    takers = taken_by(hub)
     dissipated = "dissipated + lost by transfer" if counted else "dissipated"
     words = f"the largest since the first step (kinetic + stored + {dissipated} - work)"
     by, of_transfer = "", f"transfer {words_of_transfer(hub)}"

@@ -159,6 +159,7 @@ class Narrator(Listener):
             "steps": steps,
             "time": simulation.time,
             "energy_change_percent": simulation.energy_watch.change(),
+            "energy_error_percent": simulation.energy_watch.error(),
             "lost_by_contact": self.hub.fields.lost_by_contact(),
             "lost_by_transfer": self.hub.fields.lost_by_transfer(),
             "path_cells": inf if simulation.implicit else float(simulation.control.motion[0].path),
@@ -168,10 +169,14 @@ class Narrator(Listener):
             "interrupted": bool(run.interrupted),
         }
         self.hub.record.finish(facts)
-        change, path = facts["energy_change_percent"], facts["path_cells"]
+        error, path = facts["energy_error_percent"], facts["path_cells"]
         of_energy = {}
-        if change is not None:
-            of_energy = {"energy": energy.words_of_change(self.hub, change)}
+        if error is not None:
+            of_energy = {
+                "energy": energy.words_of_error(
+                    self.hub, error, facts["lost_by_transfer"] is not None
+                )
+            }
             of_energy |= energy.words_of_losses(simulation)
         self.hub.console.summary(
             {

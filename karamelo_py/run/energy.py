@@ -169,9 +169,13 @@ class EnergyWatch:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
         # Relative to the first balance, which `forget_growth` leaves unchanged.
-        watch = self.watch
+        return -100 * self.lost_fraction()
+
+    def error(self) -> float | None:
+        """Return the change plus the loss in the transfer, in % of the largest energy."""
+        watch, change = self.watch, self.change()
         lost = (watch.lost_now + watch.last_lost + watch.lost_but_one) / FEW - watch.first_lost
-        return 100 * (float(lost / self._largest()) - self.lost_fraction())
+        return None if change is None else change + 100 * float(lost) / self._largest()
 
     def forget_growth(self) -> None:
         """Measure growth from the present state, after a warning."""

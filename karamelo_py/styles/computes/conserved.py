@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.language.rules import Restrictions
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.units import ENERGY, Powers
 from karamelo_py.points.kinematics import total
@@ -182,6 +183,13 @@ class LostByTransfer(Energy):
     @property
     def point_fields(self) -> tuple[type, ...]:
         return (self.hub.update.scheme.traits.loss,)
+
+    @property
+    def restrictions(self) -> Restrictions:
+        # Passes of other schemes already scatter to the sums of which XPIC needs the old values.
+        schemes = {"scheme": ("musl", "usavg")} if self.hub.update.transfer.traits.series else {}
+        instead = "no compute transfer_loss"
+        return Restrictions("transfer_loss", instead, only=schemes, without=("implicit",))
 
 
 class Drift:

@@ -1,0 +1,54 @@
+"""Energy that points lose in the transfer of velocity, against the conservation of energy."""
+
+import json
+import re
+
+import pytest
+
+# Short and long waves in a bar without loads.
+BAR = """
+method({})
+scheme({})
+dimension(1, 0, 20, 1)
+region(bar, block, 4, 12)
+material(rubber, neo-hookean, 1, 1, 0)
+solid(bar, region, bar, 2, rubber, 1)
+fix(v, initial_velocity_particles, all, 0.05*sin(x))
+compute(L, transfer_loss, all)
+set_dt(0.1)
+set_output(60)
+log_modify(custom, step, L)
+run(60)
+"""
+
+
+@pytest.mark.parametrize(
+    ("method", "scheme"),
+    [
+        ("tlmpm, FLIP, linear, 0.9", "musl"),
+        ("ulmpm, FLIP, quadratic-spline, 0.9", "usavg"),
+        ("tlmpm, PIC, linear", "usf"),
+        ("tlmpm, FLIP, linear, 1", "usl"),
+        ("ulmpm, APIC, quadratic-spline", "usl"),
+        ("ulmpm, AFLIP, linear, 0.9", "musl"),
+        ("tlmpm, PolyPIC, linear", "musl"),
+        ("tlmpm, XPIC, linear, 2", "musl"),
+    ],
+)
+def test_the_balance_closes_with_the_loss(run_interpreted, method, scheme):
+    """Without loads the energy is constant, up to the error of steps of w dt = 0.1."""
+    result = run_interpreted(BAR.format(method, scheme))
+    (change,) = re.findall(r"  energy +(\S+) % of the largest", result.out)
+    (lost,) = re.findall(r"  lost by transfer +(\S+) % of the largest, by", result.out)
+    assert abs(float(change)) < 0.15 and abs(float(lost)) > 0.2
+    record = json.loads((result.folder / "run.json").read_text("utf-8"))["runs"][-1]
+    assert record["lost_by_transfer"] == pytest.approx(result.log.L[-1])
+
+
+@pytest.mark.parametrize(
+    ("method", "scheme", "words"),
+    [("tlmpm, XPIC, linear, 2", "usl", "scheme usl"), ("tlmpm, FLIP, linear, 1", "newmark", "")],
+)
+def test_what_cannot_be_counted_is_refused(run_interpreted, method, scheme, words):
+    said = run_interpreted(BAR.format(method, scheme), status=1).err
+    assert re.search(rf"compute transfer_loss does not support .*{words}", said)
