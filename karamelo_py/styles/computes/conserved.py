@@ -181,11 +181,11 @@ class LostByTransfer(Energy):
     measured = "transfer loss"
 
     @property
-    def point_fields(self) -> tuple[type, ...]:
+    def point_fields(self) -> tuple[type, ...]:  # type: ignore[override]
         return (self.hub.update.scheme.traits.loss,)
 
     @property
-    def restrictions(self) -> Restrictions:
+    def restrictions(self) -> Restrictions:  # type: ignore[override]
         # Passes of other schemes already scatter to the sums of which XPIC needs the old values.
         schemes = {"scheme": ("musl", "usavg")} if self.hub.update.transfer.traits.series else {}
         instead = "no compute transfer_loss"
