@@ -141,6 +141,7 @@ def with_energy(text):
 WHOLE = {
     "APIC": "ulmpm, APIC, quadratic-spline",
     "AFLIP": "ulmpm, AFLIP, cubic-spline, 1",
+    "PolyPIC": "ulmpm, PolyPIC/quadratic, cubic-spline",
     "TPIC": "ulmpm, TPIC, quadratic-spline",
     "MLS": "ulmpm, MLS, quadratic-spline",
     "linear": "ulmpm, APIC, linear",

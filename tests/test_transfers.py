@@ -31,6 +31,7 @@ from karamelo_py.points.transfers import (
 from karamelo_py.points.transfers.affine import AFLIP, APIC, ASFLIP
 from karamelo_py.points.transfers.flip import FLIP, PIC
 from karamelo_py.points.transfers.polynomial import MIXED, PolyPIC
+from karamelo_py.points.transfers.quadratic import PolyPICQuadratic
 from karamelo_py.points.transfers.taylor import MLS, TFLIP, TPIC
 from karamelo_py.points.transfers.xpic import XPIC
 from karamelo_py.scene.lattice import Lattice
@@ -187,6 +188,27 @@ def test_an_affine_field_is_taken_and_given_as_it_is(transfer, basis, kin, data)
     assert np.reshape(kept, (d, d)) == pytest.approx(expected, abs=1e-11)
     momentum = met.given(transfer, 1.0, tuple(v), kept)
     assert momentum == pytest.approx(met.weights[:, None] * field, abs=1e-11)
+
+
+@every_kinematics
+@few
+@given(data=st.data())
+def test_quadratic_polypic_returns_any_quadratic_field(kin, data):
+    """Away from walls; momentum and its moment are those of v and C (Fu et al. 2017, section 4)."""
+    d, bulk = kin.dimension, st.floats(0.26, 0.74)
+    x = position(kin, data.draw(st.tuples(bulk, bulk, bulk)))
+    met = Met(CubicSpline(), kin, x)
+    v, c = np.array(data.draw(numbers(d))), np.reshape(data.draw(tensors(planar(kin))), (d, d))
+    bend = np.reshape(data.draw(numbers(d**3)), (d, d, d))
+    field = v + met.arms @ c.T + np.einsum("ijk,nj,nk->ni", bend, met.arms, met.arms)
+    kept = met.taken(PolyPICQuadratic(), field)
+    assert len(kept.curved) == d * (d + 1) // 2
+    mean = met.weights @ field
+    momentum = met.given(PolyPICQuadratic(), 2.5, tuple(mean), kept)
+    assert momentum == pytest.approx(2.5 * met.weights[:, None] * field, abs=1e-9)
+    assert momentum.sum(axis=0) == pytest.approx(2.5 * mean, abs=1e-9)
+    turning = 2.5 * np.reshape(kept.affine, (d, d))
+    assert momentum.T @ met.arms == pytest.approx(turning, abs=1e-9)
 
 
 @every_kinematics

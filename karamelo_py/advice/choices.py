@@ -118,9 +118,9 @@ CHOICES = (
     ),
     Choice(
         lambda s: s.liquid,
-        ("method({grid}, APIC, quadratic-spline)",),
+        ("method({grid}, PolyPIC/quadratic, cubic-spline)",),
         "a liquid",
-        "vortices lose little energy, and angular momentum is conserved",
+        "vortices lose least energy, and angular momentum is conserved",
         ("in.taylor_green", "in.couette"),
     ),
     Choice(

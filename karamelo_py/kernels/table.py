@@ -36,7 +36,7 @@ from karamelo_py.kernels.equations.periodic import (
 )
 from karamelo_py.kernels.records import clear_first
 from karamelo_py.kernels.sweep import OldWeights, PresentWeights, Visit
-from karamelo_py.points.transfers import stores_moment
+from karamelo_py.points.transfers import NodalMass, stores_moment
 
 
 class Processor(NamedTuple):
@@ -500,6 +500,7 @@ LOSS = SceneTask(
     at_nodes_with(loss.EnergyLoss, loss.KeepLoss()),
     "kinetic energy that the nodes lose, as heat to the points",
 )
+COMPANY = SceneTask(at_nodes_with(NodalMass, loss.KeepMass()))
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in a pass over the points")
 CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
@@ -534,6 +535,7 @@ UPDATE = (
     SEAM,
     FRICTION,
     LOSS,
+    COMPANY,
     HEAT,
     BEFORE_LOADS,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),

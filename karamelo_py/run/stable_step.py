@@ -108,6 +108,7 @@ def lone_point(hub: Hub) -> float:
     by_gradient = not update.transfer.traits.inverts_spread
     usl = min(update.scheme.traits.courant) < 1 and not by_gradient
     share = CORRECTED_LONE if update.method.corrected else LONE
+    share *= update.transfer.traits.lone_shares[usl]
     return share * 2 / sqrt(stiff[2 if usl else by_gradient] * hub.domain.dimension)
 
 

@@ -66,6 +66,14 @@ class KeepLoss(NamedTuple):
 
 
 @node_task
+class KeepMass(NamedTuple):
+    goes_through = ("sums", "nodal mass")
+
+    def at_node(task, kin, nodes, n, dt):
+        field(nodes.fields, transfers.NodalMass)[n, 0] = nodes.sums[n, MASS]
+
+
+@node_task
 class ClearFrictionalHeat(NamedTuple):
     goes_through = ("frictional heat",)
 
@@ -126,7 +134,7 @@ def in_company(pt, moment):
     for node in pt.nodes:  # mass fraction of the point at its nodes
         share += node.N * node.N * mass / max(lost[node.i, 2], real(1e-36, mass))
     kept = (one - share) / real(1 - ALONE**pt.kin.dimension, mass)
-    return max(min(kept, one), mass - mass) * moment
+    return transfers.fraction(pt.w.transfer, moment, max(min(kept, one), mass - mass))
 
 
 def _heat(pt, gone):

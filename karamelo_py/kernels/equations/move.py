@@ -2,8 +2,8 @@
 
 from math import inf, nan
 
-from karamelo_py.compiler import where
-from karamelo_py.compiler.fields import Field, forget, increase, store, vector
+from karamelo_py.compiler import real, where
+from karamelo_py.compiler.fields import Field, field, forget, increase, store, vector
 from karamelo_py.kernels import arrays
 from karamelo_py.kernels.equations import Report, Task
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
@@ -81,11 +81,20 @@ class Move(Task):
 
 
 def towards_walls(pt, moment):
+    """Return the part of the moment that a point retains at a wall, where D may vanish.
+
+    The limit is for isolated points. If nodal masses are known, it is less for points in company.
+    """
     kept = retained(pt.w.basis, pt.stencil) if len(moment) else ()
-    if not kept:
-        return moment
-    pairs = zip(moment, moment.places, strict=True)
-    return moment._make([kept[j] * a for a, (_, j) in pairs])
+    mass = field(pt.w.nodes.fields, transfers.NodalMass)
+    if kept and mass is not None:
+        own = pt.w.points.mass[pt.p]
+        share, least = own - own, real(1e-36, own)
+        for node in pt.nodes:
+            share += node.N * node.N * own / max(mass[node.i, 0], least)
+        kept = tuple([1 - share * (1 - one) for one in kept])
+        moment = transfers.in_company(pt.w.transfer, moment, share)
+    return transfers.narrowed(pt.w.transfer, moment, kept) if kept else moment
 
 
 def moves_corners(basis: arrays.Tag, kin: arrays.Tag) -> bool:

@@ -10,7 +10,7 @@ The default functions are for PIC.
 from typing import NamedTuple
 
 from karamelo_py.compiler import point_function
-from karamelo_py.compiler.fields import Field, planar
+from karamelo_py.compiler.fields import Field, StepField, planar
 from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.points import noise
 
@@ -23,6 +23,8 @@ class TransferTraits(NamedTuple):
     series: bool = False  # the new velocity is a series, which needs further passes over the points
     # fraction of the stable step with musl in the total frame
     share_in_total: float = 1.0
+    # fractions of the stable step of isolated points in flowing material, with musl and with usl
+    lone_shares: tuple[float, float] = (1.0, 1.0)
     restrictions: Restrictions | None = None
 
 
@@ -30,6 +32,10 @@ class Moment(Field):
     """Moment B or velocity gradient L stored by a point."""
 
     shape = planar
+
+
+class NodalMass(StepField):
+    """Mass at the nodes, for transfers that treat isolated points separately."""
 
 
 def flip_coefficient(transfer) -> float:
@@ -94,6 +100,28 @@ def zero_moment(transfer, kin, template):
 
 @point_function(otherwise=True)
 def add_moment(transfer, node, v, moment):
+    return moment
+
+
+def narrowed_tensor(tensor, kept):
+    pairs = zip(tensor, tensor.places, strict=True)
+    return tensor._make([kept[j] * a for a, (_, j) in pairs])
+
+
+@point_function(otherwise=True)
+def narrowed(transfer, moment, kept):
+    """Return the moment with the fractions `kept` (d,) of its gradients, for points at walls."""
+    return narrowed_tensor(moment, kept)
+
+
+@point_function(otherwise=True)
+def fraction(transfer, moment, kept):
+    return kept * moment
+
+
+@point_function(otherwise=True)
+def in_company(transfer, moment, share):
+    """Return what a point retains of the moment, by its mean share in the mass of its nodes."""
     return moment
 
 
