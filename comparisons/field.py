@@ -1,22 +1,27 @@
-"""python -m comparisons.field FOLDER: error against cost of every set-up, over twelve scenes.
+"""python -m comparisons.field [FOLDER [SCENE ...]]: error against cost of set-ups, twelve scenes.
 
-Draws docs/_static/field.png and prints the least error at equal cost: of ten usual set-ups, and
-with corrected accelerations, PolyPIC, usl, AFLIP, F-bar, long steps and fewer points. Cost is
-visited nodes (:mod:`comparisons.auto`), or with ``-seconds`` the processor time of the steps, and
-then the picture is FOLDER/seconds.png.
+Runs the scenes in FOLDER and writes their rows of comparisons/data/field.csv. Results that FOLDER
+has are used, except those of auto. Draws docs/_static/field.png from the data, and prints the least
+error at equal cost: of ten usual set-ups, and with corrected accelerations, PolyPIC, usl, AFLIP,
+F-bar, long steps and fewer points. Cost is visited nodes (:mod:`comparisons.auto`), or with
+``-seconds`` the processor time of the steps, and then the picture is seconds.png.
 """
 
+import csv
 import re
 import sys
 from collections.abc import Iterable, Sequence
 from math import exp, inf, isfinite, log
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from comparisons.auto import SCENES, SETUPS, run, warm
 
 PICTURE = Path(__file__).parent.parent / "docs" / "_static" / "field.png"
+DATA = Path(__file__).parent / "data" / "field.csv"
+NUMBERS = ("refine", "error", "cost", "seconds")
 SIZES = {  # finer than the two of `comparisons.auto`
     "axis_aligned": ("0.5", "1", "2"), "bar": ("0.2", "0.4", "1", "2"),
     "pulse": ("1", "2", "4", "8"), "energy_disk": ("4", "6", "8"), "turns": ("1", "1.5", "2"),
@@ -48,6 +53,12 @@ AFTER = {
     "AFLIP quadratic F-bar": (
         "method(ulmpm, AFLIP, quadratic-spline, 0.95)\nanti_volumetric_locking(true)"),
     "AFLIP cubic": "method(ulmpm, AFLIP, cubic-spline, 0.9)",
+    "APIC linear": "method(ulmpm, APIC, linear)",
+    "linear long steps, 1 point": "method(ulmpm, FLIP, linear, 1)\ndt_factor(0.9)",
+    "PolyPIC/quadratic": "method(ulmpm, PolyPIC/quadratic, cubic-spline)",
+    # of liquids that fill a box
+    "PolyPIC/quadratic long steps": (
+        "method(ulmpm, PolyPIC/quadratic, cubic-spline)\nscheme(usl)\ndt_factor(0.6)"),
 }  # fmt: skip
 # Visited nodes and errors that others published, or a study of their method found.
 PUBLISHED = {
@@ -73,14 +84,15 @@ def runs_of(name: str, setup: str, folder: Path, most: float = inf) -> list[dict
     """Run a set-up in all sizes; then, up to a cost of `most`, with cells of half the size."""
     points = re.findall(r", (\d) points?$", setup)
     scene = SCENES[name]._replace(points=int(points[0]) if points else None)
-    runs = [run(scene, name, setup, n, folder) for n in SIZES[name]]
-    size, (before, last) = float(SIZES[name][-1]), (one["cost"] for one in runs[-2:])
-    growth = (last / before) ** (log(2) / log(size / float(SIZES[name][-2])))
+    sizes = list(SIZES[name])
+    runs = [run(scene, name, setup, n, folder) for n in sizes]
+    before, last = (one["cost"] for one in runs[-2:])
+    growth = (last / before) ** (log(2) / log(float(sizes[-1]) / float(sizes[-2])))
     while last * growth <= most < inf:
-        size *= 2
-        runs.append(run(scene, name, setup, f"{size:g}", folder))
+        sizes.append(f"{2 * float(sizes[-1]):g}")
+        runs.append(run(scene, name, setup, sizes[-1], folder))
         last = runs[-1]["cost"]
-    return runs
+    return [one | {"refine": float(size)} for size, one in zip(sizes, runs, strict=True)]
 
 
 def drawn(runs: Sequence[dict], cost: str) -> list[tuple[float, float]]:
@@ -105,59 +117,82 @@ def covered(lines: Lines, cost: str) -> np.ndarray:
     return np.geomspace(min(costs), max(costs), 61)
 
 
+def measure(name: str, folder: Path) -> list[list[str]]:
+    """Run a scene with every set-up; return its rows of the data."""
+    found = {s: runs_of(name, s, folder) for s in SETUPS if s not in AFTER}
+    most = max(one["cost"] for runs in found.values() for one in runs if one["cost"] > 0)
+    found |= {s: runs_of(name, s, folder, most) for s in SETUPS if s != "auto"}
+    return [
+        [name, setup, *(f"{one[key]:.4g}" for key in NUMBERS), one["status"]]
+        for setup, runs in found.items()
+        for one in runs
+    ]
+
+
+def read() -> list[list[str]]:
+    with DATA.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))[1:]
+
+
+def write(rows: list[list[str]]) -> None:
+    with DATA.open("w", encoding="utf-8", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerows([["scene", "setup", *NUMBERS, "failure"], *rows])
+
+
+def draw(axes, name: str, found: dict[str, list[dict]], cost: str) -> tuple[str, float]:
+    """Draw the panel of a scene; return its row of the table and the mean gain (logarithm)."""
+    for k, setup in enumerate(SETUPS):
+        good = drawn(found[setup], cost)
+        new = setup in AFTER
+        line = {
+            "color": plt.cm.tab20(k % 20), "lw": 1.6 if new else 0.9, "ls": "-" if new else ":",
+        }  # fmt: skip
+        if setup == "auto":
+            line = {"color": "k", "marker": "*", "ms": 11, "ls": "", "zorder": 9}
+        axes.loglog(*zip(*good, strict=True) if good else ((), ()), label=words_of(setup), **line)
+    mine = found.pop("auto")
+    usual = [runs for s, runs in found.items() if s not in AFTER]
+    costs = covered(usual, cost)
+    before, after = (least(costs, some, cost) for some in (usual, found.values()))
+    axes.loglog(costs, before, color="0.6", lw=5, alpha=0.5, label="least error, usual set-ups")
+    axes.loglog(costs, after, color="r", lw=5, alpha=0.3, label="least error, all set-ups")
+    for k, (label, points) in enumerate(PUBLISHED.get(name, {}).items()):
+        if cost == "cost":
+            axes.loglog(*zip(*points, strict=True), "sD"[k], color="b", mfc="none", label=label)
+            axes.text(0.03, 0.03, label, fontsize=7, color="b", transform=axes.transAxes)
+    axes.set_title(TITLES[name])
+    gain = float(np.mean(np.log(before / after)))
+    ratios = [e / least(np.array([c]), found.values(), cost)[0] for c, e in drawn(mine, cost)]
+    ends = (f"{100 * errors[-1]:.2g} %" for errors in (before, after))
+    cells = (
+        f"{TITLES[name]} (`{name}`)", *ends, f"{exp(gain):.2f}", f"{max(ratios, default=inf):.2f}",
+    )  # fmt: skip
+    return f"| {' | '.join(cells)} |", gain
+
+
 def main() -> None:
-    folder = Path(sys.argv[1])
-    warm(folder)
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    folder = Path(sys.argv[1])
     cost = "seconds" if "-seconds" in sys.argv else "cost"
+    folder, *names = [word for word in sys.argv[1:] if word != "-seconds"] or [""]
     SETUPS.update(AFTER)
+    if folder:
+        warm(Path(folder))
+        for name in names or SIZES:
+            rows = measure(name, Path(folder))
+            write(sorted([row for row in read() if row[0] != name] + rows, key=lambda row: row[0]))
     fig, panels = plt.subplots(3, 4, figsize=(16, 11))
     gains = []
     print("| scene | before | now | error before over now | auto over the least |")
     print("|---|---|---|---|---|")
+    rows = read()
     for axes, name in zip(panels.flat, SIZES, strict=True):
-        found = {s: runs_of(name, s, folder) for s in SETUPS if s not in AFTER}
-        most = max(one["cost"] for runs in found.values() for one in runs if one["cost"] > 0)
-        found |= {s: runs_of(name, s, folder, most) for s in SETUPS if s != "auto"}
-        for k, (setup, runs) in enumerate(found.items()):
-            good = drawn(runs, cost)
-            new = setup in AFTER
-            line = {
-                "color": plt.cm.tab20(k % 20),
-                "lw": 1.6 if new else 0.9,
-                "ls": "-" if new else ":",
-            }
-            if setup == "auto":
-                line = {"color": "k", "marker": "*", "ms": 11, "ls": "", "zorder": 9}
-            axes.loglog(
-                *zip(*good, strict=True) if good else ((), ()), label=words_of(setup), **line
-            )
-        mine = found.pop("auto")
-        usual = [runs for s, runs in found.items() if s not in AFTER]
-        costs = covered(usual, cost)
-        before, after = (least(costs, some, cost) for some in (usual, found.values()))
-        axes.loglog(costs, before, color="0.6", lw=5, alpha=0.5, label="least error, usual set-ups")
-        axes.loglog(costs, after, color="r", lw=5, alpha=0.3, label="least error, all set-ups")
-        for k, (label, points) in enumerate(PUBLISHED.get(name, {}).items()):
-            if cost == "cost":
-                axes.loglog(*zip(*points, strict=True), "sD"[k], color="b", mfc="none", label=label)
-                axes.text(0.03, 0.03, label, fontsize=7, color="b", transform=axes.transAxes)
-        axes.set_title(TITLES[name])
-        gains.append(float(np.mean(np.log(before / after))))
-        ratios = [e / least(np.array([c]), found.values(), cost)[0] for c, e in drawn(mine, cost)]
-        ends = (f"{100 * errors[-1]:.2g} %" for errors in (before, after))
-        cells = (
-            f"{TITLES[name]} (`{name}`)",
-            *ends,
-            f"{exp(gains[-1]):.2f}",
-            f"{max(ratios, default=inf):.2f}",
-        )
-        print(f"| {' | '.join(cells)} |", flush=True)
+        found: dict[str, list[dict]] = {setup: [] for setup in SETUPS}
+        for scene, setup, *numbers, _ in rows:
+            if scene == name and setup in found:
+                found[setup].append(dict(zip(NUMBERS, map(float, numbers), strict=True)))
+        text, gain = draw(axes, name, found, cost)
+        gains.append(gain)
+        print(text, flush=True)
     print(f"mean of log(error before / after) at equal cost: {np.mean(gains):.3f}, a factor of "
           f"{exp(np.mean(gains)):.2f}")  # fmt: skip
     words = "processor time of the steps (s)" if cost == "seconds" else "visited nodes"
@@ -168,8 +203,7 @@ def main() -> None:
         handles, labels, loc="lower center", ncols=6, fontsize=8, bbox_to_anchor=(0.5, -0.09)
     )
     fig.tight_layout()
-    picture = PICTURE if cost == "cost" else folder / "seconds.png"
-    fig.savefig(picture, dpi=70, bbox_inches="tight")
+    fig.savefig(PICTURE if cost == "cost" else "seconds.png", dpi=70, bbox_inches="tight")
 
 
 if __name__ == "__main__":

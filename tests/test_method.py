@@ -187,7 +187,7 @@ def fluid(eos, strength="fluid, 0"):
         (RUBBER, OTHER, "method(ulmpm, AFLIP, cubic-spline, 1, mass=corrected)"),
         (f"{RUBBER}\nboundary(periodic, x)", "", "method(ulmpm, FLIP, quadratic-spline, 0.99)"),
         ("material(m, linear, 1000, 1e6, 0.3, 500, 50)", "", "linear, thermo-mechanical)"),
-        (fluid("fluid, 1000, 1e5, 7"), "", "method(ulmpm, APIC, quadratic-spline)"),
+        (fluid("fluid, 1000, 1e5, 7"), "", "method(ulmpm, PolyPIC/quadratic, cubic-spline)"),
         (fluid("fluid, 1000, 1e5, 7"), "fix(weight, body_force, all, 0, -1)",
          "method(ulmpm, AFLIP, quadratic-spline, 1)"),
         (fluid("linear, 1000, 1e6", "plastic, 5e5, 1e3"), "scheme(newmark)\nset_dt(1)",

@@ -226,6 +226,24 @@ def test_polypic_returns_any_field_of_a_cell(kin, data):
     assert momentum.sum(axis=0) == pytest.approx(2.5 * v, abs=1e-9)
 
 
+def test_quadratic_polypic_conserves_energy(run_interpreted):
+    """A half wave in four cells vibrates: APIC takes most of its constant energy (in percent)."""
+    lines = (
+        "fix(v, initial_velocity_particles, all, 0.02*cos(PI*(x0 - 0.3)/0.4))",
+        "set_output(60)", "run(60)",
+    )  # fmt: skip
+    text = block(1, *lines, size=(0.4,))
+    lost = []
+    for transfer in ("APIC", "PolyPIC/quadratic"):
+        method = f"ulmpm, {transfer}, cubic-spline"
+        result = run_interpreted(text.replace("ulmpm, FLIP, linear, 1", method))
+        lost.append(-float(re.search(r"energy +(\S+) % of", result.out)[1]))
+    assert lost[0] > 50 and abs(lost[1]) < 15
+    wrong = "ulmpm, PolyPIC/quadratic, quadratic-spline"
+    error = run_interpreted(text.replace("ulmpm, FLIP, linear, 1", wrong), status=1).err
+    assert "transfer PolyPIC/quadratic does not support the basis quadratic-spline" in error
+
+
 def test_polypic_belongs_to_the_total_frame(run_interpreted):
     """It conserves energy that APIC loses, with linear shape functions alone."""
     lines = (

@@ -93,7 +93,6 @@ def towards_walls(pt, moment):
         for node in pt.nodes:
             share += node.N * node.N * own / max(mass[node.i, 0], least)
         kept = tuple([1 - share * (1 - one) for one in kept])
-        moment = transfers.in_company(pt.w.transfer, moment, share)
     return transfers.narrowed(pt.w.transfer, moment, kept) if kept else moment
 
 

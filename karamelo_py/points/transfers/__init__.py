@@ -120,12 +120,6 @@ def fraction(transfer, moment, kept):
 
 
 @point_function(otherwise=True)
-def in_company(transfer, moment, share):
-    """Return what a point retains of the moment, by its mean share in the mass of its nodes."""
-    return moment
-
-
-@point_function(otherwise=True)
 def by_arms(transfer, inverse_d):
     """Return (a,) if the stored tensor is a sum_I N_I v*_I (X_I - x)^T, else ()."""
     return ()
