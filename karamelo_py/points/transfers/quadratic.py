@@ -57,8 +57,8 @@ class PolyPICQuadratic(NamedTuple):
     node_fields = (NodalMass,)
     traits = TransferTraits(
         inverts_spread=True,
-        # A dam break with three points per cell gained energy at 0.9 and 0.6 of the stable step
-        # of isolated points, and ran to its end with 0.4 and 0.25.
+        # A dam break with three points per cell gained energy at 0.6 and 0.4 of the stable step of
+        # isolated points, and ran to its end with 0.4 and 0.25.
         lone_shares=(0.4, 0.25),
         restrictions=Restrictions(
             "transfer PolyPIC/quadratic", "APIC",
