@@ -2,9 +2,8 @@
 
 Around a point it is v + C r + sum_m c_m q_m(r), r = X - x, with the modes q = r_i r_j and, in each
 direction, r^2 - (m3/m2) r - m2, where m_n = sum_I N_I (X_I - x)^n along a line of nodes. These are
-orthogonal under the weights N_I, so momentum and angular momentum are those of v and C (Fu, Guo,
-Gast, Jiang & Teran 2017, "A polynomial particle-in-cell method", section 4, with their modes of
-the second degree).
+orthogonal under the weights N_I, so only v and C have momentum and angular momentum (Fu, Guo, Gast,
+Jiang & Teran 2017, "A polynomial particle-in-cell method", section 4; modes up to degree 2).
 """
 
 from typing import Any, NamedTuple
