@@ -365,7 +365,7 @@ TWO_BODIES = (
     "region(two, block, 0.1, 0.2, 0.3, 0.4)",
     "material(neo, neo-hookean, 2, 100, 0.3)",
     "solid(two, region, two, 2, neo, 0.1, 0)",
-    "run(60)",
+    "run(42)",
 )
 
 
