@@ -830,7 +830,7 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
     assert done.returncode == 1 and said in done.stderr and "in.file:8" in done.stderr
 
 
-def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
+def test_rubber_of_a_plug_in_is_the_built_in(run_interpreted):
     """A law of F in Python: the same stress along three paths as by its energy."""
     paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}
     lines = [
@@ -840,18 +840,15 @@ def test_rubber_of_a_plug_in_is_the_built_in(tmp_path, site):
     for name, ends in paths.items():
         lines += [f"load_path({name}, 2, {ends})"]
         lines += [f"element({law}_{name}, {law}, {name})" for law in ("own", "energy")]
-    (tmp_path / "in.file").write_text("\n".join(lines) + "\n", "utf-8")
-    done = karamelo_py(site, tmp_path, "in.file")
-    assert done.returncode == 0, done.stderr
+    folder = run_interpreted("\n".join(lines)).folder
     for name in paths:
         own, energy = (
-            np.loadtxt(tmp_path / f"element_{law}_{name}.txt", skiprows=1)
+            np.loadtxt(folder / f"element_{law}_{name}.txt", skiprows=1)
             for law in ("own", "energy")
         )
         np.testing.assert_allclose(own, energy, rtol=1e-8, atol=1e-2)
-    (tmp_path / "in.file").write_text(lines[0].replace("1000", "-1000"), "utf-8")
-    done = karamelo_py(site, tmp_path, "in.file")
-    assert done.returncode == 1 and "'rho' must be a number above 0" in done.stderr
+    said = run_interpreted(lines[0].replace("1000", "-1000"), status=1).err
+    assert "'rho' must be a number above 0" in said
 
 
 MUD = """
@@ -871,15 +868,13 @@ run(1)
 """
 
 
-def test_mud_of_a_plug_in_tells_the_step_of_its_viscosity(tmp_path, site):
+def test_mud_of_a_plug_in_tells_the_step_of_its_viscosity(run_interpreted):
     """tau = mu d + tau_y d/(d + slowest) at the rate d = 1; the step is that of nu at rest."""
-    (tmp_path / "in.mud").write_text(MUD, "utf-8")
-    done = karamelo_py(site, tmp_path, "in.mud")
-    assert done.returncode == 0, done.stderr
-    row = np.genfromtxt(tmp_path / "element_e.txt", names=True)[-1]
+    folder = run_interpreted(MUD).folder
+    row = np.genfromtxt(folder / "element_e.txt", names=True)[-1]
     assert row["sxy"] == pytest.approx(5 + 20 / (1 + 1e-2), rel=1e-9)
     assert row["dissipated"] == pytest.approx(0.02 * row["sxy"], rel=1e-3)
-    dt = np.loadtxt(tmp_path / "log.mpm", skiprows=1)[-1, 1]
+    dt = np.loadtxt(folder / "log.mpm", skiprows=1)[-1, 1]
     nu, c = 4 / 3 * (5 + 20 / 2e-5) / 1500, np.sqrt(7e5 / 1500)
     a = nu / 0.25
     assert dt <= 0.25 / (np.hypot(c, a) + a)

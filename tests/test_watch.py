@@ -151,7 +151,7 @@ def test_energy_that_is_no_number_ends_the_run(tmp_path, monkeypatch):
 @pytest.mark.parametrize("scheme", few(SCHEMES, "musl"))
 def test_work_of_gravity_is_added_up(run_interpreted, scheme):
     """A body in free fall: its energy less the work of gravity stays, and nothing is told."""
-    lines = ["fix(g, body_force, all, 0, -1)", "set_dt(0.002)", "set_output(100)", "run(130)"]
+    lines = ["fix(g, body_force, all, 0, -1)", "set_dt(0.002)", "set_output(100)", "run(65)"]
     result = run_interpreted(block(2, TRAVEL, *lines, scheme=scheme, size=(0.2, 0.1)))
     assert "energy balance" not in result.out + result.err
     assert "is not monitored" not in result.out
@@ -432,7 +432,7 @@ def test_the_end_of_a_run_tells_its_energy_at_one_time(run_interpreted):
     fix(v, initial_velocity_particles, all, 0.1*(x - 2))
     compute(E, energy_balance, all)
     log_modify(custom, step, E_drift)
-    run(100)
+    run(50)
     """
     done = run_interpreted(script)
     assert 0.25 < max(done.log.E_drift) < 0.35
