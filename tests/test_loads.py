@@ -212,11 +212,11 @@ def test_a_bar_under_traction_has_its_stress(run_interpreted):
         "fix(left, velocity_nodes, left, 0, NULL)",
         "fix(pull, edge_traction, all, box, xhi, 0.2, 0)",
         "fix(calm, local_damping, all, 0.8)",
-        "dt_factor(0.5)",
+        "dt_factor(0.9)",
         "compute(mean, average_stress, all)",
-        "set_output(50)",
+        "set_output(85)",
         "log_modify(custom, step, mean_11, mean_22, left_x, pull_x)",
-        "run(150)",
+        "run(85)",
         size=(0.3, 0.1),
     )  # fmt: skip
     log = run_interpreted(text).log

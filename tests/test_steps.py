@@ -174,10 +174,10 @@ def test_the_last_reaction_of_a_run(run_interpreted):
     """
     script = """
         method(ulmpm, FLIP, linear, 0.9)
-        dimension(1, 0, 1.1, 0.1)
+        dimension(1, 0, 1.2, 0.2)
         region(bar, block, 0, 1)
         material(m, neo-hookean, 1, 100, 0)
-        solid(bar, region, bar, 2, m, 0.1, 0)
+        solid(bar, region, bar, 2, m, 0.2, 0)
         region(low, block, 0, 0)
         region(top, block, 1, 1)
         group(low, nodes, region, low, all)

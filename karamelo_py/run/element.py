@@ -123,7 +123,7 @@ class Point:
 
     def _stress(self, state: tuple) -> np.ndarray:
         stress = laws.cauchy_stress(self.law, self.kin, state)
-        return np.pad(stress, (0, 6 - len(stress)))
+        return np.array([*stress, *[0.0] * (6 - len(stress))])
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
@@ -218,7 +218,7 @@ class Point:
         numbers = [Dual(float(dl[at]), tuple([float(way[at]) for way in ways])) for at in places]
         stress = on_numbers(stress_after)(self.law, self.kin, state, tensor(self.kin, numbers), dt)
         rows = [slopes_of(x, len(ways)) for x in stress]
-        return np.pad(np.array(rows, float), ((0, 6 - len(rows)), (0, 0)))
+        return np.array([*rows, *[[0.0] * len(ways)] * (6 - len(rows))], float)
 
     def _newton(
         self,
