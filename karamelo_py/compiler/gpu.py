@@ -21,6 +21,7 @@ from numba import types
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.code.arguments import ArgumentBuffer, plan_for
+from karamelo_py.compiler.code.builder import Builder
 from karamelo_py.compiler.disk import cache
 from karamelo_py.compiler.llvm import I32, I64
 from karamelo_py.compiler.trace.choices import INTERPRETED, modules_noted, modules_of, note
@@ -104,7 +105,7 @@ def aligned_record(array, i, count):
 
 def _entry(module: ir.Module) -> tuple[ir.Function, ir.IRBuilder]:
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [I64] * 2), NAME + ENTRY)
-    return entry, ir.IRBuilder(entry.append_basic_block("entry"))
+    return entry, Builder(entry.append_basic_block("entry"))
 
 
 def _as_loop(module: ir.Module, main: ir.Function, kinds: tuple, result: Any) -> None:

@@ -19,6 +19,7 @@ from numba import types
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code import machine
 from karamelo_py.compiler.code.arguments import Address, ArgumentBuffer, plan_for, reader
+from karamelo_py.compiler.code.builder import Builder
 from karamelo_py.compiler.code.exceptions import Failure, failure_at, noting
 from karamelo_py.compiler.disk import cache, lock
 from karamelo_py.compiler.trace import choices
@@ -122,7 +123,7 @@ def written(
         main = new_function(module, kinds, result, NAME)
         main.attributes.add("noinline")
         main.attributes.add("nounwind")
-        lowering = write_into(ir.IRBuilder(main.append_basic_block("entry")))
+        lowering = write_into(Builder(main.append_basic_block("entry")))
         result = lowering.give_back(run, kinds, main.args, result)
         (entry or _write_entry)(module, main, kinds, result)
         module.raises = hasattr(main, "raises")
@@ -150,7 +151,7 @@ def items_at(builder: ir.IRBuilder, kinds: tuple, address: Any) -> list:
 
 def _write_entry(module: ir.Module, main: ir.Function, kinds: tuple, result: types.Type) -> None:
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [llvm.I64] * 3), NAME + ENTRY)
-    builder = ir.IRBuilder(entry.append_basic_block("entry"))
+    builder = Builder(entry.append_basic_block("entry"))
     value = builder.call(main, [*items_at(builder, kinds, entry.args[0]), entry.args[2]])
     if not llvm.is_empty(result):
         pointer = builder.inttoptr(entry.args[1], llvm.memory_type(result).as_pointer())

@@ -12,6 +12,7 @@ from numba import typeof, types
 
 from karamelo_py.compiler import llvm
 from karamelo_py.compiler.code import arithmetic, exceptions
+from karamelo_py.compiler.code.builder import Builder
 from karamelo_py.compiler.trace import indexing
 from karamelo_py.compiler.trace import values as traced
 from karamelo_py.compiler.trace.choices import tag_class
@@ -194,7 +195,7 @@ class Lowering:
             made.linkage = "internal"
             made.attributes.add("nounwind")
             functions[run, kinds] = made
-            inner = Lowering(self.seen, ir.IRBuilder(made.append_basic_block("entry")))
+            inner = Lowering(self.seen, Builder(made.append_basic_block("entry")))
             made.gives = inner.give_back(run, kinds, made.args, result)
         return functions[run, kinds]
 
