@@ -86,9 +86,20 @@ def nothing() -> ir.Constant:
 def constant(builder: ir.IRBuilder, kind: types.Type, value: Any) -> ir.Constant:
     if isinstance(kind, types.Array):
         return _constant_array(builder, kind, np.asarray(value))
-    if isinstance(kind, types.Float):
-        value = float(value)
-    return ir.Constant(register_type(kind), value if isinstance(value, float) else int(value))
+    is_real = isinstance(kind, types.Float) or isinstance(value, float)
+    number = float(value) if is_real else int(value)
+    return _numbers(kind)(number) if number else ir.Constant(register_type(kind), number)
+
+
+@per_type
+def _numbers(kind: types.Type) -> Callable[[float], ir.Constant]:
+    made = register_type(kind)
+    return functools.lru_cache(None, typed=True)(lambda number: ir.Constant(made, number))
+
+
+@functools.cache
+def int32(k: int) -> ir.Constant:
+    return ir.Constant(I32, k)
 
 
 def _constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> ir.Value:
@@ -110,9 +121,11 @@ def in_module(builder: ir.IRBuilder, content: ir.Constant, name: str) -> ir.Glob
 
 
 def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types.Type) -> ir.Value:
+    if kind is wanted:
+        return value
     if isinstance(wanted, types.Literal):
         wanted = types.unliteral(wanted)
-    if kind is wanted or kind == wanted:
+    if kind == wanted:
         return value
     if isinstance(wanted, types.BaseTuple) and isinstance(kind, types.BaseTuple):
         parts = zip(unpack(builder, value), kind, wanted, strict=True)
@@ -152,28 +165,33 @@ def _conversion(kind: types.Type, wanted: types.Type) -> str | None:
 
 
 def scalar_of(kind: types.Type) -> types.Type:
-    return kind.scalar if isinstance(kind, Lanes) else kind
+    return kind.scalar if type(kind) is Lanes else kind  # isinstance is slow for Numba's types
 
 
 def splat(builder: ir.IRBuilder, value: ir.Value, lanes: Lanes) -> ir.Value:
     none = ir.Constant(register_type(lanes), ir.Undefined)
-    one = builder.insert_element(none, value, I32(0))
+    one = builder.insert_element(none, value, int32(0))
     return shuffle(builder, one, none, [0] * lanes.width)
 
 
 def lane(builder: ir.IRBuilder, value: ir.Value, k: int) -> ir.Value:
-    return builder.extract_element(value, I32(k))
+    return builder.extract_element(value, int32(k))
 
 
 def pack(builder: ir.IRBuilder, values: list, lanes: Lanes) -> ir.Value:
     made = ir.Constant(register_type(lanes), ir.Undefined)
     for k, value in enumerate(values):
-        made = builder.insert_element(made, value, I32(k))
+        made = builder.insert_element(made, value, int32(k))
     return made
 
 
 def shuffle(builder: ir.IRBuilder, a: ir.Value, b: ir.Value, order: list[int]) -> ir.Value:
-    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(order)), order))
+    return builder.shuffle_vector(a, b, _order(tuple(order)))
+
+
+@functools.cache
+def _order(items: tuple[int, ...]) -> ir.Constant:
+    return ir.Constant(ir.VectorType(I32, len(items)), list(map(int32, items)))
 
 
 def overloaded(kind: ir.Type) -> str:
@@ -190,7 +208,7 @@ def room(builder: ir.IRBuilder, kind: ir.Type) -> ir.Value:
 
 
 def at(builder: ir.IRBuilder, pointer: ir.Value, *indices: int) -> ir.Value:
-    return builder.gep(pointer, [I32(index) for index in indices], inbounds=True)
+    return builder.gep(pointer, list(map(int32, indices)), inbounds=True)
 
 
 def put(

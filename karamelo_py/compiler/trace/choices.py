@@ -8,7 +8,7 @@ import functools
 import itertools
 import sys
 import types as python
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -50,8 +50,8 @@ def register(made: Callable) -> None:
         session.registered.append(made)
 
 
-def note(modules: Iterable[str]) -> None:
-    if noted := _noted.get():
+def note(modules: Collection[str]) -> None:
+    if modules and (noted := _noted.get()):
         noted[-1].update(modules)
 
 

@@ -95,8 +95,8 @@ def _counter(kinds: tuple) -> types.Integer:
 class Flow:
     """Writes the control flow of a call."""
 
-    def __init__(self, lowering: Any):
-        self.lowering, self.builder = lowering, lowering.builder
+    def __init__(self, lowering: Any, builder: Any):
+        self.lowering, self.builder = lowering, builder
 
     def edge(self, names: dict[str, Any]) -> Edge:
         return Edge(self.builder.block, names, self.lowering.read)

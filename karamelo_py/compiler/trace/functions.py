@@ -113,6 +113,10 @@ _AS_THEY_ARE = (*_CONSTANT, values.Emitted, Module)
 
 def _seen(thing: Any) -> Any:
     """Return the replacement of a global in traced functions."""
+    if type(thing) is python.FunctionType and thing in session.seen:
+        made, modules = session.seen[thing]
+        note(modules)
+        return made
     if isinstance(thing, _AS_THEY_ARE):
         return thing
     if isinstance(thing, python.ModuleType):

@@ -16,11 +16,11 @@ from karamelo_py.compiler.code.builder import Builder
 from karamelo_py.compiler.trace import indexing
 from karamelo_py.compiler.trace import values as traced
 from karamelo_py.compiler.trace.choices import tag_class
+from karamelo_py.compiler.trace.flow import Flow
 from karamelo_py.compiler.trace.held import HeldTuple, item_of
 from karamelo_py.compiler.trace.session import session
 
 MOST_OPERATIONS = 100_000  # largest number in a function; more operations should be a loop
-_tuple_type = functools.cache(types.BaseTuple.from_types)
 
 
 class FunctionType(types.Opaque):
@@ -40,6 +40,13 @@ def _is_of_values(one: type) -> bool:
     return not issubclass(one, others)
 
 
+def _tuple_type(kinds: tuple, named: type | None) -> types.BaseTuple:
+    key, cache = (named, numbers_of(kinds)), session.tuples
+    if key not in cache:
+        cache[key] = types.BaseTuple.from_types(kinds, named)
+    return cache[key]
+
+
 _literal = functools.lru_cache(typed=True)(types.literal)  # makes a type for each call
 
 
@@ -49,7 +56,7 @@ class Lowering:
     dispatch: Callable  # calls functions selected by type
 
     def __init__(self, seen: Callable, builder: ir.IRBuilder):
-        self.seen, self.builder = seen, builder
+        self.seen, self.builder, self.flow = seen, builder, Flow(self, builder)
         self.operations = 0  # number of operations in the function that is being traced
         self.begun: set[tuple] = set()  # functions that are being traced
         self.regardless = False  # whether code continues after a called function has raised
@@ -82,7 +89,9 @@ class Lowering:
         if isinstance(thing, int):
             return _literal(thing)
         if isinstance(thing, tuple):
-            kinds = tuple([types.unliteral(self.kind_of(item)) for item in thing])
+            kinds = tuple(
+                [i._kind if isinstance(i, _TRACED) else types.unliteral(self.kind_of(i)) for i in thing]
+            )
             return _tuple_type(kinds, type(thing) if hasattr(thing, "_fields") else None)
         if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)

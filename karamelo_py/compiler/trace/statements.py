@@ -195,7 +195,7 @@ class AstCompiler:
 
     @property
     def flow(self) -> Flow:
-        return Flow(values.now())
+        return values.now().flow
 
     def result(self) -> Any:
         self.block(self.walked.body)
