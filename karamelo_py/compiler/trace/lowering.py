@@ -198,15 +198,16 @@ class Lowering:
     def function(self, name: str, run: Callable, kinds: tuple, result: Any = None) -> ir.Function:
         """Return the module's separate function for `run`, whose result type is `result`."""
         module = self.builder.module
-        functions = vars(module).setdefault("own", {})
-        if (run, kinds) not in functions:
+        functions, key = vars(module).setdefault("own", {}), (run, kinds)
+        made = functions.get(key)
+        if made is None:
             made = new_function(module, kinds, result, f"{name}.{len(functions)}")
             made.linkage = "internal"
             made.attributes.add("nounwind")
-            functions[run, kinds] = made
+            functions[key] = made
             inner = Lowering(self.seen, Builder(made.append_basic_block("entry")))
             made.gives = inner.give_back(run, kinds, made.args, result)
-        return functions[run, kinds]
+        return made
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
         """Write a function; return its result type, which follows from the code if not given."""

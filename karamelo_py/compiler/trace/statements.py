@@ -109,19 +109,24 @@ class AstFunction:
         # By loop, and by all that determines its code: the types of initial literals by name, or
         # None for an unrolled loop.
         self.loops: dict[tuple, dict | None] = {}
-        plain = python.FunctionType(
-            code, {}, code.co_name, function.__defaults__, function.__closure__
-        )  # the same signature as the code object
-        plain.__kwdefaults__ = function.__kwdefaults__
-        self.signature = inspect.signature(plain)
         others = code.co_kwonlyargcount or code.co_flags & (
             inspect.CO_VARARGS | inspect.CO_VARKEYWORDS
         )
         self.plain = -1 if others else code.co_argcount  # parameters, if all are positional
 
+    @functools.cached_property
+    def signature(self) -> inspect.Signature:
+        function, code = self.function, self.__code__
+        plain = python.FunctionType(
+            code, {}, code.co_name, function.__defaults__, function.__closure__
+        )  # the same signature as the code object
+        plain.__kwdefaults__ = function.__kwdefaults__
+        return inspect.signature(plain)
+
     def free(self) -> dict[str, Any]:
-        cells = zip(self.__code__.co_freevars, self.function.__closure__ or (), strict=True)
-        return {name: self.seen(cell.cell_contents) for name, cell in cells}
+        names = self.__code__.co_freevars
+        cells = zip(names, self.function.__closure__ or (), strict=True)
+        return {name: self.seen(cell.cell_contents) for name, cell in cells} if names else {}
 
     def of_module(self, name: str) -> Any:
         true = self.function.__globals__
@@ -242,7 +247,10 @@ class AstCompiler:
         self.meet(edges)
 
     def do(self, node: ast.AST) -> Any:
-        return _COMPILED.get(type(node), AstCompiler.unknown)(self, node)
+        kind = type(node)
+        if kind is ast.Name and node.id in self.names:  # half of the nodes
+            return self.names[node.id]
+        return _COMPILED.get(kind, AstCompiler.unknown)(self, node)
 
     def unknown(self, node: ast.AST) -> None:
         kind = type(node).__name__
@@ -276,7 +284,7 @@ class AstCompiler:
     def items(self, nodes: list[ast.expr]) -> list:
         out: list = []
         for node in nodes:
-            if isinstance(node, ast.Starred):
+            if type(node) is ast.Starred:
                 out += self.do(node.value)
             else:
                 out.append(self.do(node))
