@@ -83,18 +83,25 @@ def nothing() -> ir.Constant:
     return ir.Constant(NOTHING, None)
 
 
-def constant(builder: ir.IRBuilder, kind: types.Type, value: Any) -> ir.Constant:
-    if isinstance(kind, types.Array):
-        return _constant_array(builder, kind, np.asarray(value))
-    is_real = isinstance(kind, types.Float) or isinstance(value, float)
-    number = float(value) if is_real else int(value)
-    return _numbers(kind)(number) if number else ir.Constant(register_type(kind), number)
+@per_type
+def constants(kind: types.Type) -> Callable[[Any], ir.Constant]:
+    """Return a function that makes constants of a type, once for each number."""
+    made, is_real = register_type(kind), isinstance(kind, types.Float)
+
+    def new(value: Any) -> ir.Constant:
+        return ir.Constant(
+            made, float(value) if is_real or isinstance(value, float) else int(value)
+        )
+
+    cached = functools.lru_cache(None, typed=True)(new)
+    return lambda value: cached(value) if value else new(value)  # 0.0 and -0.0 are equal
 
 
 @per_type
-def _numbers(kind: types.Type) -> Callable[[float], ir.Constant]:
-    made = register_type(kind)
-    return functools.lru_cache(None, typed=True)(lambda number: ir.Constant(made, number))
+def number_in(kind: types.Type) -> types.Type | None:
+    """Return the type of a number or of numbers in lanes, without a literal value."""
+    scalar = types.unliteral(scalar_of(kind))
+    return scalar if isinstance(scalar, types.Number | types.Boolean) else None
 
 
 @functools.cache
@@ -102,7 +109,7 @@ def int32(k: int) -> ir.Constant:
     return ir.Constant(I32, k)
 
 
-def _constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> ir.Value:
+def constant_array(builder: ir.IRBuilder, kind: types.Array, value: np.ndarray) -> ir.Value:
     value = np.ascontiguousarray(value)
     item = memory_type(kind.dtype)
     value = value.view(np.uint8) if value.dtype == np.bool_ else value

@@ -115,7 +115,8 @@ def _seen(thing: Any) -> Any:
     """Return the replacement of a global in traced functions."""
     if type(thing) is python.FunctionType and thing in session.seen:
         made, modules = session.seen[thing]
-        note(modules)
+        if modules:
+            note(modules)
         return made
     if isinstance(thing, _AS_THEY_ARE):
         return thing
@@ -154,8 +155,10 @@ def _copy(thing: Any) -> Any:
 def _copied(function: Callable) -> AstFunction:
     walked = session.walked
     if function not in walked:
-        walked[function] = AstFunction(function, _seen)
-    return walked[function]
+        walked[function] = AstFunction(function, _seen), modules_of(function)
+    made, modules = walked[function]
+    note(modules)
+    return made
 
 
 def run_for_kernel(dispatch: Callable, arguments: tuple) -> Any:
@@ -177,7 +180,6 @@ class Selected(NamedTuple):
         before, lowering.operations = lowering.operations, 0
         lowering.begun.add(self.key)
         try:
-            note(modules_of(function))
             run = _seen(function) if isinstance(function, values.Intrinsic) else _copied(function)
             return run(*arguments)
         except (CannotCompile, Undefined):

@@ -108,15 +108,15 @@ class Lowering:
             items = [self.lowered(a, k) for a, k in zip(thing, wanted, strict=True)]
             return llvm.make_tuple(self.builder, wanted, items)
         if isinstance(thing, int | float | np.generic):
-            scalar = types.unliteral(llvm.scalar_of(wanted))
-            if isinstance(scalar, types.Number | types.Boolean):
-                made = llvm.constant(self.builder, scalar, thing)
+            scalar = llvm.number_in(wanted)
+            if scalar is not None:
+                made = llvm.constants(scalar)(thing)
                 return llvm.cast(self.builder, made, scalar, wanted)
         return llvm.nothing()
 
     def constant(self, array: np.ndarray) -> traced.Value:
         kind = typeof(array)
-        return traced.Value(kind, llvm.constant(self.builder, kind, array))
+        return traced.Value(kind, llvm.constant_array(self.builder, kind, array))
 
     def unify(self, *kinds: types.Type) -> types.Type | None:
         first = kinds[0]

@@ -137,7 +137,7 @@ def _round_off(template):
     made = _of_width(lanes_of(template), scalar)
 
     def codegen(builder, _):
-        error = llvm.constant(builder, scalar, 2.0**-23 if scalar == types.float32 else 2.0**-52)
+        error = llvm.constants(scalar)(2.0**-23 if scalar == types.float32 else 2.0**-52)
         return llvm.cast(builder, error, scalar, made)
 
     return made(template), codegen
