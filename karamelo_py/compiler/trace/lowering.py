@@ -89,9 +89,7 @@ class Lowering:
         if isinstance(thing, int):
             return _literal(thing)
         if isinstance(thing, tuple):
-            kinds = tuple(
-                [i._kind if isinstance(i, _TRACED) else types.unliteral(self.kind_of(i)) for i in thing]
-            )
+            kinds = tuple([types.unliteral(self.kind_of(item)) for item in thing])
             return _tuple_type(kinds, type(thing) if hasattr(thing, "_fields") else None)
         if thing is None or isinstance(thing, float | np.generic):
             return typeof(thing)
