@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from karamelo_py.compiler import point_function
-from karamelo_py.compiler.fields import scalar
+from karamelo_py.compiler.fields import Field
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
 from karamelo_py.kernels.table import ACCELERATE, SUMS
 from karamelo_py.points.basis import BasisTraits
@@ -219,40 +219,29 @@ class Mute(Compute):
 
 
 # --- fields
-class Shapeless(NamedTuple):
+class Formless(NamedTuple):
     array: Any
 
 
-class Wordy(NamedTuple):
-    array: Any
-    shape = scalar
+class Wordy(Field):
     columns = "dose"
 
 
-class Sized(NamedTuple):
-    array: Any
-    shape = scalar
-
+class Sized(Field):
     def start(kin):
         return 1.0, 2.0
 
 
-class Unshaped(NamedTuple):
-    array: Any
-
+class Unshaped(Field):
     def shape(kin):
         return kin.dimensions
 
 
-class Taken(NamedTuple):
-    array: Any
-    shape = scalar
+class Taken(Field):
     columns = ("vx",)
 
 
-class Other(NamedTuple):
-    array: Any
-    shape = scalar
+class Other(Field):
     columns = ("dose",)
 
 
@@ -263,7 +252,7 @@ class Second(Other):
 named(
     Group,
     Bare={"point_fields": Other},
-    Formless={"point_fields": (Shapeless,)},
+    Formless={"point_fields": (Formless,)},
     OneWord={"point_fields": (Wordy,)},
     Clashing={"point_fields": (Taken,)},
     Doubled={"point_fields": (Sized,)},

@@ -106,7 +106,7 @@ def test_init(hub):
         ("undirected", "it has no formulas, so post_particles_to_grid would act in no direction"),
         ("viewless", "initial_integrate has to take one argument, the view of the group"),
         ("bare", "point_fields has to be a tuple of classes, as in (Other,)"),
-        ("formless", "the field Shapeless has no shape: scalar, vector, tensor or planar"),
+        ("formless", "the field Formless is not derived from Field"),
         ("oneword", "the field Wordy has columns that are not a tuple of words, as in ('dose',)"),
         ("doubled", "the field Sized: it starts from 2 numbers and has 1 components"),
         ("lost", "the field Unshaped: AttributeError: 'Line' object has no attribute 'dimensions'"),

@@ -1,6 +1,6 @@
 """Declared fields: data of points and nodes, declared by the part that owns it.
 
-A field is a NamedTuple class with one member, its array. Kernels look it up by class; its
+A field is a class derived from `Field`, with one member, its array. Kernels look it up by class; its
 attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check`::
 
     class Dose(Field):
@@ -123,36 +123,11 @@ def name_of(kind: type) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", kind.__name__).lower()
 
 
-def _trait(kind: type, name: str) -> Any:
-    """Return a trait of a field class, with defaults of `Field` even if not derived from it."""
-    return getattr(kind, name, getattr(Field, name))
-
-
-def is_kept(kind: type) -> bool:
-    return _trait(kind, "kept")
-
-
-def columns_of(kind: type) -> tuple[str, ...]:
-    return _trait(kind, "columns")
-
-
-def position_in(kind: type, kin: Any) -> int | None:
-    return _trait(kind, "position")(kin)
-
-
-def shown_by(kind: type, values: np.ndarray, table: Any) -> np.ndarray:
-    return _trait(kind, "shown")(values, table)
-
-
-def start_of(kind: type) -> Any:
-    return _trait(kind, "start")
-
-
-def fields_of(owner: Any, attribute: str) -> tuple[type, ...]:
+def fields_of(owner: Any, attribute: str) -> tuple[type[Field], ...]:
     return getattr(owner, attribute, ())
 
 
-def declared(owners: Iterable[Any], attribute: str) -> tuple[type, ...]:
+def declared(owners: Iterable[Any], attribute: str) -> tuple[type[Field], ...]:
     return tuple(dict.fromkeys(kind for owner in owners for kind in fields_of(owner, attribute)))
 
 
@@ -205,15 +180,15 @@ def some_points(array: np.ndarray, points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array[..., points])
 
 
-def at_points(kind: type, kin: Any, count: int, real: type) -> Any:
+def at_points(kind: type[Field], kin: Any, count: int, real: type) -> Any:
     """Make a field (components, count) with initial values."""
     array = rows_of_points((kind.shape(kin), count), real)
     array[:] = _start(kind, kin, real)[:, None]
     return kind(array)
 
 
-def _start(kind: type, kin: Any, real: type) -> np.ndarray:
-    start = _trait(kind, "start")
+def _start(kind: type[Field], kin: Any, real: type) -> np.ndarray:
+    start = kind.start
     return np.array(start(kin) if callable(start) else [start], real)
 
 
@@ -224,7 +199,7 @@ def records(count: int, width: int, real: type) -> np.ndarray:
     return room[first : first + count * width].reshape(count, width)
 
 
-def at_nodes(kind: type, kin: Any, count: int, real: type) -> NamedTuple:
+def at_nodes(kind: type[Field], kin: Any, count: int, real: type) -> NamedTuple:
     """Make a field (count, components) with initial values."""
     width = kind.shape(kin)
     # Three numbers are loaded and stored as four, which fill a register.

@@ -205,7 +205,7 @@ class PointTable:
         if name in (of_fields := declared_columns(self.hub, "point_fields")):
             kind, k = of_fields[name]
             if (array := self._rows.declared(kind)) is not None:
-                return _column(fields.shown_by(kind, array, self), k)
+                return _column(kind.shown(array, self), k)
         elif name in named_sets(self.hub):
             return members(self.hub, name, self.numbers)
         return np.zeros(self.count)
@@ -239,7 +239,7 @@ def owners_of_fields(hub: Scene, contact: object = None) -> list:
 def declared_columns(hub: Scene, attribute: str) -> dict[str, tuple[type[fields.Field], int]]:
     columns: dict[str, tuple[type[fields.Field], int]] = {}
     for kind in fields.declared(owners_of_fields(hub), attribute):
-        for k, column in enumerate(fields.columns_of(kind)):
+        for k, column in enumerate(kind.columns):
             columns.setdefault(column, (kind, k))
     return columns
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from karamelo_py.compiler.fields import field, position_in
+from karamelo_py.compiler.fields import field
 from karamelo_py.kernels.arrays import TIME, TIMESTEP, Setup
 from karamelo_py.kernels.equations.periodic import EVERY, GHOSTS, Axis, InUse, Seam, position_on
 from karamelo_py.kernels.equations.sheared import Shear
@@ -34,7 +34,7 @@ def return_points(s: Setup, domain: Domain) -> None:
         stored = [
             one.array[first:]
             for one in block.points.fields
-            if (first := position_in(type(one), s.kin)) is not None
+            if (first := one.position(s.kin)) is not None
         ]
         for k in reversed(domain.periodic):
             lo, length = domain.lo[k], domain.hi[k] - domain.lo[k]

@@ -151,7 +151,7 @@ class SceneArrays:
                 rows[:, ids] = values
             laws[without_rate(law_kind(block.laws))] = rows
         kinds = (type(one) for block in self.setup.blocks for one in block.points.fields)
-        kept = [kind for kind in dict.fromkeys(kinds) if fields.is_kept(kind)]
+        kept = [kind for kind in dict.fromkeys(kinds) if kind.kept]
         return State(
             self.count,
             self.present,
@@ -160,7 +160,7 @@ class SceneArrays:
             laws,
             {kind: all_points.declared(kind).T for kind in kept},
             self.setup.grids,
-            {type(one): one.array for one in self.setup.nodes.fields if fields.is_kept(type(one))},
+            {type(one): one.array for one in self.setup.nodes.fields if one.kept},
             self.setup.contact,
             carried_on(self.control),
         )

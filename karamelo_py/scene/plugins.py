@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from karamelo_py.compiler import Undefined, places_of
-from karamelo_py.compiler.fields import Field, columns_of, fields_of, start_of
+from karamelo_py.compiler.fields import Field, fields_of
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.heat import Supply
 from karamelo_py.kernels.equations.internal_force import Force, WorkOfForces
@@ -237,7 +237,7 @@ def check_fields(hub: Scene, name: str, owner: object, mark: Mark | None) -> Non
                 error = _wrong_field(kind) or _wrong_size(kind, hub.domain)
             if error:
                 raise faults.fault(name, f"{field}{error}", mark)
-            for column in columns_of(kind):
+            for column in kind.columns:
                 if shows := _shows(hub, column, kind, attribute):
                     error = f"{kind.__name__}: the column '{column}' is {shows}"
                     raise faults.fault(name, error, mark)
@@ -253,22 +253,17 @@ def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
 
 
 def _wrong_field(kind: Any) -> str:
-    if not (inspect.isclass(kind) and issubclass(kind, tuple) and hasattr(kind, "_fields")):
-        return " is not a NamedTuple class"
-    if kind._fields != ("array",):
-        return " has to have one member, array: Any"
-    if not (hasattr(kind, "shape") and callable(kind.shape)):
-        return " has no shape: scalar, vector, tensor or planar"
-    columns = columns_of(kind)
-    if not isinstance(columns, tuple):
-        return f" has columns that are not a tuple of words, as in ({columns!r},)"
+    if not (inspect.isclass(kind) and issubclass(kind, Field)):
+        return " is not derived from Field"
+    if not isinstance(kind.columns, tuple):
+        return f" has columns that are not a tuple of words, as in ({kind.columns!r},)"
     return ""
 
 
 def _wrong_size(kind: type[Field], domain: Any) -> str:
     for dimension in [domain.dimension] if domain else KINEMATICS:
         kin = KINEMATICS[dimension]()
-        size, start = kind.shape(kin), start_of(kind)
+        size, start = kind.shape(kin), kind.start
         if not isinstance(size, int) or size < 1:
             return f": its shape gives {size!r}, not a number of components"
         if callable(start) and len(start(kin)) != size:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from karamelo_py.compiler.fields import as_rows_of_points, is_kept, name_of, rows_of_points
+from karamelo_py.compiler.fields import as_rows_of_points, name_of, rows_of_points
 from karamelo_py.compiler.tuples import flat
 from karamelo_py.kernels.arrays import Hooks, Nodes, Points, Setup, Tiling, arrays_of
 from karamelo_py.kernels.heat import Conducting
@@ -276,7 +276,7 @@ def of_nodes(s: Setup) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def kept_at_nodes(s: Setup) -> list[tuple[str, np.ndarray]]:
-    return [(name_of(type(one)), one.array) for one in s.nodes.fields if is_kept(type(one))]
+    return [(name_of(type(one)), one.array) for one in s.nodes.fields if one.kept]
 
 
 def rows_at(
