@@ -1,7 +1,7 @@
 """Declared fields: data of points and nodes, declared by the part that owns it.
 
-A field is a class derived from `Field`, with one member, its array. Kernels look it up by class; its
-attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check`::
+A field is a class derived from `Field`, with one member, its array. Kernels look it up by class;
+its attributes are used by lowering, sorting, restarts, dumps and `karamelo-py check`::
 
     class Dose(Field):
         \"\"\"Radiation that a point has taken up, in gray.\"\"\"
