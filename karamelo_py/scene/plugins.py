@@ -253,7 +253,8 @@ def check_law(hub: Scene, name: str, law: NamedTuple) -> None:
 
 
 def _wrong_field(kind: Any) -> str:
-    if not (inspect.isclass(kind) and issubclass(kind, Field)):
+    is_field = inspect.isclass(kind) and issubclass(kind, Field)
+    if not is_field:
         return " is not derived from Field"
     if not isinstance(kind.columns, tuple):
         return f" has columns that are not a tuple of words, as in ({kind.columns!r},)"
