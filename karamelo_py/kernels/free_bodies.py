@@ -155,8 +155,7 @@ def _list_point(body, surface, s, block, p):
 def _recall(grip, control, state, contact):
     """Restore the friction state of a point that also touched in the last step."""
     contact.usual = contact.spare = 0.0
-    for c in range(3):
-        contact.hold[c] = 0.0
+    contact.hold[:] = 0.0
     step, number = control.values[arrays.TIMESTEP], contact.number
     if number >= len(grip) or grip[number, 5] != step or not step > 0:
         return
@@ -239,8 +238,7 @@ def _give_to_points(body, s, block, number, measures):
             for c in range(d):
                 s.control.values[contact.slot + c] += contact.impulse[c] / kick
             for c in range(3 if contact.torque else 0):
-                i, j, f = (c + 1) % 3, (c + 2) % 3, contact.impulse
-                torque = (contact.at[i] * f[j] - contact.at[j] * f[i]) / kick
+                torque = motion.cross(contact.at, contact.impulse, c) / kick
                 s.control.values[contact.torque + c] += torque
 
 
@@ -304,8 +302,7 @@ def _list_nodes(body, s):
         one.gap = (closing if lasts else 1.0) * max(body.pairs.gaps[q], 0.0)
         one.mass, one.mu, one.share = nodes.sums[m, arrays.MASS], contact.friction[a, b], 1.0
         one.most = one.usual = one.spare = 0.0
-        for c in range(3):
-            one.hold[c] = 0.0
+        one.hold[:] = 0.0
         body.count[0] += 1
 
 
@@ -316,9 +313,7 @@ def _reaction(body, s):
     for k in range(3):
         total[k] = -kick * values[force[body.field] + k]
     for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        about = centre[i] * total[j] - centre[j] * total[i]
-        total[3 + k] = -kick * values[torque[body.field] + k] - about
+        total[3 + k] = -kick * values[torque[body.field] + k] - motion.cross(centre, total, k)
 
 
 @noinline
@@ -326,10 +321,9 @@ def _add_links(body, s):
     impulses, centre, values = body.solution.given, body.state[0].x, s.control.values
     kick, force, torque = s.control.step[0].kick, s.contact.slot, s.contact.torque
     for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        about = centre[i] * impulses[j] - centre[j] * impulses[i]
+        turning = impulses[3 + k] + motion.cross(centre, impulses, k)
         values[force[body.field] + k] += impulses[k] / kick
-        values[torque[body.field] + k] += (impulses[3 + k] + about) / kick
+        values[torque[body.field] + k] += turning / kick
 
 
 @noinline

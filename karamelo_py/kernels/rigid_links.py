@@ -248,11 +248,9 @@ def _give(links, link, p, into, by_mass):
 @noinline
 def _begin(links, body, k):
     state, work, inverse = body.state[0], body.solution, links.inverse[k]
-    for a in range(3):
-        links.states[k].x[a] = state.x[a]
-        links.old[k, a], links.old[k, 3 + a] = state.v[a], state.spin[a]
-        for b in range(3):
-            links.states[k].R[a, b] = state.R[a, b]
+    links.states[k].x[:], links.states[k].R[:] = state.x, state.R
+    links.old[k, :3], links.old[k, 3:] = state.v, state.spin
+    links.u[k] = work.u
     for c in range(6):
         J = work.slope
         for a in range(6):
@@ -261,9 +259,7 @@ def _begin(links, body, k):
                 J[a, b] = work.mass[a, b] if both else (1.0 if a == b else 0.0)
             J[a, 6] = 1.0 if a == c and body.dofs[a] else 0.0
         motion.solve_system(J)
-        for a in range(6):
-            inverse[a, c] = J[a, 6]
-        links.u[k, c] = work.u[c]
+        inverse[:, c] = J[:, 6]
 
 
 @noinline
@@ -310,10 +306,11 @@ def _list_touch(links, touch, kin, dt):
         normal = motion.from_start(links.states[b], (way[0], way[1], way[2]))
         link = links.rows[links.count[0]]
         link.kind, link.first, link.second, link.gap = CONTACT, a, b, gap
+        link.hit[:] = 0.0
         link.mu, link.restitution = touch.numbers[0], touch.numbers[1]
         link.slot, link.torque, link.sign = touch.slots[0], touch.slots[1], touch.slots[2]
         for c in range(3):
-            link.ways[0, c], link.hit[c] = normal[c], 0.0
+            link.ways[0, c] = normal[c]
             link.at[c] = y[c] + away[c] - radius * normal[c]
         link.constant = link.most = 0.0
         _set_stiffness(links, link, dt)
@@ -388,8 +385,7 @@ def _rotation_between(links, joint):
         b = motion.from_start(links.states[joint.second], axis)
         weight = (1.0 if k == 0 else 0.0) if alone else 0.5
         for c in range(3):
-            i, j = (c + 1) % 3, (c + 2) % 3
-            total[c] += weight * (b[i] * a[j] - b[j] * a[i])
+            total[c] += weight * motion.cross(b, a, c)
     return total[0], total[1], total[2]
 
 
@@ -505,9 +501,7 @@ def _residual(links, bodies, u, rest, bounded):
 def _add_body(links, body, n, bounded):
     work = body.solution
     J = work.slope
-    for a in range(6):
-        for b in range(6):
-            J[a, b] = work.mass[a, b]
+    J[:, :6] = work.mass
     for i in range(body.count[0]):
         motion.add_slope(body, i, bounded)
     m = links.slope.shape[0]
@@ -524,9 +518,9 @@ def _add_body(links, body, n, bounded):
 def _try(links, bodies, fraction, bounded):
     """Try `fraction` of the step in the last column of the slope; return the squared residual."""
     m = links.slope.shape[0]
+    links.trial[:] = links.u
     for n in range(links.free.shape[0]):
         for a in range(6):
-            links.trial[n, a] = links.u[n, a]
             if links.free[n, a] >= 0:
                 links.trial[n, a] -= fraction * links.slope[links.free[n, a], m]
     return _residual(links, bodies, links.trial, links.trial_rest, bounded)
@@ -609,8 +603,7 @@ def _solve(links, bodies):
     # With friction bounds by the previous normal impulses, the problem is convex and Newton's
     # method converges. The first pass has no friction.
     for n, body in enumerate(bodies):
-        for a in range(6):
-            links.u[n, a] = body.solution.u[a]
+        links.u[n] = body.solution.u
     _iterate(links, bodies, True)
     for _ in range(motion.BOUNDS_AT_MOST):
         if motion.bounds_are_settled(links.rows, links.count[0]):
@@ -722,7 +715,7 @@ def _collide(links, bodies, dt):
         for a in range(6):
             body.solution.momentum[a] += links.given[n, a]
             body.solution.u[a] += links.jump[n, a]
-            links.u[n, a] = body.solution.u[a]
+        links.u[n] = body.solution.u
 
 
 @noinline
@@ -760,9 +753,9 @@ def solve(links, bodies, control):
     _solve(links, bodies)
     _sum_impulses(links)
     for n, body in enumerate(bodies):
+        body.solution.u[:] = links.u[n]
         for a in range(6):
             body.solution.momentum[a] += links.given[n, a]
-            body.solution.u[a] = links.u[n, a]
     for i in range(links.count[0]):
         link = links.rows[i]
         for c in range(3):
@@ -772,16 +765,15 @@ def solve(links, bodies, control):
     # including collisions, for published forces
     _sum_impulses(links)
     for n, body in enumerate(bodies):
-        for a in range(6):
-            body.solution.given[a] = links.given[n, a]
+        body.solution.given[:] = links.given[n]
 
 
 @noinline
 def _publish(link, values, kick):
+    p = link.impulse
     for c in range(3):
-        i, j, p = (c + 1) % 3, (c + 2) % 3, link.impulse
         if link.kind != HOLD_ROTATION:
             values[link.slot + c] += link.sign * p[c] / kick
         if link.torque:
-            torque = p[c] if link.kind == HOLD_ROTATION else link.at[i] * p[j] - link.at[j] * p[i]
+            torque = p[c] if link.kind == HOLD_ROTATION else motion.cross(link.at, p, c)
             values[link.torque + c] += link.sign * torque / kick

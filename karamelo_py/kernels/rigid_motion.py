@@ -129,6 +129,12 @@ def records(kind: np.dtype, count: int = 1) -> Any:
     return np.zeros(count, kind).view(np.recarray)
 
 
+def cross(a, b, k):
+    """Return component `k` of the cross product of vectors (3,)."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    return a[i] * b[j] - a[j] * b[i]
+
+
 @noinline
 def _turn_about(state, axis, angle):
     q, c, s = state.q, cos(0.5 * angle), sin(0.5 * angle)
@@ -452,9 +458,8 @@ def start_step(body, control):
         moment = _value(body, values, LOADED + 3 + k)
         work.momentum[3 + k] = state.momentum[k] + kick * moment
     for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
         work.momentum[k] = mass * state.v[k] + kick * load[k]
-        work.momentum[3 + k] += kick * (arm[i] * load[j] - arm[j] * load[i])
+        work.momentum[3 + k] += kick * cross(arm, load, k)
     for a in range(6):
         work.u[a] = 0.0 if body.dofs[a] else _value(body, values, LED + a)
     _velocities_of(body, work.momentum)
