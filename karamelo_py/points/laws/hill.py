@@ -234,11 +234,7 @@ class Hill(NamedTuple):
                 expected="R=(R0, R45, R90) or yields=(r11, r22, r33, r12, r13, r23)",
             )
         hard = strength.laws["strength"]
-        known = flow_stress.defined(type(hard)) or isinstance(hard, Plastic | LinearHardening)
-        if (
-            not known
-            or not flow(hard, before_flow(hard, initial_memory(hard, 1.0), ()), 0.0, 1.0)[0] > 0
-        ):
+        if not yield_stress(hard) > 0:
             raise ScriptError(
                 f"strength '{strength.id}' has no yield stress",
                 argument="strength",
