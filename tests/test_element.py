@@ -21,6 +21,13 @@ material(steel, eos-strength, bulk, mild)
 """
 
 
+@pytest.fixture(autouse=True)
+def drawn_by_the_example_alone(request, monkeypatch):
+    """A picture takes longer than most of the tests."""
+    if request.node.name != "test_the_example":
+        monkeypatch.setattr(element.Response, "draw", lambda *_: None)
+
+
 @pytest.fixture
 def answer(run_script):
     """``answer(script, ID)``: the table of an element after a script."""

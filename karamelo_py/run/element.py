@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -79,6 +79,7 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
+CONTRACTS = 0.1  # least factor of the residual for which slopes are used again
 DIVISIONS = 8  # halvings of an increment that does not converge
 TOLERANCE = 1e-10  # residual / stress, or / the stress change in elastic increments
 UNRESOLVED = 1e-13  # stress / modulus below which a stress is round-off
@@ -107,6 +108,8 @@ class Point:
         self.state = laws.initial_state(self.law, kin, 1.0)
         if T is not None:
             self.state = laws.with_temperature(self.law, kin, self.state, T)
+        self.stress = self._stress(self.state)
+        self.slopes: np.ndarray | None = None  # of the stress, found last along this path
         self.strain = np.zeros(6)  # sum of symmetric parts of dt grad v
         self.time = 0.0
         self.work = 0.0  # work per reference volume
@@ -117,17 +120,13 @@ class Point:
         places = self.kin.Tensor.places
         return tuple(c for c in COMPONENTS if ("xyz".index(c[0]), "xyz".index(c[1])) in places)
 
-    @property
-    def stress(self) -> np.ndarray:
-        return self._stress(self.state)
-
     def _stress(self, state: tuple) -> np.ndarray:
         stress = laws.cauchy_stress(self.law, self.kin, state)
         return np.array([*stress, *[0.0] * (6 - len(stress))])
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
-        motion = Loading(
+        load = Loading(
             strain=path.strain_at_end(self.strain, self.free) - self.strain,
             turn=path.turn,
             shear=tuple(COMPONENTS.index(name) for name in path.shear),
@@ -135,12 +134,12 @@ class Point:
             begin=self.stress[prescribed],
             end=np.array([path.stress[COMPONENTS[k]] for k in prescribed]),
         )
-        begun = self.time
+        begun, self.slopes = self.time, None
         rate = np.zeros(len(prescribed))  # change of the unknown strains along the path
         marks = np.arange(path.increments + 1) / path.increments
         for number, (a, b) in enumerate(pairwise(marks), 1):
             try:
-                rate = self._go(motion, path.duration, a, b, rate, DIVISIONS)
+                rate = self._go(load, path.duration, a, b, rate, DIVISIONS)
             except Unreachable as error:
                 raise Unreachable(f"increment {number} of {path.increments}: {error}") from None
             # Computed from the path, not summed over increments, so that tables have round numbers.
@@ -148,28 +147,33 @@ class Point:
             observe()
 
     def _go(
-        self, motion: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
+        self, load: Loading, duration: float, a: float, b: float, rate: np.ndarray, divisions: int
     ) -> np.ndarray:
         try:
-            solution = self._solve(motion, (b - a) * duration, a, b, rate)
+            solution = self._solve(load, (b - a) * duration, a, b, rate)
         except Unreachable:
             middle = (a + b) / 2
-            if divisions == 0 or not len(motion.prescribed):
+            if divisions == 0 or not len(load.prescribed):
                 raise
-            rate = self._go(motion, duration, a, middle, rate, divisions - 1)
-            return self._go(motion, duration, middle, b, rate, divisions - 1)
+            rate = self._go(load, duration, a, middle, rate, divisions - 1)
+            return self._go(load, duration, middle, b, rate, divisions - 1)
         return solution / (b - a)
 
-    def _solve(
-        self, motion: Loading, dt: float, a: float, b: float, rate: np.ndarray
-    ) -> np.ndarray:
-        prescribed, target = motion.prescribed, motion.begin + b * (motion.end - motion.begin)
-        increment = (b - a) * motion.strain
-        rigid = self._turned((b - a) * motion.turn, dt)
+    def _solve(self, load: Loading, dt: float, a: float, b: float, rate: np.ndarray) -> np.ndarray:
+        prescribed, target = load.prescribed, load.begin + b * (load.end - load.begin)
+        increment = (b - a) * load.strain
+        rigid = self._turned((b - a) * load.turn, dt)
+        latest: Any = (None, None)
 
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
+            nonlocal latest
             increment[prescribed] = unknown
-            dl = self._strained(increment, motion.shear) + rigid
+            if latest[0] is not unknown:
+                latest = unknown, computed()
+            return latest[1]
+
+        def computed() -> tuple[tuple, np.ndarray] | None:
+            dl = self._strained(increment, load.shear) + rigid
             try:
                 state = laws.advance(self.law, self.kin, self.state, self._flat(dl), dt)
                 stored = laws.energy_density(self.law, self.kin, state)
@@ -181,25 +185,23 @@ class Point:
 
         def misfit(unknown: np.ndarray) -> np.ndarray:
             state = after(unknown)
-            if state is None:
-                return np.full(len(prescribed), np.inf)
-            return state[1][prescribed] - target
+            return state[1][prescribed] - target if state else np.full(len(prescribed), np.inf)
 
         def slopes(unknown: np.ndarray) -> np.ndarray:
             increment[prescribed] = unknown
-            dl = self._strained(increment, motion.shear) + rigid
-            ways = [self._strained(e, motion.shear) for e in np.eye(6)[prescribed]]
+            dl = self._strained(increment, load.shear) + rigid
+            ways = [self._strained(e, load.shear) for e in np.eye(6)[prescribed]]
             return self._slopes(self.state, dl, dt, ways)[prescribed]
 
         unknown = self._newton(misfit, slopes, rate * (b - a), increment, target)
         after_increment = after(unknown)
-        self.last = (self.state, self._strained(increment, motion.shear) + rigid, dt)
+        self.last = (self.state, self._strained(increment, load.shear) + rigid, dt)
         if after_increment is None or not np.isfinite(after_increment[1]).all():
             raise Unreachable(
                 "the point is turned inside out (det F <= 0), or its energy has no value there: "
                 "gent ends at I1*J^(-2/3) - 3 = Jm"
             )
-        self._accept(after_increment[0], increment)
+        self._accept(*after_increment, increment)
         return unknown
 
     def tangent(self) -> np.ndarray:
@@ -221,42 +223,39 @@ class Point:
         return np.array([*rows, *[[0.0] * len(ways)] * (6 - len(rows))], float)
 
     def _newton(
-        self,
-        misfit: Callable,
-        slopes: Callable,
-        guess: np.ndarray,
-        increment: np.ndarray,
+        self, misfit: Callable, slopes: Callable, guess: np.ndarray, increment: np.ndarray,
         target: np.ndarray,
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         if not len(guess):
             return guess
         volume = laws.specific_volume(self.law) * laws.jacobian(self.law, self.kin, self.state)
         modulus = laws.wave_speed_squared(self.law, self.kin, self.state) / volume
-        unknown, residual = guess, misfit(guess)
-        if not np.isfinite(residual).all():
-            unknown = np.zeros(len(guess))
-            residual = misfit(unknown)
+        unknown = guess if np.isfinite(misfit(guess)).all() else np.zeros(len(guess))
+        residual = misfit(unknown)
         for _ in range(ITERATIONS):
             size = np.linalg.norm(residual)
-            largest = float(np.abs(increment).max())
-            stresses = [modulus * largest, *np.abs(target), *np.abs(self.stress)]
+            stresses = [modulus * np.abs(increment).max(), *np.abs(target), *np.abs(self.stress)]
             if size <= TOLERANCE * max(stresses) + UNRESOLVED * modulus:
                 return unknown
             if not np.isfinite(size):
                 break
-            tangent = slopes(unknown)
-            if not np.isfinite(tangent).all():
+            if new := self.slopes is None:
+                self.slopes = slopes(unknown)
+            if not np.isfinite(self.slopes).all():
                 break
             # Least squares leave components without stiffness unchanged.
-            step = np.linalg.lstsq(tangent, -residual, rcond=1e-12)[0]
-            for halving in range(SEARCH_HALVINGS):
+            step = np.linalg.lstsq(self.slopes, -residual, rcond=1e-12)[0]
+            for halving in range(SEARCH_HALVINGS if new else 1):
                 trial = unknown + step / 2**halving
                 trial_residual = misfit(trial)
-                if np.linalg.norm(trial_residual) < size:
+                if np.linalg.norm(trial_residual) < size * (1 if new else CONTRACTS):
+                    unknown, residual = trial, trial_residual
                     break
             else:
-                break
-            unknown, residual = trial, trial_residual
+                if new:
+                    break
+                self.slopes, residual = None, misfit(unknown)  # which restores the increment
+        self.slopes = None
         raise Unreachable("the law does not reach the prescribed stress")
 
     def _strained(self, increment: np.ndarray, shear: Sequence[int]) -> np.ndarray:
@@ -293,10 +292,10 @@ class Point:
     def _flat(self, gradient: np.ndarray) -> tuple:
         return tensor(self.kin, [float(gradient[index]) for index in self.kin.Tensor.places])
 
-    def _accept(self, state: tuple, increment: np.ndarray) -> None:
+    def _accept(self, state: tuple, stress: np.ndarray, increment: np.ndarray) -> None:
         weights = np.where(np.arange(6) < 3, 1, 2)
         before = laws.jacobian(self.law, self.kin, self.state) * self.stress
-        self.state = state
+        self.state, self.stress = state, stress
         after = laws.jacobian(self.law, self.kin, self.state) * self.stress
         self.work += float(weights * (before + after) / 2 @ increment)
         self.strain = self.strain + increment
