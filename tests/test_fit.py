@@ -111,7 +111,7 @@ def test_searches_that_disagree_give_no_range(folder, capsys):
     noise = 0.01 * np.random.default_rng(1).standard_normal(len(times))
     table = pandas.DataFrame({"time": times, "y": np.sin(11.5 * times) + noise})
     table.to_csv("sine.csv", index=False)
-    words = ["-var", "speed=5,13", "-jobs", "1", "-match", "place=sine.csv:y"]
+    words = ["-var", "speed=5,13", "-jobs", "1", "-match", "place=sine.csv:y", "-most", "6"]
     assert main(["fit", "in.sine", *words]) == 0
     out = capsys.readouterr().out
     (value,) = re.findall(r"^speed +(\S+) +–$", out, re.M)

@@ -79,7 +79,7 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
-CONTRACTS = 0.1  # least factor of the residual for which slopes are used again
+CONTRACTS = 0.1  # residual / the one before, below which slopes are used again
 DIVISIONS = 8  # halvings of an increment that does not converge
 TOLERANCE = 1e-10  # residual / stress, or / the stress change in elastic increments
 UNRESOLVED = 1e-13  # stress / modulus below which a stress is round-off
@@ -121,8 +121,7 @@ class Point:
         return tuple(c for c in COMPONENTS if ("xyz".index(c[0]), "xyz".index(c[1])) in places)
 
     def _stress(self, state: tuple) -> np.ndarray:
-        stress = laws.cauchy_stress(self.law, self.kin, state)
-        return np.array([*stress, *[0.0] * (6 - len(stress))])
+        return np.array([*laws.cauchy_stress(self.law, self.kin, state), *5 * [0.0]][:6])
 
     def follow(self, path: LoadPath, observe: Callable[[], None]) -> None:
         prescribed = np.array([k for k, name in enumerate(COMPONENTS) if name in path.stress], int)
@@ -248,8 +247,10 @@ class Point:
             for halving in range(SEARCH_HALVINGS if new else 1):
                 trial = unknown + step / 2**halving
                 trial_residual = misfit(trial)
-                if np.linalg.norm(trial_residual) < size * (1 if new else CONTRACTS):
+                fraction = np.linalg.norm(trial_residual) / size
+                if fraction < (1 if new else CONTRACTS):
                     unknown, residual = trial, trial_residual
+                    self.slopes = self.slopes if fraction < CONTRACTS else None
                     break
             else:
                 if new:
