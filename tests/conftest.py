@@ -191,11 +191,15 @@ def _settled() -> None:
 
 
 @contextmanager
-def interpreting(*folders: Path) -> Iterator[subprocess.Popen]:
-    """A process that interprets scripts, and finds packages in further folders."""
+def interpreting(*folders: Path, python: str = sys.executable) -> Iterator[subprocess.Popen]:
+    """A process that interprets scripts, and finds packages in further folders.
+
+    Another `python` starts it as a fork.
+    """
     path = os.pathsep.join([*map(str, folders), os.environ["PYTHONPATH"]])
+    forked = ["-c", "from uncompiled import answer; answer()"]
     process = subprocess.Popen(
-        [sys.executable, str(TESTS / "uncompiled.py")],
+        [python, *([str(TESTS / "uncompiled.py")] if python == sys.executable else forked)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": path},
@@ -210,8 +214,8 @@ def interpreting(*folders: Path) -> Iterator[subprocess.Popen]:
 
 
 @pytest.fixture(scope="session")
-def _interpreter() -> Iterator[subprocess.Popen]:
-    with interpreting() as process:
+def _interpreter(_forking) -> Iterator[subprocess.Popen]:
+    with interpreting(python=_forking) as process:
         yield process
 
 

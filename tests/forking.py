@@ -72,9 +72,7 @@ def run_a_scene() -> None:
     from tempfile import TemporaryDirectory
 
     from scenes import block
-    from uncompiled import quicken
 
-    quicken()
     from karamelo_py.app.cli import main
 
     with TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
@@ -88,13 +86,18 @@ def serve(path: str) -> None:
     """Fork for each that asks."""
     import gc
 
+    interpreted = os.environ.get("NUMBA_DISABLE_JIT")
+    if interpreted:
+        from uncompiled import quicken
+
+        quicken()
     import karamelo_py.app.cli
     import karamelo_py.commands
     import karamelo_py.run.loop  # noqa: F401
     from karamelo_py.script.parser import parse
 
     parse("run(1)")  # which reads the grammar
-    if os.environ.get("NUMBA_DISABLE_JIT"):
+    if interpreted:
         run_a_scene()
     gc.freeze()
     signal.signal(signal.SIGCHLD, reap)

@@ -244,10 +244,9 @@ def quicken() -> None:
     gc.set_threshold(50_000, 20, 100)  # and few cycles
 
 
-def main() -> None:
+def answer() -> None:
     """Serve requests until the input ends."""
     requests, answers = sys.stdin, sys.stdout
-    quicken()
     import karamelo_py
     from karamelo_py.app import cli
     from karamelo_py.run.element import Response
@@ -265,10 +264,11 @@ def main() -> None:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             arguments = request["arguments"]
             status = save_state(request) if "state" in request else cli.main(arguments)
-        answer = {"status": status, "out": out.getvalue(), "err": err.getvalue()}
-        answers.write(json.dumps(answer) + "\n")
+        said = {"status": status, "out": out.getvalue(), "err": err.getvalue()}
+        answers.write(json.dumps(said) + "\n")
         answers.flush()
 
 
 if __name__ == "__main__":
-    main()
+    quicken()
+    answer()
