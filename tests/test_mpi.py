@@ -46,9 +46,11 @@ def started(folder: Path, *words: str, compiled: bool = False, **more: str) -> s
     )  # fmt: skip
 
 
-def by_ranks(folder: Path, script: str | Path, ranks: int, *words: str, **more) -> tuple:
+def by_ranks(
+    folder: Path, script: str | Path, ranks: int, *words: str, program=PROGRAM, **more
+) -> tuple:
     """Exit status, output and errors of a script of so many processes."""
-    process = started(folder, *PROGRAM, str(script), "--ranks", str(ranks), *words, **more)
+    process = started(folder, *program, str(script), "--ranks", str(ranks), *words, **more)
     out, err = process.communicate(timeout=300)
     assert "Traceback" not in out + err
     return process.returncode, out, err
@@ -213,9 +215,9 @@ def test_a_step_that_is_halved(tmp_path):
 
 
 @needs_mpi
-def test_a_wrong_script(tmp_path):
+def test_a_wrong_script(tmp_path, _forking):
     path = script(tmp_path, "fix(g, gravitate, all)")
-    status, out, err = by_ranks(tmp_path, path, 2)
+    status, out, err = by_ranks(tmp_path, path, 2, program=[_forking, "-m", "karamelo_py.app.cli"])
     assert status == 1 and not out
     assert err.count("unknown fix style 'gravitate'") == 1 and "PMIX" not in err
     assert main([str(path)]) == 1
