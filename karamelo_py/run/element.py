@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -162,7 +162,7 @@ class Point:
         prescribed, target = load.prescribed, load.begin + b * (load.end - load.begin)
         increment = (b - a) * load.strain
         rigid = self._turned((b - a) * load.turn, dt)
-        latest: Any = (None, None)
+        latest: tuple = (None, None)
 
         def after(unknown: np.ndarray) -> tuple[tuple, np.ndarray] | None:
             nonlocal latest
