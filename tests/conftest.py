@@ -158,10 +158,12 @@ def tmp_path(request, tmp_path_factory) -> Path:
 def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
     """``run_script(text or path, *options, status=0, folder="run")``: compiled, in this process.
 
-    Of a path, dump pyplot writes nothing; test_dumps.py draws. Elements draw in in.element alone.
+    Of a path, dump pyplot and save_plot write nothing; test_dumps.py and test_plots.py draw.
+    Elements draw in in.element alone.
     """
     from comparisons.results import Result
     from karamelo_py.app.cli import main
+    from karamelo_py.output import plots
     from karamelo_py.run.element import Response
     from karamelo_py.styles.dumps.pyplot import PyPlot
 
@@ -174,6 +176,7 @@ def run_script(tmp_path, monkeypatch, capsys) -> Callable[..., Result]:
             # A picture takes as long as its scene at a small size: one scene draws its own.
             if isinstance(script, Path) and script.name != "in.sod":
                 patch.setattr(PyPlot, "write", lambda dump: None)
+                patch.setattr(plots, "draw", lambda *_: None)
             if not isinstance(script, Path) or script.name != "in.element":
                 patch.setattr(Response, "draw", lambda *_: None)
             result = main([str(_prepared(place, script)), *options])
