@@ -183,13 +183,13 @@ def test_values_are_published_in_one_array_that_stays():
     array = values.array
     assert values.names() == ["time", "timestep", "dt"]
     values.publish_vector("F")
-    assert [values.slot(f"F_{s}") for s in "xyzs"] == [4, 5, 6, 7]  # slot 3 has no name
+    assert [values.slot(f"F_{s}") for s in "xyzs"] == [5, 6, 7, 8]  # slots 3 and 4 have no names
     assert values.names()[3:] == ["F_x", "F_y", "F_z", "F_s", "F"]
-    assert values.publish("F_s", 2.0) == 7
-    assert array[7] == values.get("F_s") == 2.0
+    assert values.publish("F_s", 2.0) == 8
+    assert array[8] == values.get("F_s") == 2.0
     values.publish_vector("F", ("x", "s"))
     assert values.names()[3:] == ["F_x", "F_s"]
-    assert (values.slot("F_x"), values.slot("F_s")) == (4, 7)
+    assert (values.slot("F_x"), values.slot("F_s")) == (5, 8)
     with pytest.raises(ScriptError, match=str(CAPACITY)):
         for k in range(CAPACITY):
             values.publish(f"v{k}")

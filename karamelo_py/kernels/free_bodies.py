@@ -11,7 +11,7 @@ from karamelo_py.compiler.tuples import record
 from karamelo_py.kernels import arrays, rigid_links
 from karamelo_py.kernels import rigid_motion as motion
 from karamelo_py.kernels.contact import Bodies, SeparateFields, closing_part, list_pairs
-from karamelo_py.kernels.surfaces import Surface, depth, distance, encloses, nearest, slopes
+from karamelo_py.kernels.surfaces import Surface, closest, depth, encloses, place_on, slopes
 from karamelo_py.kernels.table import AtNodes, Once, each_node, each_point
 from karamelo_py.kernels.totals import CONTACT_LOSS, WORK, add_to
 from karamelo_py.kernels.touching import ASIDE, CALL, direction_of
@@ -35,7 +35,8 @@ class TouchingSurface(NamedTuple):
 
     shape: arrays.Tag
     members: np.ndarray  # (N,) bool by id
-    clear: np.ndarray  # (N,) by id: distance within which there is no face
+    # (N, 2) by id: distance within which there is no face; 1 inside, -1 outside, 0 unknown
+    clear: np.ndarray
     grip: np.ndarray  # (N, GRIP) by id; (0, GRIP) without friction
     mu: float
     slot: int  # slot of the force on points
@@ -51,21 +52,27 @@ def _stencil_of(s, points, p):
 
 
 @point_function(otherwise=True)
-def free_way(shape, kin, x, reach):
-    """Return the distance to the surface, up to `reach`, if it can save later searches; else 0."""
-    return 0.0
+def free_way(shape, kin, x, reach, side):
+    """Return the distance to the surface, up to `reach`, the side and the nearest face.
+
+    The distance is 0 if it cannot save later searches. The side is 1 inside, -1 outside; `side` is
+    the last one if no face was in the way since then, else 0.
+    """
+    return 0.0, 0.0, -1
 
 
 @free_way.on(Surface)
-def _free_way_to_faces(shape, kin, x, reach):
-    away = distance(shape, kin, x, reach)
-    return 0.0 if away >= reach and encloses(kin, shape, x) else away
+def _free_way_to_faces(shape, kin, x, reach, side):
+    square, face = closest(kin, shape, x, reach)
+    if side == 0.0:
+        side = 1.0 if encloses(kin, shape, x) else -1.0
+    return 0.0 if face < 0 and side > 0 else sqrt(square), side, face
 
 
 @noinline
 def _touched(shape, kin, x, about):
     """Return the depth at `x`, and the unit direction out (0 if unknown or the surface is far)."""
-    close, ball, reach, step, _ = about
+    close, ball, reach, step = about[:4]
     within = depth(shape, kin, x, close)
     if within <= -close:
         return within, x - x
@@ -81,11 +88,11 @@ def touched(shape, kin, x, about):
 
 @touched.on(Surface)
 def _touched_faces(shape, kin, x, about):
-    _, _, _, step, away = about
+    step, away, side, face = about[3:]
     if not 0.01 * step < away:
         return _touched(shape, kin, x, about)
-    sign = 1.0 if encloses(kin, shape, x) else -1.0  # finite differences would take six searches
-    return sign * away, (-sign / away) * (x - nearest(kin, shape, x, 1.001 * away))
+    # finite differences would take six searches
+    return side * away, (-side / away) * (x - place_on(kin, shape, face, x))
 
 
 def _is_near(body, kin, x, p, square):
@@ -113,16 +120,18 @@ def _list_point(body, surface, s, block, p):
     volume = volume_of(kin, points, law, material, p)
     ball = radius(kin, volume, x)
     close = min(move, h) + ball
-    surface.clear[number] -= move
-    if surface.clear[number] > close:
+    clear = surface.clear[number]
+    clear[0] -= move
+    if clear[0] > close:
         return False
     arm = [x[c] - state.x[c] if c < d else 0.0 for c in range(3)]
     local = motion.to_start(state, (arm[0], arm[1], arm[2]))
     y = none._make([local[c] + constants.start[c] for c in range(d)])
-    surface.clear[number] = free_way(surface.shape, kin, y, max(close, h))
-    if surface.clear[number] > close:
+    side = clear[1] if clear[0] > move else 0.0  # far enough for the point not to have passed
+    clear[0], clear[1], nearest = free_way(surface.shape, kin, y, max(close, h), side)
+    if clear[0] > close or (clear[0] > 0 and nearest < 0):
         return False
-    about = close, ball, h + ball, ASIDE * h, surface.clear[number]
+    about = close, ball, h + ball, ASIDE * h, clear[0], clear[1], nearest
     within, way = touched(surface.shape, kin, y, about)
     if way.squared() == 0:
         if within > 0 and _call(surface.lost, number) == 0:

@@ -133,18 +133,21 @@ def _from_box(kin, surface, k, x):
     return square
 
 
-def _nearer(kin, surface, k, x, best):
+def _nearer(kin, surface, k, x, found):
+    best, face = found
     first = LEAF * (k - surface.low.shape[0] // 2)
     for i in range(first, min(first + LEAF, surface.faces.shape[0])):
-        best = min(best, _squared(kin, surface, i, x))
-    return best
+        square = _squared(kin, surface, i, x)
+        if square < best:
+            best, face = square, i
+    return best, face
 
 
 @noinline
-def distance(surface, kin, x, reach):
-    """Return the distance to the nearest face, at most `reach`."""
+def closest(kin, surface, x, reach):
+    """Return the squared distance to the nearest face within `reach`, and its number, else -1."""
     leaves = surface.low.shape[0] // 2
-    best = reach * reach
+    best, face = reach * reach, -1
     k = 1
     while k < leaves:  # first descend to a near face, so that few boxes are searched
         left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
@@ -152,7 +155,7 @@ def distance(surface, kin, x, reach):
             break
         k = 2 * k if left <= right else 2 * k + 1
     if k >= leaves:
-        best = _nearer(kin, surface, k, x, best)
+        best, face = _nearer(kin, surface, k, x, (best, face))
     k = 1
     while k > 0:
         near = _from_box(kin, surface, k, x) < best
@@ -160,9 +163,14 @@ def distance(surface, kin, x, reach):
             k = 2 * k
         else:
             if near:
-                best = _nearer(kin, surface, k, x, best)
+                best, face = _nearer(kin, surface, k, x, (best, face))
             k = _behind(k)
-    return sqrt(best)
+    return best, face
+
+
+def distance(surface, kin, x, reach):
+    """Return the distance to the nearest face, at most `reach`."""
+    return sqrt(closest(kin, surface, x, reach)[0])
 
 
 def _on_line(a, b, x):
@@ -171,20 +179,21 @@ def _on_line(a, b, x):
 
 
 @point_function()
-def _place_on(kin, surface, i, x): ...
+def place_on(kin, surface, i, x):
+    """Return the closest point on face `i`."""
 
 
-@_place_on.on(KINEMATICS[1])
+@place_on.on(KINEMATICS[1])
 def _place_of_point(kin, surface, i, x):
     return _corner(kin, surface, i, 0)
 
 
-@_place_on.on(KINEMATICS[2])
+@place_on.on(KINEMATICS[2])
 def _place_on_segment(kin, surface, i, x):
     return _on_line(_corner(kin, surface, i, 0), _corner(kin, surface, i, 1), x)
 
 
-@_place_on.on(KINEMATICS[3])
+@place_on.on(KINEMATICS[3])
 def _place_on_triangle(kin, surface, i, x):
     a, b, c = (_corner(kin, surface, i, k) for k in range(3))
     normal = _cross(b - a, c - a)
@@ -199,24 +208,9 @@ def _place_on_triangle(kin, surface, i, x):
     return closest
 
 
-@noinline
 def nearest(kin, surface, x, reach):
     """Return the closest point on the nearest face, which must be within `reach`."""
-    leaves = surface.low.shape[0] // 2
-    best, face = reach * reach, 0
-    k = 1
-    while k > 0:
-        near = _from_box(kin, surface, k, x) < best
-        if near and k < leaves:
-            k = 2 * k
-        else:
-            first = LEAF * (k - leaves) if near else 0
-            for i in range(first, min(first + LEAF, surface.faces.shape[0]) if near else 0):
-                square = _squared(kin, surface, i, x)
-                if square < best:
-                    best, face = square, i
-            k = _behind(k)
-    return _place_on(kin, surface, face, x)
+    return place_on(kin, surface, closest(kin, surface, x, reach)[1], x)
 
 
 def _offset(surface, kin, x, reach):

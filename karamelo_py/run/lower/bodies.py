@@ -59,7 +59,7 @@ def _body(hub: Hub, fix: RigidBody, nodes: int) -> motion.FreeBody:
         kernel.TouchingSurface(
             touch.region.outline(),
             touch.group.has(np.arange(count)) & soft,
-            np.zeros(count),
+            np.zeros((count, 2)),
             touch.grip_of(count),
             float(touch.mu),
             hub.values.slot(f"{touch.id}_x"),
