@@ -54,6 +54,12 @@ def test_a_throw_is_exact(run_interpreted):
     assert end.y == pytest.approx(c[1] + np.sin(a) * x0 + np.cos(a) * y0)
 
 
+def test_check_takes_a_rigid_body(run_interpreted):
+    """Its fix has arrays, among which check looks for materials."""
+    result = run_interpreted(alone("velocity=(1, 0)", "b_x"), command="check")
+    assert "no solid uses" not in result.out + result.err
+
+
 def turned(r):
     """Rotation matrix of a rotation vector (Rodrigues)."""
     angle = np.linalg.norm(r)

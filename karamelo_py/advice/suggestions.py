@@ -53,9 +53,10 @@ def _unused(hub: Hub, simulation: Simulation) -> Words:
     if any(name.endswith("_exx") for name in hub.values.names()):
         return  # element tests may use materials
     materials = [*hub.materials.values()]
-    of_fixes = [value for fix in hub.fixes.values() for value in vars(fix).values()]
+    # By identity: fixes have arrays, which cannot be compared with a material.
+    of_fixes = {id(value) for fix in hub.fixes.values() for value in vars(fix).values()}
     used = {(part.kind, part.id) for m in materials for part in m.parts() if part is not m}
-    used |= {("material", m.id) for m in materials if m in of_fixes}
+    used |= {("material", m.id) for m in materials if id(m) in of_fixes}
     used |= {("material", solid.material.id) for solid in hub.solids.values()}
     for kind, catalogue in {"material": hub.materials, **hub.parts}.items():
         owner = "solid" if kind == "material" else "material"
