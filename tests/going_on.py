@@ -341,6 +341,13 @@ SCENES = {
         "dimension(", "scheme(usf)\nanti_volumetric_locking(true)\ndimension("
     ),
     "elastic laws": of_laws("tlmpm, PolyPIC, linear", ELASTIC, "true"),
+    "heat flux in shocks": block(
+        1, "fix(v, initial_velocity_particles, all, -x0)", "run(4)", size=(0.3,)
+    )
+    .replace("FLIP, linear, 1", "PolyPIC/quadratic, cubic-spline, thermo-mechanical")
+    .replace("material(rubber, linear, 2, 100, 0.3)",
+        "eos(gas, ideal-gas, 2, 5/3, p=1, Q1=1, Qh=3)\nstrength(none, fluid, 0)\n"
+        "material(rubber, eos-strength, gas, none)"),
     "rate of plastic strain": sheared(", epdot"),
     "step that varies": block(
         2, "fix(v, initial_velocity_particles, all, 5*sin(9*x0), 3)", "set_output(1)",
