@@ -611,14 +611,14 @@ class MakeFlux(NamedTuple):
         m, V = water[n, arrays.MASS], water[n, of_V]
         pushed, p = _by_pressure(nodes, kin, n, task.rim)
         per_mass, per_volume = 1 / m, 1 / V
+        if of_step:
+            momentum = [m * out[n, k] for k in range(d)]
+        else:
+            kept = m * out[n, 2 * d]
+            momentum = [again[n, k] + kept * out[n, 2 * d + 1 + k] for k in range(d)]
         for k in range(d):
-            if of_step:
-                again[n, k] = m * out[n, k]
-            else:
-                again[n, k] += m * out[n, 2 * d] * out[n, 2 * d + 1 + k]
-            j = again[n, k] * per_volume
-            flux[n, k] = j
-            across += j * water[n, of_area + k]
+            flux[n, k] = momentum[k] * per_volume
+            across += momentum[k] * per_volume * water[n, of_area + k]
         drained = is_open(nodes, n)
         if not of_step:
             enters = field(nodes.fields, GivenPressure)[n, 1] == 1 and across < 0
@@ -636,7 +636,7 @@ class MakeFlux(NamedTuple):
         for k in range(d):
             beyond = out[n, 2 * d + 1 + k]
             dragged = beyond if of_step else out[n, 2 * d] * beyond
-            w = 0.5 * ((water[n, arrays.of_momentum(kin) + k] + again[n, k]) * per_mass + dragged)
+            w = 0.5 * ((water[n, arrays.of_momentum(kin) + k] + momentum[k]) * per_mass + dragged)
             dv = nodes.update[n, arrays.of_change(kin) + k] + out[n, d + k]
             work += (w + beyond - dragged) * m * dv - w * dt * pushed[k]
         field(nodes.fields, WorkAtNodes)[n, 0] += work

@@ -81,25 +81,25 @@ def _energy_density_saturated(law, kin, state):
     return laws.energy_density(law.law, kin, state.skeleton) + stiff * state.pores * compressed
 
 
-def _trace(law, kin, state, slow):
-    """Return the trace of the two-phase wave problem, given the skeleton's c^2."""
-    # K / n ((1 - n)^2 / dry + n / rho), with one division
+def _fast_wave(law, kin, state, slow):
+    """Return a bound of c^2 of two phases without drag, which grows with `slow`, the skeleton's."""
+    # trace = slow + K / n ((1 - n)^2 / dry + n / rho), with one division
     dry = laws.specific_volume(law) * laws.jacobian(law, kin, state)
     grains, pores = 1 - law.n, state.pores * (state.pores + (1 - law.n))
-    return slow + law.K_of_waves * ((grains * grains * law.rho * dry + pores) / (pores * law.rho))
+    of_water = (grains * grains * law.rho * dry + pores) / (pores * law.rho)
+    trace = slow + law.K_of_waves * of_water
+    return trace - slow * law.K_of_waves / (law.rho * trace)
 
 
 @laws.wave_speed_squared.on(Saturated)
 def _wave_speed_squared_saturated(law, kin, state):
-    # A bound of the larger eigenvalue of the two phases that needs no root; drag slows waves.
-    slow = laws.wave_speed_squared(law.law, kin, state.skeleton)
-    trace = _trace(law, kin, state, slow)
-    return trace - slow * law.K_of_waves / (law.rho * trace)
+    return _fast_wave(law, kin, state, laws.wave_speed_squared(law.law, kin, state.skeleton))
 
 
 @laws.wave_speed_bound.on(Saturated)
 def _wave_speed_bound_saturated(law, kin, state):
-    return _trace(law, kin, state, laws.wave_speed_bound(law.law, kin, state.skeleton))
+    # The trace alone is so much larger that the root would be taken at every point.
+    return _fast_wave(law, kin, state, laws.wave_speed_bound(law.law, kin, state.skeleton))
 
 
 def _filled(law, state):
