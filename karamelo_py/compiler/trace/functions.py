@@ -171,7 +171,6 @@ class Selected(NamedTuple):
 
     key: tuple
     function: Callable
-    kinds: tuple
 
     def __call__(self, *arguments: Any) -> Any:
         function, lowering = self.function, values.now()
@@ -206,7 +205,7 @@ def chosen(dispatch: Callable, kinds: tuple) -> Selected | None:
                 one.clear()
         if key not in cached:
             function = _chosen(dispatch, kinds)
-            cached[key] = function and Selected(key, function, kinds)
+            cached[key] = function and Selected(key, function)
         return cached[key]
 
 
