@@ -58,28 +58,22 @@ class Join(NamedTuple):
 
     says = "periodic sums"
     goes_through = ("sums", "in use")
+    array = "sums"
+    fields = SummedField
 
     def at_node(task, kin, nodes, n, dt):
         if _is_lowest(task.axis, nodes, n):
-            _join(task.axis, nodes, nodes.sums, n)
+            _join(task.axis, nodes, getattr(nodes, task.array), n)
             for one in nodes.fields:
-                if isinstance(one, SummedField):
+                if isinstance(one, task.fields):
                     _join(task.axis, nodes, one.array, n)
 
 
-@node_task
-class JoinVelocity(NamedTuple):
-    axis: Axis
-
+class JoinVelocity(Join):
     says = "periodic momentum"
     goes_through = ("velocity", "in use")
-
-    def at_node(task, kin, nodes, n, dt):
-        if _is_lowest(task.axis, nodes, n):
-            _join(task.axis, nodes, nodes.velocity, n)
-            for one in nodes.fields:
-                if isinstance(one, FieldMappedAgain):
-                    _join(task.axis, nodes, one.array, n)
+    array = "velocity"
+    fields = FieldMappedAgain
 
 
 @node_task
