@@ -11,7 +11,7 @@ def compare(run, axes, full):
     """Linear functions while no point crosses a cell, tlmpm and, in full, CPDI while they do."""
     ways = {
         "linear, points stay": {"G": 1e-4},
-        "tlmpm, far deformation": {"kind": "tlmpm", "G": 0.1},
+        "tlmpm, large deformation": {"kind": "tlmpm", "G": 0.1},
     }
     if full:
         ways["CPDI R4, points cross"] = {"kind": "ulcpdi", "domains": "R4", "G": 0.1}

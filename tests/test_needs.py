@@ -24,7 +24,7 @@ from karamelo_py.compiler.trace.functions import PointFunction, forget, outdate_
 from karamelo_py.kernels.equations.fbar import NodalMean
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.step import advance
-from karamelo_py.kernels.table import companies, in_scene, take
+from karamelo_py.kernels.table import in_scene, scene_additions, take
 from karamelo_py.language.interpreter import Interpreter
 from karamelo_py.output.console import Console
 from karamelo_py.run.implicit.load_steps import LoadSteps
@@ -157,7 +157,7 @@ def test_a_kernel_has_the_code_of_what_is_there_and_no_other(run_script, monkeyp
     words, find = set(), PointFunction.find
 
     def noted(self, classes):
-        if self not in (take, in_scene, companies):
+        if self not in (take, in_scene, scene_additions):
             words.update(one.__name__ for one in classes if one)
         return find(self, classes)
 

@@ -67,7 +67,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
-        # A point of a radial scene costs as much, so one or two layers are no waste.
+        # A point of a radial scene costs as much, so one or two layers waste nothing.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
             several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):

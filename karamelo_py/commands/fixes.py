@@ -149,7 +149,7 @@ def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
                 f"'{ID}' would publish its value as '{name}', which is "
                 + MEANINGS.get(name, "a coordinate of points"),
                 argument="ID",
-                expected="an ID without another meaning",
+                expected="an ID whose published names are not in use",
                 hint=f"choose another ID, such as {ID}_1",
             )
         if name in hub.interpreter.variables:

@@ -152,7 +152,7 @@ def cast(builder: ir.IRBuilder, value: ir.Value, kind: types.Type, wanted: types
             value = builder.trunc(value, ir.VectorType(I32, of.width))  # can be converted
         return getattr(builder, conversion)(value, to)
     if register_type(of) != to:
-        raise TypeError(f"{of} is no {wanted}")
+        raise TypeError(f"{of} is not a {wanted}")
     return value
 
 

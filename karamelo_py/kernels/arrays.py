@@ -372,6 +372,8 @@ LAST = 2**62  # above any point id
 
 
 class Control(NamedTuple):
+    """Time, sums and reports of a run, which all kernels of a step read and write."""
+
     values: np.ndarray  # published values, from TIME, TIMESTEP, DT on
     clock: np.ndarray  # (1,) CLOCK; the next four are its parts
     step: np.ndarray
@@ -386,7 +388,7 @@ class Control(NamedTuple):
 
 
 def new_control(values: np.ndarray, firsts: Sequence[int] = (), d: int = 0) -> Control:
-    """Make a control with a zero clock; `firsts` are ids of the solids' first points."""
+    """Make a `Control` at time 0; `firsts` are ids of the solids' first points."""
     clock: Any = np.zeros(1, CLOCK).view(np.recarray)
     parts = clock.step, clock.motion, clock.energy, clock.heat
     clock.motion.weight = clock.motion.stride = 1.0
@@ -408,7 +410,7 @@ class Setup(NamedTuple):
     contact: Tag
     bodies: Tag  # free rigid bodies, or none
     heat: Tag
-    company: Tag  # adds tasks and quantities: pore water, rotation
+    additions: Tag  # adds tasks and quantities: pore water, rotation
     grids: Grid  # (g,) each
     nodes: Nodes
     buffers: Buffers

@@ -34,7 +34,7 @@ def kick(s: Setup) -> Number:
 
 
 def common_velocity(kin: Tag, motion: Any, template: Number) -> tuple:
-    """Return the reference velocity (d,) for speeds, in the type of `template`."""
+    """Return the velocity (d,) relative to which speeds are measured, in the type of `template`."""
     return vector(kin, [real(motion.common[0, k], template) for k in range(kin.dimension)])
 
 

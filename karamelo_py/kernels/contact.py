@@ -136,7 +136,7 @@ def work_around(kin, nodes, n):
 
 @point_function(otherwise=True)
 def stay_around(kin, bodies, pair, sides, share):
-    """Make a sticking pair's angular velocities, as used to strain points, equal."""
+    """Equalise the angular velocities that strain the points of a sticking pair."""
 
 
 @point_function(otherwise=True)

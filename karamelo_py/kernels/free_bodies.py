@@ -253,7 +253,7 @@ def _give_to_points(body, s, block, number, measures):
 
 @noinline
 def _work_on_points(body, s, block, number, now):
-    """Count the work on points, with the mean velocities in the step; `now`: those after it."""
+    """Add the work on points, with mean nodal velocities; `now` (N, d): those after the step."""
     kin, nodes, points, work = s.kin, s.nodes, block.points, 0.0
     first = arrays.of_momentum(kin)
     for i in range(body.count[0]):
@@ -279,7 +279,7 @@ def _lead_nodes(body, s):
         for n in range(s.spans[r, 0], s.spans[r, 1]):
             mass = s.nodes.sums[n, arrays.MASS]
             if n // s.contact.stride == body.field and mass > 0:
-                motion.set_lever(body, node_position(record(s.grids, body.field), n))
+                motion.set_jacobian(body, node_position(record(s.grids, body.field), n))
                 for k in range(s.kin.dimension):
                     v = motion.velocity_there(body, body.solution.u, k)
                     s.nodes.sums[n, first + k], s.nodes.update[n, k] = mass * v, v
@@ -340,8 +340,8 @@ def _follow(s, n, again):
     """Let a node of a body follow the surface that it touches, in the velocity that strains points.
 
     A light body may be faster than the surface until the gap is closed. If the surface were
-    strained by the velocity of the body, this would add more energy than the body has. `again`: v*
-    of this step is known.
+    strained by the velocity of the body, this would add more energy than the body has. `again`: the
+    updated velocity v* is known and used.
     """
     contact, nodes = s.contact, s.nodes
     for body in s.bodies.bodies:

@@ -12,7 +12,14 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import AtNodes, BeforeLoads, Company, NodeTask, Once, companies
+from karamelo_py.kernels.table import (
+    Additions,
+    AtNodes,
+    BeforeLoads,
+    NodeTask,
+    Once,
+    scene_additions,
+)
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -42,24 +49,24 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s), pores.Mapped())
 
 
-OF_MASS = Company(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
+OF_MASS = Additions(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
 OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
-BEFORE_LOADS = Company(before=(NodeTask(pores.SplitMomentum()),))
-OF_MOVE = Company(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
+BEFORE_LOADS = Additions(before=(NodeTask(pores.SplitMomentum()),))
+OF_MOVE = Additions(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
 OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWater(pores.OfStep())),))
-COMPANIES = (
+ADDITIONS = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
-    (InternalForce, Company(then=OF_FORCE)),
+    (InternalForce, Additions(then=OF_FORCE)),
     (
         MomentumAgain,
-        Company(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
+        Additions(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
     ),
-    (NodalUpdate, Company(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
+    (NodalUpdate, Additions(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, OF_MOVE),
-    (Strain, Company(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
+    (Strain, Additions(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
-SLOW_COMPANIES = ((MassMomentum, Company(then=(pores.WaterMomentum(),))),)
+SLOW_ADDITIONS = ((MassMomentum, Additions(then=(pores.WaterMomentum(),))),)
 
 
 class Water(NamedTuple):
@@ -69,9 +76,9 @@ class Water(NamedTuple):
     node_fields = pores.NODE_FIELDS
 
 
-@companies.on(Water)
-def _companies_water(tag):
-    return COMPANIES
+@scene_additions.on(Water)
+def _additions_water(tag):
+    return ADDITIONS
 
 
 def _foresee(s):
@@ -95,15 +102,15 @@ SOLVE = (
     Once(pressures.solve),
     NodeTask(pressures.AddPressure, make=_add_pressure),
 )
-COMPANIES_OF_SOLUTION = (
+ADDITIONS_OF_SOLUTION = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
-    (InternalForce, Company(then=(*OF_FORCE, pressures.SumsOfCells()))),
-    (NodalUpdate, Company(before=SOLVE)),
+    (InternalForce, Additions(then=(*OF_FORCE, pressures.SumsOfCells()))),
+    (NodalUpdate, Additions(before=SOLVE)),
     (Move, OF_MOVE_OF_STEP),
     (
         Strain,
-        Company(
+        Additions(
             before=(NodeTask(pores.MakeFlux, make=_make_flux_of_step),),
             first=(pores.Seep(),),
         ),
@@ -115,18 +122,18 @@ class SolvedWater(NamedTuple):
     """Pore water whose pressure at the end of a step is solved for."""
 
 
-@companies.on(SolvedWater)
-def _companies_solved_water(tag):
-    return COMPANIES_OF_SOLUTION
+@scene_additions.on(SolvedWater)
+def _additions_solved_water(tag):
+    return ADDITIONS_OF_SOLUTION
 
 
 class SlowWater(NamedTuple):
     """Water in load steps, with equations in `run.implicit.pore_water`."""
 
 
-@companies.on(SlowWater)
-def _companies_slow_water(tag):
-    return SLOW_COMPANIES
+@scene_additions.on(SlowWater)
+def _additions_slow_water(tag):
+    return SLOW_ADDITIONS
 
 
 impose_pore_pressure = imposing(with_pore_pressure)

@@ -113,7 +113,7 @@ class Links(NamedTuple):
     given: np.ndarray  # impulses of links
     inverse: np.ndarray  # (B + 1, 6, 6) inverse mass matrix, 0 where prescribed
     slope: np.ndarray  # (m, m + 1), right-hand side last
-    levers: np.ndarray  # (2, 3, 6): A, B
+    jacobians: np.ndarray  # (2, 3, 6): A, B
     weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, right-hand side last
 
 
@@ -181,10 +181,10 @@ def _closest_of_parts(shape, kin, x, reach):
 
 
 @noinline
-def _set_levers(links, link):
+def _set_jacobians(links, link):
     for side in range(2):
         body = link.first if side == 0 else link.second
-        A, x, centre = links.levers[side], link.at, links.states[body].x
+        A, x, centre = links.jacobians[side], link.at, links.states[body].x
         A[:] = 0.0
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
@@ -198,7 +198,7 @@ def _set_levers(links, link):
 @noinline
 def _relative(links, link, u, k):
     """Return component `k` of A U_a - B U_b."""
-    A, B, r = links.levers[0], links.levers[1], 0.0
+    A, B, r = links.jacobians[0], links.jacobians[1], 0.0
     for c in range(6):
         r += A[k, c] * u[link.first, c] - B[k, c] * u[link.second, c]
     return r
@@ -212,7 +212,7 @@ def _set_weight(links, link):
         for j in range(3):
             total = 0.0
             for side in range(2):
-                A = links.levers[side]
+                A = links.jacobians[side]
                 inverse = links.inverse[link.first if side == 0 else link.second]
                 for a in range(6):
                     for b in range(6 if A[k, a] != 0 else 0):
@@ -234,7 +234,7 @@ def _along(links, a, b):
 def _give(links, link, p, into, by_mass):
     """Add impulse `p` of a link to (B + 1, 6) impulses, or its velocity changes if `by_mass`."""
     for side in range(2):
-        A, body = links.levers[side], link.first if side == 0 else link.second
+        A, body = links.jacobians[side], link.first if side == 0 else link.second
         sign = 1.0 if side == 0 else -1.0
         for a in range(6):
             for k in range(3):
@@ -320,7 +320,7 @@ def _list_touch(links, touch, kin, dt):
 
 @noinline
 def _set_stiffness(links, link, dt):
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     _set_weight(links, link)
     along = _along(links, link.ways[0], link.ways[0])
     aside = links.weight[0, 0] + links.weight[1, 1] + links.weight[2, 2] - along
@@ -357,7 +357,7 @@ def _list_joint(links, joint, dt, kick):
         if kind == HOLD_ROTATION:
             error = _rotation_between(links, joint)
             way = [error[c] for c in range(3)]
-        _set_levers(links, link)
+        _set_jacobians(links, link)
         _set_weight(links, link)
         some = False
         for k in range(3):
@@ -396,7 +396,7 @@ def _set_spring(links, link, joint, way, times):
     for c in range(3):
         link.ways[0, c] = way[c] / length if length > 0 else 0.0
         link.stiff[c] = link.bias[c] = 0.0
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     _set_weight(links, link)
     link.constant = kick * joint.stiffness * (length - joint.length)
     link.stiff[0] = kick * joint.damping
@@ -410,7 +410,7 @@ def _set_impulse(links, link, u, bounded):
 
     With `bounded`, friction is limited by the normal impulse of an earlier pass.
     """
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     for k in range(3):
         link.slip[k], link.impulse[k] = _relative(links, link, u, k), 0.0
     if link.kind != CONTACT:
@@ -459,7 +459,7 @@ def _slope_of(link, k, j, bounded):
 
 @noinline
 def _add_slope(links, link, bounded):
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     for k in range(3):
         for j in range(3):
             slope = _slope_of(link, k, j, bounded)
@@ -471,12 +471,14 @@ def _add_slope(links, link, bounded):
                     column = links.free[link.first if other == 0 else link.second]
                     sign = slope if side == other else -slope
                     for a in range(6):
-                        if row[a] < 0 or links.levers[side, k, a] == 0:
+                        if row[a] < 0 or links.jacobians[side, k, a] == 0:
                             continue
                         for b in range(6):
                             if column[b] >= 0:
                                 links.slope[row[a], column[b]] += (
-                                    sign * links.levers[side, k, a] * links.levers[other, j, b]
+                                    sign
+                                    * links.jacobians[side, k, a]
+                                    * links.jacobians[other, j, b]
                                 )
 
 
@@ -516,7 +518,7 @@ def _add_body(links, body, n, bounded):
 
 @noinline
 def _try(links, bodies, fraction, bounded):
-    """Try `fraction` of the step in the last column of the slope; return the squared residual."""
+    """Try `fraction` of the Newton step (last column of `slope`); return the squared residual."""
     m = links.slope.shape[0]
     links.trial[:] = links.u
     for n in range(links.free.shape[0]):
@@ -616,7 +618,7 @@ def _solve(links, bodies):
 @noinline
 def _approach(links, link, dt):
     """Return the speed of approach before the step if the bodies collide in it, else 0."""
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     before = after = 0.0
     for k in range(3):
         jump = _relative(links, link, links.jump, k)
@@ -631,7 +633,7 @@ def _hit(links, link):
 
     Friction stops the slip, with an impulse of up to mu times the normal impulse.
     """
-    _set_levers(links, link)
+    _set_jacobians(links, link)
     _set_weight(links, link)
     W, n, r, p = links.weight, link.ways[0], link.slip, link.impulse
     along = square = trace = 0.0
@@ -709,7 +711,7 @@ def _collide(links, bodies, dt):
     for i in range(links.count[0]):
         link = links.rows[i]
         if link.kind == CONTACT:
-            _set_levers(links, link)
+            _set_jacobians(links, link)
             _give(links, link, link.hit, links.given, False)
     for n, body in enumerate(bodies):
         for a in range(6):
@@ -742,7 +744,7 @@ def _sum_impulses(links):
     links.given[:] = 0.0
     for i in range(links.count[0]):
         link = links.rows[i]
-        _set_levers(links, link)
+        _set_jacobians(links, link)
         _give(links, link, link.impulse, links.given, False)
 
 
@@ -760,7 +762,7 @@ def solve(links, bodies, control):
         link = links.rows[i]
         for c in range(3):
             link.impulse[c] += link.hit[c]
-        _set_levers(links, link)
+        _set_jacobians(links, link)
         _publish(link, values, kick)
     # including collisions, for published forces
     _sum_impulses(links)

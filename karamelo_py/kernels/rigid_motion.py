@@ -96,7 +96,7 @@ class Solution(NamedTuple):
     before: np.ndarray  # centre before the step, (3,)
     mass: np.ndarray  # (6, 6)
     slope: np.ndarray  # (6, 7), right-hand side last
-    lever: np.ndarray  # (3, 6): A, whose first half is the unit matrix
+    jacobian: np.ndarray  # (3, 6): A, whose first half is the unit matrix
 
 
 class FreeBody(NamedTuple):
@@ -251,9 +251,9 @@ def set_mass(body):
 
 
 @noinline
-def set_lever(body, x):
+def set_jacobian(body, x):
     """Set A (3, 6), with A U the body's velocity at `x`."""
-    A, centre = body.solution.lever, body.state[0].x
+    A, centre = body.solution.jacobian, body.state[0].x
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         A[k, 3 + i], A[k, 3 + j] = x[j] - centre[j], centre[i] - x[i]
@@ -264,7 +264,7 @@ def velocity_there(body, u, k):
     """Return component `k` of A U."""
     v = 0.0
     for a in range(6):
-        v += body.solution.lever[k, a] * u[a]
+        v += body.solution.jacobian[k, a] * u[a]
     return v
 
 
@@ -283,7 +283,7 @@ def _set_impulse(body, u, i, dt, bounded):
     """
     c = body.contacts[i]
     slip, normal = c.slip, c.normal
-    set_lever(body, c.at)
+    set_jacobian(body, c.at)
     along = square = 0.0
     for k in range(3):
         slip[k] = velocity_there(body, u, k) - c.v[k]
@@ -310,7 +310,7 @@ def residual(body, dt, u, rest, bounded):
         _set_impulse(body, u, i, dt, bounded)
         for k in range(3):
             for a in range(6):
-                total[a] += work.lever[k, a] * body.contacts[i].impulse[k]
+                total[a] += work.jacobian[k, a] * body.contacts[i].impulse[k]
     for a in range(6):
         rest[a] = total[a] - work.momentum[a]
         for b in range(6):
@@ -323,10 +323,10 @@ def residual(body, dt, u, rest, bounded):
 @noinline
 def add_slope(body, i, bounded):
     """Add A^T (dp/dr) A of contact `i` to the slope; its impulse is known."""
-    c, A, J = body.contacts[i], body.solution.lever, body.solution.slope
+    c, A, J = body.contacts[i], body.solution.jacobian, body.solution.slope
     if not (c.push > 0 or c.rub > 0):
         return
-    set_lever(body, c.at)
+    set_jacobian(body, c.at)
     stiff, slips = c.share * c.mass if c.push > 0 else 0.0, 0.0 < c.rub < c.mass
     for k in range(3):
         for j in range(3):

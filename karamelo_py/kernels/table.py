@@ -289,8 +289,8 @@ def says(row: Any, setup: Any) -> str | None:
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
-class Company(NamedTuple):
-    """Rows and tasks that accompany a task or quantity in a scene (`Setup.company`)."""
+class Additions(NamedTuple):
+    """Rows and tasks that accompany a task or quantity in a scene (`Setup.additions`)."""
 
     before: tuple = ()  # rows before it
     instead: Any = None  # replaces it
@@ -298,33 +298,33 @@ class Company(NamedTuple):
     then: tuple = ()  # in the same pass, after it
 
 
-class NoCompany(NamedTuple):
+class NoAdditions(NamedTuple):
     pass
 
 
 @point_function(otherwise=True)
-def companies(tag: Any) -> tuple:
-    """Return pairs of a class of tasks or quantities and its `Company`."""
+def scene_additions(tag: Any) -> tuple:
+    """Return pairs of a class of tasks or quantities and its `Additions`."""
     return ()
 
 
 class BeforeLoads(NamedTuple):
-    """A key of `companies` for rows before the forces of fixes."""
+    """A key of `scene_additions` for rows before the forces of fixes."""
 
 
-def company_of(tag: type, s: Setup) -> Company:
-    for kind, company in companies.find((type(s.company),))(s.company):
+def additions_of(tag: type, s: Setup) -> Additions:
+    for kind, additions in scene_additions.find((type(s.additions),))(s.additions):
         if kind in tag.__mro__:
-            return company
-    return Company()
+            return additions
+    return Additions()
 
 
 def _joined(tags: tuple, s: Setup) -> tuple:
     joined: tuple = ()
     for tag in tags:
-        company = company_of(type(tag), s)
-        instead = tag if company.instead is None else company.instead
-        joined = (*joined, *company.first, instead, *company.then)
+        additions = additions_of(type(tag), s)
+        instead = tag if additions.instead is None else additions.instead
+        joined = (*joined, *additions.first, instead, *additions.then)
     return joined
 
 
@@ -342,18 +342,18 @@ def _rows_of_scene(row, s):
 @in_scene.on(NodeTask)
 def _after_others(row, s):
     kind = row.task if row.make else type(row.task)
-    return (row,) if row.at else (*company_of(kind, s).before, row)
+    return (row,) if row.at else (*additions_of(kind, s).before, row)
 
 
 @in_scene.on(Sweep)
-def _in_company(row, s):
+def _with_additions(row, s):
     """Add the tasks that join a pass, and rows before it; F-bar adds a pass before strains."""
     averages = average_volumes(row, s) if isinstance(s.averaging, fbar.FBar) else ()
     if row.at is not None:
         return (*averages, row)
     before: tuple = ()
     for task in row.visit.tasks if row.gathers else ():
-        before = (*before, *company_of(type(task), s).before)
+        before = (*before, *additions_of(type(task), s).before)
     tasks, quantities, weights = row.visit
     visit = Visit(_joined(tasks, s), _joined(quantities, s), weights)
     return (*averages, *before, row._replace(visit=visit))
@@ -510,7 +510,7 @@ WORK_OF_LOADS = WorkOfLoads()
 CONTACT_BEFORE = SceneTask(lambda s: (*s.bodies.rows_before, *s.contact.rows_before))
 CONTACT_AFTER = SceneTask(lambda s: (*s.bodies.rows_after, *s.contact.rows_after))
 CONTACT_WORK = SceneTask(lambda s: (*s.bodies.rows_work, *s.contact.rows_work))
-BEFORE_LOADS = SceneTask(lambda s: company_of(BeforeLoads, s).before)
+BEFORE_LOADS = SceneTask(lambda s: additions_of(BeforeLoads, s).before)
 CORRECTION = SceneTask(corrected, CorrectAcceleration.says)
 AXIS = SceneTask(hold_axis, "v_r = 0 on the axis")
 SERIES = SceneTask(sum_series, "series of XPIC")

@@ -1,4 +1,4 @@
-"""Rows of a step for rotation around an axis; nodes have one component, as for heat."""
+"""Rows of a step for rotation around an axis; nodes have one such component of velocity."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ from karamelo_py.kernels.equations import twist
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.table import AtNodes, Company, NodeTask, any_node, companies
+from karamelo_py.kernels.table import Additions, AtNodes, NodeTask, any_node, scene_additions
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.transfers import stores_moment
@@ -35,18 +35,18 @@ def _task(task: Any) -> NodeTask:
 
 HELD = AtNodes(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE, at_its_nodes)
 LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=any_node)
-COMPANIES = (
-    (MassMomentum, Company(then=(twist.RotationToNodes(),))),
-    (InternalForce, Company(then=(twist.Torque(),))),
-    (MomentumAgain, Company(then=(twist.RotationAgain(),))),
+ADDITIONS = (
+    (MassMomentum, Additions(then=(twist.RotationToNodes(),))),
+    (InternalForce, Additions(then=(twist.Torque(),))),
+    (MomentumAgain, Additions(then=(twist.RotationAgain(),))),
     (
         nodes.NodalUpdate,
-        Company(before=(_task(nodes.NodalUpdate()), HELD, NodeTask(twist.PushOutwards()))),
+        Additions(before=(_task(nodes.NodalUpdate()), HELD, NodeTask(twist.PushOutwards()))),
     ),
-    (nodes.SumsToVelocity, Company(before=(_task(nodes.SumsToVelocity()), AGAIN))),
-    (nodes.MomentumToVelocity, Company(before=(_task(nodes.MomentumToVelocity()), AGAIN))),
-    (nodes.UpdateToVelocity, Company(before=(LIMITED,))),
-    (Move, Company(then=(twist.Rotate(),))),
+    (nodes.SumsToVelocity, Additions(before=(_task(nodes.SumsToVelocity()), AGAIN))),
+    (nodes.MomentumToVelocity, Additions(before=(_task(nodes.MomentumToVelocity()), AGAIN))),
+    (nodes.UpdateToVelocity, Additions(before=(LIMITED,))),
+    (Move, Additions(then=(twist.Rotate(),))),
 )
 
 
@@ -64,9 +64,9 @@ class RotatingByMoments(Rotating):
     point_fields = (*Rotating.point_fields, twist.MomentAround)
 
 
-@companies.on(Rotating)
-def _companies_rotating(tag):
-    return COMPANIES
+@scene_additions.on(Rotating)
+def _additions_rotating(tag):
+    return ADDITIONS
 
 
 def rotating(kin: Any, transfer: Any) -> tuple[Rotating, ...]:

@@ -71,7 +71,10 @@ def conserving_fraction(hub: Hub) -> float:
 
 
 def _retains_velocities(hub: Hub) -> bool:
-    """Return True if points carry velocities: FLIP and similar, no moments, not usl."""
+    """Return True if points retain velocities that the grid does not resolve.
+
+    These are FLIP and similar transfers without affine moments, in schemes other than usl.
+    """
     update = hub.update
     return (
         update.method.frame.moves

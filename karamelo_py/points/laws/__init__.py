@@ -63,7 +63,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 def can(law: NamedTuple, function: Callable) -> bool:
     """Return True if the law or a part defines the point function itself, not by a wrapped law."""
     kinds = (kind for kind in law_kind(law) if function.defined(kind))
-    return any(function.find((kind,)) not in _handing_on for kind in kinds)
+    return any(function.find((kind,)) not in _delegating for kind in kinds)
 
 
 def answered(law: NamedTuple, function: Callable) -> bool:
@@ -71,12 +71,12 @@ def answered(law: NamedTuple, function: Callable) -> bool:
     kind = type(law)
     if not function.defined(kind):
         return False
-    if function.find((kind,)) not in _handing_on:
+    if function.find((kind,)) not in _delegating:
         return True
     return any(answered(part, function) for part in law if isinstance(part, tuple))
 
 
-_handing_on: set[Callable] = set()
+_delegating: set[Callable] = set()
 
 
 @point_function(otherwise=True)
@@ -113,17 +113,17 @@ def _by_constant(value: Any) -> Callable:
     return of_constant
 
 
-def hands_on(function: Callable, outer: type) -> Callable[[Callable], Callable]:
+def delegating(function: Callable, outer: type) -> Callable[[Callable], Callable]:
     """Decorate the implementation for a wrapping law; the wrapped law must have the function."""
 
     def register(implementation: Callable) -> Callable:
-        _handing_on.add(implementation)
+        _delegating.add(implementation)
         return function.on(outer)(implementation)
 
     return register
 
 
-def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
+def delegate(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
     """Define `functions` of `outer` by the law in field `component`, with the state in `kept`.
 
     The functions take (law), (law, template), or (law, kinematics, state, ...), where `kin`
@@ -131,7 +131,7 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
     """
 
     def register(function: Callable, changes: bool) -> None:
-        @hands_on(function, outer)
+        @delegating(function, outer)
         def _of_law_within(law, *arguments):
             within = getattr(law, component)
             if len(arguments) < 2:
@@ -148,8 +148,8 @@ def hand_on(outer: type, component: str, kept: str, functions: tuple, kin: Any =
 
 
 def wraps(outer: type, component: str, kept: str, functions: tuple, kin: Any = None) -> None:
-    """Call `hand_on`, and show the columns of the inner law."""
-    hand_on(outer, component, kept, functions, kin)
+    """Call `delegate`, and show the columns of the inner law."""
+    delegate(outer, component, kept, functions, kin)
 
     @within.on(outer)
     def _within(law, kinematics, state):
@@ -190,7 +190,7 @@ def columns_of(law: NamedTuple) -> dict[str, NamedTuple]:
     for base in reversed(kind.__mro__):
         declared = _columns.get(base, {})
         own = {} if declared is None else own | declared
-    if dissipated_energy.defined(kind) and dissipated_energy.find((kind,)) not in _handing_on:
+    if dissipated_energy.defined(kind) and dissipated_energy.find((kind,)) not in _delegating:
         own.setdefault("dissipated", dissipated_energy.tag)
     return tags | own
 

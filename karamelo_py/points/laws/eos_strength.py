@@ -553,11 +553,11 @@ def _temperature_eos_strength(law, kin, state):
     return sum(state.m.heat)
 
 
-laws.hand_on(EosStrength, "eos", "", (laws.specific_volume,))
-laws.hand_on(EosStrength, "temperature", "", (laws.conductivity,))
+laws.delegate(EosStrength, "eos", "", (laws.specific_volume,))
+laws.delegate(EosStrength, "temperature", "", (laws.conductivity,))
 
 
-@laws.hands_on(laws.heat_capacity, EosStrength)
+@laws.delegating(laws.heat_capacity, EosStrength)
 def _heat_capacity_eos_strength(law, template):
     if isinstance(law.viscosity, ViscosityWithFlux):
         return real(1, template)

@@ -158,8 +158,8 @@ class YieldingByHill(OfDeformation, _Fields):
     """Constants of the law in coordinates z of elastic strain, in which flow is diagonal.
 
     With stiffness C and q^2 = T.P.T: z = V^T C^(1/2) e, where V holds the eigenvectors of C^(1/2) P
-    C^(1/2), and the rates are its eigenvalues. The energy is z.z/2, q^2 the sum of rate z^2, and
-    flow by g = dep/q divides each z by 1 + g rate.
+    C^(1/2), and the rates are its eigenvalues. The energy is z.z/2, and q^2 is the sum of rate
+    z^2. Plastic flow with g = dep/q divides each z by 1 + g rate.
     """
 
     __slots__ = ()

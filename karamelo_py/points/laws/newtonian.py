@@ -135,6 +135,6 @@ for _function in (laws.wave_speed_squared, laws.wave_speed_bound):
     _damp(_function)
 
 
-@laws.hands_on(laws.with_stress, Newtonian)
+@laws.delegating(laws.with_stress, Newtonian)
 def _with_stress_newtonian(law, kin, state, stress):
     return state._replace(solid=laws.with_stress(law.law, kin, state.solid, stress))

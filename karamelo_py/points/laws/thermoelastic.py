@@ -129,7 +129,7 @@ def _kirchhoff_stress_thermoelastic(law, kin, state):
     return of_elastic(laws.kirchhoff_stress, law, kin, state) - p * I
 
 
-laws.hand_on(
+laws.delegate(
     Thermoelastic, "elastic", "elastic", (
         laws.advance, laws.jacobian, laws.deformation, laws.by_rates, laws.specific_volume,
         laws.wave_speed_squared, laws.wave_speed_bound,
@@ -150,7 +150,7 @@ def _elastic_strain_thermoelastic(law, kin, state):
     return laws.elastic_strain(law.elastic, kin, state.elastic) - law.heat.alpha * warmer * I
 
 
-@laws.hands_on(laws.with_stress, Thermoelastic)
+@laws.delegating(laws.with_stress, Thermoelastic)
 def _with_stress_thermoelastic(law, kin, state, stress):
     elastic = symmetric_tensor(kin, stress) + expansion_pressure(law, state) * I
     return State(laws.with_stress(law.elastic, kin, state.elastic, elastic), state.T)

@@ -138,7 +138,7 @@ for _function in (laws.kirchhoff_stress, laws.cauchy_stress, laws.elastic_strain
     _in_body(_function)
 
 
-@laws.hands_on(laws.with_stress, Thin)
+@laws.delegating(laws.with_stress, Thin)
 def _with_stress_thin(law, kin, state, stress):
     s = WHOLE.Symmetric._make((*stress, *nothing(WHOLE)[len(stress) :]))
     return state._replace(whole=laws.with_stress(law.law, WHOLE, state.whole, s))

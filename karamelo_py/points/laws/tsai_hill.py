@@ -87,7 +87,7 @@ class TsaiHill(NamedTuple):
                     f"with {across:g} across and {along:g} along axis 1 some shear would never "
                     "break the solid",
                     argument="Y",
-                    expected="a strength across below twice the strength along axis 1",
+                    expected="a strength across axis 1 below twice the strength along it",
                 )
         refuse_whole(residual)
         turn = map(float, axes(*angles).ravel())

@@ -164,9 +164,9 @@ class Viscoelastic(NamedTuple):
 
     Each branch dissipates at the rate |h|^2/(2 g G tau) (column ``dissipated``), with the tangent
     shear modulus G of the elastic law along the last strain increment; this heats a material with a
-    temperature. Small strains store |h|^2/(4 g G) in a branch. In a closed cycle to a stretch of 3,
-    the reported dissipation matches the work done to within 8 %. With fix initial_stress the body
-    is fully relaxed, so its shear modulus is (1 - sum g) G.
+    temperature. At small strains a branch stores |h|^2/(4 g G). In a closed cycle to a stretch
+    of 3, the reported dissipation matches the work done to within 8 %. With fix initial_stress the
+    body is fully relaxed, so its shear modulus is (1 - sum g) G.
 
     See Also
     --------
@@ -358,7 +358,7 @@ def _stiffening(law, kin, state):
 around_elastic(Viscoelastic, _stiffening)
 
 
-@laws.hands_on(laws.with_stress, Viscoelastic)
+@laws.delegating(laws.with_stress, Viscoelastic)
 def _with_stress_viscoelastic(law, kin, state, stress):
     s = symmetric_tensor(kin, stress)
     left = 1 - relaxed_part(law.branches)

@@ -97,7 +97,7 @@ class MovingBodies:
         return float(np.linalg.norm(forces / self.lever))
 
     def couple(self, contact: sp.spmatrix, free: np.ndarray, balance: np.ndarray) -> None:
-        """Store the stiffness of contact (n, n) and the unbalanced forces (m, d) at all nodes."""
+        """Project contact stiffness (m d, m d) and unbalanced forces (m, d) onto the bodies."""
         below = self.T.T @ contact
         unknown = sp.diags(free.ravel().astype(float))
         own = (below @ self.T).tocsr()

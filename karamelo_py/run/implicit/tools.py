@@ -62,7 +62,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force; apply its mean over the step, which gives its work, to the points."""
+        """Publish the force; apply its mean over the step to the points, for the right work."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()

@@ -18,7 +18,7 @@ from karamelo_py.kernels.equations.loss import EnergyLoss, FrictionalHeat
 from karamelo_py.kernels.free_bodies import NoBodies
 from karamelo_py.kernels.heat import Conducting
 from karamelo_py.kernels.laws import law_in, law_on, law_table
-from karamelo_py.kernels.table import Insulated, NoCompany
+from karamelo_py.kernels.table import Insulated, NoAdditions
 from karamelo_py.kernels.twist import rotating
 from karamelo_py.language import registry
 from karamelo_py.language.rules import Feature, Restrictions, compare
@@ -292,12 +292,12 @@ def lower(
     traits = hub.update.scheme.traits
     tag = "tag_of_solution" if traits.solves_pressure else "tag"
     tag = "tag_in_load_steps" if traits.implicit else tag
-    company = [getattr(fluid, tag) for fluid in fluids if fluid is not None]
-    company += [*rotating(kin, transfer), NoCompany()]
+    additions = [getattr(fluid, tag) for fluid in fluids if fluid is not None]
+    additions += [*rotating(kin, transfer), NoAdditions()]
     setup = arrays.Setup(
         frame=method.frame, kin=kin, basis=basis, transfer=transfer,
         averaging=method.averaging(hub), contact=contact, bodies=bodies,
-        heat=heat, company=company[0], grids=grids, nodes=nodes,
+        heat=heat, additions=additions[0], grids=grids, nodes=nodes,
         buffers=tiles.empty_buffers(nodes, len(hub.solids)),
         blocks=tuple(resumed(one, previous) if previous else one for one in blocks),
         **no_nodes(), control=control,

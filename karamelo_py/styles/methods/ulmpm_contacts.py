@@ -97,7 +97,7 @@ class ULMPMContacts(Method):
     sums of m grad N of both solids, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4
     along each axis. The solid whose sums vary less has more weight, so a face outweighs a corner.
     If the velocity of a solid is prescribed, only the normal of this solid is used, except at the
-    end of its face. Solids that a gap along a grid axis separates are not in contact.
+    end of its face. Solids with a gap between them along a grid axis are not in contact.
 
     At a node of more than two solids, the impulses of all approaching pairs are computed from the
     same velocities, with reduced impulses for solids in several pairs; up to 16 such passes remove

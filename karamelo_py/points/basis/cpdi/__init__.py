@@ -37,9 +37,9 @@ class ConvectedDomain(NamedTuple):
     """Base of CPDI bases with 2^d corners; subclasses add `dimension` and `shape`.
 
     Affine transfers use distances of nodes from the centre sum_I N_I X_I. It differs from the point
-    if corners are beyond the grid, or if the domain is no parallelogram or parallelepiped. Angular
-    momentum is conserved about the centres; about the points it varies by 0.1 % of its variation
-    with FLIP (a spinning square, Q4).
+    if corners are beyond the grid, or if the domain is not a parallelogram or parallelepiped.
+    Angular momentum is conserved about the centres; about the points it varies by 0.1 % of its
+    variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)

@@ -76,7 +76,7 @@ class PAlphaConstants(NamedTuple):
             )
         if not ps > pe:
             raise ScriptError(
-                f"pores are gone at {ps:g} before they are crushed at {pe:g}",
+                f"all pores are closed at ps = {ps:g}, but crushing begins at pe = {pe:g}",
                 argument="ps",
                 expected="a pressure above pe",
             )
