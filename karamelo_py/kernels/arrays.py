@@ -372,8 +372,6 @@ LAST = 2**62  # above any point id
 
 
 class Control(NamedTuple):
-    """Time, sums and reports of a run, which all kernels of a step read and write."""
-
     values: np.ndarray  # published values, from TIME, TIMESTEP, DT on
     clock: np.ndarray  # (1,) CLOCK; the next four are its parts
     step: np.ndarray

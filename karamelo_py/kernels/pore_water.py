@@ -12,14 +12,7 @@ from karamelo_py.kernels.equations.move import Move
 from karamelo_py.kernels.equations.node_updates import NodalUpdate
 from karamelo_py.kernels.equations.strain import Strain
 from karamelo_py.kernels.export import imposing
-from karamelo_py.kernels.table import (
-    Additions,
-    AtNodes,
-    BeforeLoads,
-    NodeTask,
-    Once,
-    scene_additions,
-)
+from karamelo_py.kernels.table import Added, AtNodes, BeforeLoads, NodeTask, Once, scene_additions
 from karamelo_py.points.basis.linear import Linear
 from karamelo_py.points.laws.pore_water import with_pore_pressure
 
@@ -49,24 +42,24 @@ def make_flux(s):
     return pores.MakeFlux(_rim(s), pores.Mapped())
 
 
-OF_MASS = Additions(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
+OF_MASS = Added(instead=pores.MixtureMomentum(), then=(pores.WaterMomentum(),))
 OF_FORCE = pores.Drag(), pores.PoreVolumes(), pores.UnseenStrain(), pores.WaterForce()
-BEFORE_LOADS = Additions(before=(NodeTask(pores.SplitMomentum()),))
-OF_MOVE = Additions(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
+BEFORE_LOADS = Added(before=(NodeTask(pores.SplitMomentum()),))
+OF_MOVE = Added(before=(NodeTask(pores.DragWater(pores.Mapped())),), then=(pores.MoveWater(),))
 OF_MOVE_OF_STEP = OF_MOVE._replace(before=(NodeTask(pores.DragWater(pores.OfStep())),))
 ADDITIONS = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
-    (InternalForce, Additions(then=OF_FORCE)),
+    (InternalForce, Added(then=OF_FORCE)),
     (
         MomentumAgain,
-        Additions(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
+        Added(instead=pores.MixtureMomentumAgain(), then=(pores.WaterMomentumAgain(),)),
     ),
-    (NodalUpdate, Additions(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
+    (NodalUpdate, Added(before=(AT_WATER, NodeTask(pores.ShareForces, make=share_forces)))),
     (Move, OF_MOVE),
-    (Strain, Additions(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
+    (Strain, Added(before=(NodeTask(pores.MakeFlux, make=make_flux),), first=(pores.Seep(),))),
 )
-SLOW_ADDITIONS = ((MassMomentum, Additions(then=(pores.WaterMomentum(),))),)
+SLOW_ADDITIONS = ((MassMomentum, Added(then=(pores.WaterMomentum(),))),)
 
 
 class Water(NamedTuple):
@@ -105,12 +98,12 @@ SOLVE = (
 ADDITIONS_OF_SOLUTION = (
     (MassMomentum, OF_MASS),
     (BeforeLoads, BEFORE_LOADS),
-    (InternalForce, Additions(then=(*OF_FORCE, pressures.SumsOfCells()))),
-    (NodalUpdate, Additions(before=SOLVE)),
+    (InternalForce, Added(then=(*OF_FORCE, pressures.SumsOfCells()))),
+    (NodalUpdate, Added(before=SOLVE)),
     (Move, OF_MOVE_OF_STEP),
     (
         Strain,
-        Additions(
+        Added(
             before=(NodeTask(pores.MakeFlux, make=_make_flux_of_step),),
             first=(pores.Seep(),),
         ),

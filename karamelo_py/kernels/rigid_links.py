@@ -113,7 +113,7 @@ class Links(NamedTuple):
     given: np.ndarray  # impulses of links
     inverse: np.ndarray  # (B + 1, 6, 6) inverse mass matrix, 0 where prescribed
     slope: np.ndarray  # (m, m + 1), right-hand side last
-    jacobians: np.ndarray  # (2, 3, 6): A, B
+    jacobian: np.ndarray  # (2, 3, 6): A, B
     weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, right-hand side last
 
 
@@ -184,7 +184,7 @@ def _closest_of_parts(shape, kin, x, reach):
 def _set_jacobians(links, link):
     for side in range(2):
         body = link.first if side == 0 else link.second
-        A, x, centre = links.jacobians[side], link.at, links.states[body].x
+        A, x, centre = links.jacobian[side], link.at, links.states[body].x
         A[:] = 0.0
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
@@ -198,7 +198,7 @@ def _set_jacobians(links, link):
 @noinline
 def _relative(links, link, u, k):
     """Return component `k` of A U_a - B U_b."""
-    A, B, r = links.jacobians[0], links.jacobians[1], 0.0
+    A, B, r = links.jacobian[0], links.jacobian[1], 0.0
     for c in range(6):
         r += A[k, c] * u[link.first, c] - B[k, c] * u[link.second, c]
     return r
@@ -212,7 +212,7 @@ def _set_weight(links, link):
         for j in range(3):
             total = 0.0
             for side in range(2):
-                A = links.jacobians[side]
+                A = links.jacobian[side]
                 inverse = links.inverse[link.first if side == 0 else link.second]
                 for a in range(6):
                     for b in range(6 if A[k, a] != 0 else 0):
@@ -234,7 +234,7 @@ def _along(links, a, b):
 def _give(links, link, p, into, by_mass):
     """Add impulse `p` of a link to (B + 1, 6) impulses, or its velocity changes if `by_mass`."""
     for side in range(2):
-        A, body = links.jacobians[side], link.first if side == 0 else link.second
+        A, body = links.jacobian[side], link.first if side == 0 else link.second
         sign = 1.0 if side == 0 else -1.0
         for a in range(6):
             for k in range(3):
@@ -471,14 +471,12 @@ def _add_slope(links, link, bounded):
                     column = links.free[link.first if other == 0 else link.second]
                     sign = slope if side == other else -slope
                     for a in range(6):
-                        if row[a] < 0 or links.jacobians[side, k, a] == 0:
+                        if row[a] < 0 or links.jacobian[side, k, a] == 0:
                             continue
                         for b in range(6):
                             if column[b] >= 0:
                                 links.slope[row[a], column[b]] += (
-                                    sign
-                                    * links.jacobians[side, k, a]
-                                    * links.jacobians[other, j, b]
+                                    sign * links.jacobian[side, k, a] * links.jacobian[other, j, b]
                                 )
 
 

@@ -289,7 +289,7 @@ def says(row: Any, setup: Any) -> str | None:
 COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 
 
-class Additions(NamedTuple):
+class Added(NamedTuple):
     """Rows and tasks that accompany a task or quantity in a scene (`Setup.additions`)."""
 
     before: tuple = ()  # rows before it
@@ -304,7 +304,7 @@ class NoAdditions(NamedTuple):
 
 @point_function(otherwise=True)
 def scene_additions(tag: Any) -> tuple:
-    """Return pairs of a class of tasks or quantities and its `Additions`."""
+    """Return pairs of a class of tasks or quantities and its `Added`."""
     return ()
 
 
@@ -312,11 +312,11 @@ class BeforeLoads(NamedTuple):
     """A key of `scene_additions` for rows before the forces of fixes."""
 
 
-def additions_of(tag: type, s: Setup) -> Additions:
+def additions_of(tag: type, s: Setup) -> Added:
     for kind, additions in scene_additions.find((type(s.additions),))(s.additions):
         if kind in tag.__mro__:
             return additions
-    return Additions()
+    return Added()
 
 
 def _joined(tags: tuple, s: Setup) -> tuple:

@@ -9,7 +9,7 @@ from karamelo_py.kernels.equations import twist
 from karamelo_py.kernels.equations.internal_force import InternalForce
 from karamelo_py.kernels.equations.mass_momentum import MassMomentum, MomentumAgain
 from karamelo_py.kernels.equations.move import Move
-from karamelo_py.kernels.table import Additions, AtNodes, NodeTask, any_node, scene_additions
+from karamelo_py.kernels.table import Added, AtNodes, NodeTask, any_node, scene_additions
 from karamelo_py.points.kinematics import Line
 from karamelo_py.points.kinematics.twist import Twisted
 from karamelo_py.points.transfers import stores_moment
@@ -36,17 +36,17 @@ def _task(task: Any) -> NodeTask:
 HELD = AtNodes(arrays.POST_UPDATE_GRID_ROTATION, arrays.ON_UPDATE, at_its_nodes)
 LIMITED = NodeTask(nodes.UpdateToVelocity, at_its_nodes, make=any_node)
 ADDITIONS = (
-    (MassMomentum, Additions(then=(twist.RotationToNodes(),))),
-    (InternalForce, Additions(then=(twist.Torque(),))),
-    (MomentumAgain, Additions(then=(twist.RotationAgain(),))),
+    (MassMomentum, Added(then=(twist.RotationToNodes(),))),
+    (InternalForce, Added(then=(twist.Torque(),))),
+    (MomentumAgain, Added(then=(twist.RotationAgain(),))),
     (
         nodes.NodalUpdate,
-        Additions(before=(_task(nodes.NodalUpdate()), HELD, NodeTask(twist.PushOutwards()))),
+        Added(before=(_task(nodes.NodalUpdate()), HELD, NodeTask(twist.PushOutwards()))),
     ),
-    (nodes.SumsToVelocity, Additions(before=(_task(nodes.SumsToVelocity()), AGAIN))),
-    (nodes.MomentumToVelocity, Additions(before=(_task(nodes.MomentumToVelocity()), AGAIN))),
-    (nodes.UpdateToVelocity, Additions(before=(LIMITED,))),
-    (Move, Additions(then=(twist.Rotate(),))),
+    (nodes.SumsToVelocity, Added(before=(_task(nodes.SumsToVelocity()), AGAIN))),
+    (nodes.MomentumToVelocity, Added(before=(_task(nodes.MomentumToVelocity()), AGAIN))),
+    (nodes.UpdateToVelocity, Added(before=(LIMITED,))),
+    (Move, Added(then=(twist.Rotate(),))),
 )
 
 

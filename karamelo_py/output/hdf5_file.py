@@ -1,8 +1,7 @@
 """Read HDF5 files that are open, damaged, or not closed because the program was killed.
 
 The HDF5 library opens such files only in SWMR mode, in which it retries damaged data for minutes to
-years. This module passes it a header that marks the file as closed (HDF5 File Format 3.0, II.A,
-VII.B).
+years. This module passes it a header marked as closed (HDF5 File Format 3.0, II.A, VII.B).
 """
 
 from __future__ import annotations

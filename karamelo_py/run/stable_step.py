@@ -71,10 +71,7 @@ def conserving_fraction(hub: Hub) -> float:
 
 
 def _retains_velocities(hub: Hub) -> bool:
-    """Return True if points retain velocities that the grid does not resolve.
-
-    These are FLIP and similar transfers without affine moments, in schemes other than usl.
-    """
+    """Return True if points retain unresolved velocities: FLIP-like transfers, not in usl."""
     update = hub.update
     return (
         update.method.frame.moves

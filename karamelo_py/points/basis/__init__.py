@@ -23,8 +23,7 @@ class BasisTraits(NamedTuple):
     nodes_per_cell: int = 1  # 2 with mid-nodes
     # gradients jump at cell faces; points that cross add energy, less with smaller steps
     gradient_jumps: bool = False
-    # Stable Courant numbers c dt / h at low speed: in the updated frame, in the updated frame with
-    # usf, and in the total frame.
+    # Stable c dt / h at low speed: updated frame, updated frame with usf, total frame.
     courant_still: float = 1.0
     courant_strained_first: float = inf
     courant_total: float = 1.0
