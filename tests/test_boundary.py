@@ -10,7 +10,9 @@ from states import final_state, same_bits
 from tensors import KINEMATICS
 
 from comparisons.results import read_dump, read_log
+from karamelo_py.points import transfers
 from karamelo_py.points.grid import turned
+from karamelo_py.points.transfers.quadratic import PolyPICQuadratic
 
 SIZE = (0.3, 0.1, 0.1)
 MASS = {1: 2 * 0.3, 2: 2 * 0.3 * 0.1, 3: 2 * 0.3 * 0.1 * 0.1}
@@ -136,10 +138,26 @@ def test_the_gradient_of_a_reflected_point_is_a_mirror_image(d):
     L, R = np.arange(1.0, d * d + 1).reshape(d, d), np.diag([-1.0, 1.0, -1.0][:d])
     mirror_image = [R @ L @ R @ x for x in np.eye(d)]
     tensor = KINEMATICS[d - 1].Tensor
-    found = turned(tuple(np.diag(R)), tensor._make([L[place] for place in tensor.places]))
+    found = turned(tensor._make([L[place] for place in tensor.places]), tuple(np.diag(R)))
     image = np.array(mirror_image).T
     assert list(found) == [image[place] for place in tensor.places]
-    assert turned(tuple(np.diag(R)), ()) == ()
+    assert turned((), tuple(np.diag(R))) == ()
+
+
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_the_curvature_of_a_reflected_point_is_a_mirror_image(d):
+    """The mirror image of the field v = c x_i x_j is R c (R x)_i (R x)_j."""
+    kin, signs = KINEMATICS[d - 1], (-1.0, 1.0, -1.0)[:d]
+    zero = transfers.zero_moment(PolyPICQuadratic(), kin, 0.0)
+    c = np.arange(1.0, 1 + d * len(zero.curved)).reshape(-1, d)
+    found = turned(zero._replace(curved=tuple([kin.Vector._make(of) for of in c])), signs)
+    x = np.array([0.3, -0.7, 1.1][:d])
+
+    def field(curved, x):
+        pairs = [(i, j) for i in range(d) for j in range(i, d)]
+        return sum(np.array(of) * x[i] * x[j] for of, (i, j) in zip(curved, pairs, strict=True))
+
+    assert field(found.curved, x) == pytest.approx(signs * field(c, signs * x))
 
 
 @pytest.mark.parametrize("d", few((1, 2, 3), 1, 2))

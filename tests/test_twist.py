@@ -90,7 +90,8 @@ def test_a_rubber_cylinder_twists(run_interpreted, method, spin):
     ("method", "scheme"),
     parameters(
         [(TOTAL, "usl"), (SPLINES, "usf"), ("ulmpm, FLIP, cpgimp, 1", "usavg"),
-         ("tlmpm, AFLIP, quadratic-spline, 1", "musl")],
+         ("tlmpm, AFLIP, quadratic-spline, 1", "musl"),
+         ("ulmpm, PolyPIC/quadratic, cubic-spline", "musl")],
         [(TOTAL, "musl"), ("tlmpm, TFLIP, quadratic-spline, 1", "musl")],
     ),
 )  # fmt: skip

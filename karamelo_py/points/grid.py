@@ -87,11 +87,11 @@ def reflected(grid, kin, y, v, moment):
 
 @reflected.on(ReflectingGrid)
 def _reflected_reflecting_grid(grid, kin, y, v, moment):
-    signs = [turn(grid, k, y[k], v[k]) for k in range(len(y))]
+    signs = tuple([turn(grid, k, y[k], v[k]) for k in range(len(y))])
     mirrored = y._make([mirror(grid, k, a) for k, a in enumerate(y)])
     hits = tuple([abs(beyond(grid, k, a)) for k, a in enumerate(y)])
     v = v._make([sign * a for sign, a in zip(signs, v, strict=True)])
-    return mirrored, v, turned(signs, moment), hits
+    return mirrored, v, turned(moment, signs), hits
 
 
 def beyond(grid, direction, y):
@@ -112,8 +112,9 @@ def mirror(grid, direction, y):
     return where(abs(side) > 0, edge + (edge - y), y)
 
 
-def turned(signs, moment):
-    """Return R L R with R = diag(signs), or () without a moment."""
+@point_function(otherwise=True)
+def turned(moment, signs):
+    """Return the mirrored moment: R L R with R = diag(signs), or () without a moment."""
     if not len(moment):
         return moment
     pairs = zip(moment, moment.places, strict=True)

@@ -57,10 +57,10 @@ def read_text(path: Path, largest: int | None = LARGEST) -> str:
 def refuse_decimal_commas(path: Path, text: str, argument: str) -> None:
     """Raise ScriptError if a table has decimal commas between other separators."""
     for number, line in enumerate(text.splitlines(), 1):
-        data = re.search(r"\d,\d", line.partition("#")[0])
-        if data and re.search(r"[;\t]|\d,\d+ +[-+]?\d+,\d", line):
-            message = f"line {number} of {path} has decimal commas: {line.strip()}"
-            expected = "decimal points: " + line.strip().replace(",", ".")
+        row = line.partition("#")[0].strip()
+        if re.search(r"\d,\d", row) and re.search(r"[;\t]|\d,\d+ +[-+]?\d+,\d", row):
+            message = f"line {number} of {path} has decimal commas: {row}"
+            expected = "decimal points: " + row.replace(",", ".")
             raise ScriptError(message, expected=expected, argument=argument)
 
 

@@ -104,7 +104,8 @@ def rotation(pt, r):
     omega = pt.of(VelocityAround)[0, pt.p] / r
     moment = pt.load(MomentAround, (r, r))
     if len(moment):
-        moment = tensor(pt.kin.plane, (*moment, *moment))
+        affine = tensor(pt.kin.plane, (*moment, *moment))
+        moment = transfers.with_affine_part(pt.w.transfer, pt.kin, affine)
     return OnePoint(eq.mass(pt) * r * r, vector(pt.kin, (omega, omega)), moment)
 
 
@@ -246,7 +247,7 @@ class Rotate(eq.Task):
         store(pt.of(RadiusAfterMove), pt.p, (pt.y[0],))
         store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
         if len(moment):
-            store(pt.of(MomentAround), pt.p, moment[:2])
+            store(pt.of(MomentAround), pt.p, transfers.affine_part(pt.w.transfer, moment)[:2])
         for push in torque_of_force(pt):
             work = pt.w.kick * push * (at_nodes - 0.5 * change)
             increase(pt.of(WorkOfForces), pt.p, (work,))

@@ -120,6 +120,17 @@ def fraction(transfer, moment, kept):
 
 
 @point_function(otherwise=True)
+def affine_part(transfer, moment):
+    """Return the tensor of a moment, which alone is stored of an angular velocity."""
+    return moment
+
+
+@point_function(otherwise=True)
+def with_affine_part(transfer, kin, affine):
+    return affine
+
+
+@point_function(otherwise=True)
 def by_arms(transfer, inverse_d):
     """Return (a,) if the stored tensor is a sum_I N_I v*_I (X_I - x)^T, else ()."""
     return ()

@@ -12,6 +12,7 @@ from karamelo_py.compiler import where
 from karamelo_py.language.rules import Restrictions
 from karamelo_py.points import transfers
 from karamelo_py.points.basis.product import places_of
+from karamelo_py.points.grid import turned
 from karamelo_py.points.kinematics import outer, planar, vector, zero
 from karamelo_py.points.transfers import Moment, NodalMass, TransferTraits
 from karamelo_py.points.transfers.flip import take_nodal_velocity
@@ -26,14 +27,14 @@ class Quadratic(NamedTuple):
     curved: tuple  # (d,) sum N v q for each mode, r in cells
 
 
-def pairs(kin: Any) -> list[tuple[int, int]]:
-    return [(i, j) for i in range(kin.dimension) for j in range(i, kin.dimension)]
+# directions of each mode, by dimension
+PAIRS = tuple(tuple((i, j) for i in range(d) for j in range(i, d)) for d in range(4))
 
 
 class QuadraticModes(Moment):
     """Moment B of a point, then its moments of the second degree, a vector each."""
 
-    shape = staticmethod(lambda kin: kin.dimension * (kin.dimension + len(pairs(kin))))
+    shape = staticmethod(lambda kin: kin.dimension * (kin.dimension + len(PAIRS[kin.dimension])))
 
 
 class PolyPICQuadratic(NamedTuple):
@@ -88,7 +89,7 @@ def modes(node):
     of = [moments_of(line) for line in lines]
     arms = [n - line.r for line, n in zip(lines, at, strict=True)]
     found = []
-    for i, j in pairs(node.kin):
+    for i, j in PAIRS[node.kin.dimension]:
         if i == j:
             q = arms[i] * (arms[i] - of[i].skew) - of[i].second
             found.append((q, of[i].curved))
@@ -105,7 +106,7 @@ def inverse(square):
 @transfers.zero_moment.on(PolyPICQuadratic)
 def _zero_moment_quadratic(transfer, kin, template):
     none = vector(kin, [template - template] * kin.dimension)
-    return Quadratic(zero(planar(kin), template), (none,) * len(pairs(kin)))
+    return Quadratic(zero(planar(kin), template), (none,) * len(PAIRS[kin.dimension]))
 
 
 @transfers.add_moment.on(PolyPICQuadratic)
@@ -132,6 +133,25 @@ def _narrowed_quadratic(transfer, moment, kept):
 @transfers.fraction.on(PolyPICQuadratic)
 def _fraction_quadratic(transfer, moment, kept):
     return Quadratic(kept * moment.affine, tuple([kept * one for one in moment.curved]))
+
+
+@transfers.affine_part.on(PolyPICQuadratic)
+def _affine_part_quadratic(transfer, moment):
+    return moment.affine
+
+
+@transfers.with_affine_part.on(PolyPICQuadratic)
+def _with_affine_part_quadratic(transfer, kin, affine):
+    return transfers.zero_moment(transfer, kin, affine[0])._replace(affine=affine)
+
+
+@turned.on(Quadratic)
+def _turned_quadratic(moment, signs):
+    mirrored = []
+    for one, (i, j) in zip(moment.curved, PAIRS[len(signs)], strict=True):
+        of = [signs[i] * signs[j] * sign * a for sign, a in zip(signs, one, strict=True)]
+        mirrored.append(one._make(of))
+    return Quadratic(turned(moment.affine, signs), tuple(mirrored))
 
 
 take_nodal_velocity(PolyPICQuadratic)
