@@ -110,7 +110,8 @@ def pulled(run_interpreted, script, folder="run"):
 
 
 def test_a_curve_from_a_file(run_interpreted, tmp_path):
-    (tmp_path / "curve.txt").write_text("# strain, stress\n0, 0.4\n0.01 0.5\n0.1, 0.6\n0.3 0.55\n")
+    text = "# strain, stress\n0,0.4\t# 20 C; 1/s\n0.01 0.5\n0.1, 0.6\n0.3 0.55\n"
+    (tmp_path / "curve.txt").write_text(text)
     by_file = pulled(run_interpreted, PULL.format(f'tabulated, 80, "{tmp_path}/curve.txt"'), "file")
     curve = ", ".join(str(value) for value in np.ravel(POINTS))
     assert by_file == pulled(run_interpreted, PULL.format(f"tabulated, 80, {curve}"))
