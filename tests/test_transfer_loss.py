@@ -52,3 +52,27 @@ def test_the_balance_closes_with_the_loss(run_interpreted, method, scheme):
 def test_what_cannot_be_counted_is_refused(run_interpreted, method, scheme, words):
     said = run_interpreted(BAR.format(method, scheme), status=1).err
     assert re.search(rf"compute transfer_loss does not support .*{words}", said)
+
+
+LED = """
+region(end, block, 11, 12)
+group(end, particles, region, end, solid, bar)
+fix(led, velocity_particles, end, 0.02*cos(time))
+"""
+
+
+def test_steps_of_usl_with_prescribed_points_are_counted_as_musl(run_interpreted):
+    """Steps are those of musl then, and FLIP 1 loses nothing."""
+    script = BAR.format("tlmpm, FLIP, linear, 1", "usl").replace("compute(", LED + "compute(", 1)
+    result = run_interpreted(script)
+    assert abs(result.log.L[-1]) < 1e-12
+    (change,) = re.findall(r"  energy +(\S+) % of the largest", result.out)
+    assert abs(float(change)) < 0.15
+
+
+def test_the_loss_goes_on_in_another_scheme(run_interpreted):
+    """FLIP 1 with musl loses nothing, so the loss is the one of the steps of usl."""
+    script = BAR.format("tlmpm, FLIP, linear, 1", "usl") + "scheme(musl)\nrun(60)\n"
+    log = run_interpreted(script).log
+    first, last = (log.L[list(log.Step).index(step)] for step in (60, 120))
+    assert last == pytest.approx(first) and first > 1e-4

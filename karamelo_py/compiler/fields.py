@@ -84,6 +84,7 @@ class Field(NamedTuple):
 
     shape = scalar
     kept = True
+    family = ""  # a field continues the values of another one of its family in an earlier run
     start = 0.0
     columns = ()
 

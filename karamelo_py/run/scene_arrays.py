@@ -158,7 +158,7 @@ class SceneArrays:
             all_points.take(lambda points: points.x[self.now]).T,
             all_points.take(lambda points: points.v).T,
             laws,
-            {kind: all_points.declared(kind).T for kind in kept},
+            {kind.family or kind: all_points.declared(kind).T for kind in kept},
             self.setup.grids,
             {type(one): one.array for one in self.setup.nodes.fields if one.kept},
             self.setup.contact,

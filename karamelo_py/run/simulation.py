@@ -159,11 +159,7 @@ class Simulation(SceneArrays):
 
     @property
     def scheme(self) -> Tag:
-        """The scheme of the steps, which may depend on whether fixes move deformable points."""
-        scheme, fixes = self.hub.update.scheme, self.hub.fixes.values()
-        led = (fix for fix in fixes if fix.leads_points and not fix.of_rigid_points)
-        leading = scheme.traits.leading
-        return scheme if leading is None or next(led, None) is None else leading
+        return self.hub.scheme_of_steps
 
     def advance(self, count: int, between: Callable[[str], bool] | None = None) -> int:
         """Take up to `count` steps, not beyond the end time; return DONE or another status.

@@ -60,20 +60,21 @@ class StepPolicy(NamedTuple):
         }
 
 
-Carried = tuple[float, float, float]
+Carried = tuple[float, float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Return the last dt, contact dt, and path, for the next lowering."""
-    step = control.step[0]
-    return float(step.last_dt), float(step.last_contact_dt), float(control.motion[0].path)
+    """Return the last dt, contact dt, path, and loss of deleted points, for the next lowering."""
+    step, path, lost = control.step[0], control.motion[0].path, control.energy[0].lost_with_deleted
+    return float(step.last_dt), float(step.last_contact_dt), float(path), float(lost)
 
 
 def set_up(control: Control, hub: Hub, transfer: Tag, last: Carried | None) -> None:
     """Set the clock of new arrays, continuing after the `last` steps."""
     step, heat = control.step[0], control.heat[0]
     if last is not None:
-        step.last_dt, step.last_contact_dt, control.motion[0].path = last
+        step.last_dt, step.last_contact_dt, control.motion[0].path, lost = last
+        control.energy[0].lost_with_deleted = lost
     step.spacing = min(lattice.h for lattice in hub.lattices)
     heat.heat_limit = heat.heat_reference = stable_conduction(hub)
     step.kept = flip_coefficient(transfer)

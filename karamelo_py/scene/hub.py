@@ -272,6 +272,13 @@ class Hub:
         return self._simulation
 
     @property
+    def scheme_of_steps(self) -> Any:
+        """The scheme of the steps, which may depend on whether fixes move deformable points."""
+        led = (fix for fix in self.fixes.values() if fix.leads_points and not fix.of_rigid_points)
+        leading = self.update.scheme.traits.leading
+        return self.update.scheme if leading is None or next(led, None) is None else leading
+
+    @property
     def lattices(self) -> list[Lattice]:
         """Return the grids of the method; without a method, the grid of the domain."""
         key, method = self._key_of_lattices, self.update.method

@@ -28,6 +28,7 @@ from karamelo_py.points.transfers import nodal_momentum
 class TransferLoss(Field):
     """Kinetic energy that a point has lost in the transfer of velocity since the start."""
 
+    family = "transfer loss"
     work_with_update = strains_by_update = False
 
     @staticmethod

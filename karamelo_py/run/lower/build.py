@@ -67,7 +67,7 @@ class State(NamedTuple):
     places: np.ndarray
     v: np.ndarray
     laws: dict[tuple, np.ndarray]
-    fields: dict[type, np.ndarray]
+    fields: dict[type | str, np.ndarray]  # by family or class
     grids: NamedTuple
     node_fields: dict[type, np.ndarray]  # (nodes of `grids`, components)
     contact: NamedTuple
@@ -455,7 +455,7 @@ def resumed(block: arrays.Block, previous: State) -> arrays.Block:
     take(points.v, previous.v)
     take(points.state, previous.laws.get(without_rate(laws.law_kind(block.laws))))
     for one in points.fields:
-        take(one.array, previous.fields.get(type(one)))
+        take(one.array, previous.fields.get(one.family or type(one)))
     present = np.ones(len(points.id), np.bool_)
     present[old] = previous.present[ids]
     return block if present.all() else arrays.some_of(block, np.flatnonzero(present))

@@ -182,7 +182,7 @@ class LostByTransfer(Energy):
 
     @property
     def point_fields(self) -> tuple[type, ...]:  # type: ignore[override]
-        return (self.hub.update.scheme.traits.loss,)
+        return (self.hub.scheme_of_steps.traits.loss,)
 
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
