@@ -167,7 +167,7 @@ class LostByTransfer(Energy):
     loss is this work minus the change of m v^2 / 2. It is negative while points get energy back
     from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments. With
     usl it includes the damping of the scheme. Points of gases, which take this energy up as heat,
-    and of soil with pore water are not counted.
+    and of soil with pore water are not counted, nor is the loss of points that have been deleted.
 
     PIC and FLIP below 1 with musl or usavg are always counted. Otherwise this compute makes steps
     10 to 20 % slower.
