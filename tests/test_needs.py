@@ -339,6 +339,19 @@ def test_materials_that_nothing_uses(advice):
     ]
 
 
+def test_materials_of_solids_after_a_run_are_used(advice):
+    before = "material(late, linear, 1, 1, 0)\neos(water, linear, 1, 1)\nstrength(s, fluid, 0)"
+    after = """
+        material(more, eos-strength, water, s)
+        region(further, block, 7, 9, 2, 4)
+        solid(further, region, further, 1, {}, 1)
+        run(1)
+        """
+    said = advice(plane(more=before) + after.format("late"))
+    assert "late" not in said and "water" not in said
+    assert "late" in advice(plane(more=before) + after.format("more"))
+
+
 def test_what_an_included_script_shows(advice, tmp_path):
     """Also one that stands behind the run that is looked at."""
     (tmp_path / "rest.in").write_text("log_modify(custom, step, Ek)\n")

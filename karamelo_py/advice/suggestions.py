@@ -50,14 +50,16 @@ def _unread(hub: Hub, simulation: Simulation) -> Words:
 
 
 def _unused(hub: Hub, simulation: Simulation) -> Words:
-    if any(name.endswith("_exx") for name in hub.values.names()):
-        return  # element tests may use materials
-    materials = [*hub.materials.values()]
-    # By identity: fixes have arrays, which cannot be compared with a material.
-    of_fixes = {id(value) for fix in hub.fixes.values() for value in vars(fix).values()}
-    used = {(part.kind, part.id) for m in materials for part in m.parts() if part is not m}
-    used |= {("material", m.id) for m in materials if id(m) in of_fixes}
-    used |= {("material", solid.material.id) for solid in hub.solids.values()}
+    used = set()
+    for scene in (hub, hub.at_end or hub):
+        if any(name.endswith("_exx") for name in scene.values.names()):
+            return  # element tests may use materials
+        materials = [*scene.materials.values()]
+        # By identity: fixes have arrays, which cannot be compared with a material.
+        of_fixes = {id(value) for fix in scene.fixes.values() for value in vars(fix).values()}
+        used |= {(part.kind, part.id) for m in materials for part in m.parts() if part is not m}
+        used |= {("material", m.id) for m in materials if id(m) in of_fixes}
+        used |= {("material", solid.material.id) for solid in scene.solids.values()}
     for kind, catalogue in {"material": hub.materials, **hub.parts}.items():
         owner = "solid" if kind == "material" else "material"
         for ID in (ID for ID in catalogue if (kind, ID) not in used):

@@ -215,6 +215,7 @@ class Hub:
         self.pausing = False  # stops before runs, for a Python program that controls them
         self.open_ended = False  # a Python program may add commands after the script
         self.in_runs: list[Any] = []
+        self.at_end: Hub | None = None  # the scene at the end of the script, in a check
         self.interpreter: Any = None
         self.restart: Any = None  # restart file, until the script has rebuilt the scene
         self.domain: Any = None
@@ -349,6 +350,7 @@ class Hub:
             if other is not self:
                 self.interpreter.rehearse(other)
                 self.later = other.later
+                self.at_end = other if self.checking else None
             self._tell_of_late(other)
 
     def lasting(self) -> list[Any]:
