@@ -498,6 +498,24 @@ run(30)
 """
 
 
+AGAIN = (
+    CUBE.format(region="skin")
+    .replace("1.2, 2.8, 1.2, 2.8, 1.2, 2.8", "1.2, 2.8, 1.2, 2.8, 0.9, 2.5")
+    .replace("velocity=(0.1, 0, -1)", "velocity=(0, 0, 0)")
+    .replace("run(30)", "group(a, particles, region, below, solid, a)\nset_dt(0.01)\nrun(14)\n")
+)
+
+
+def test_points_that_enter_again_touch_at_once(run_interpreted, tmp_path):
+    """In the step before, they were far from the surface, and were not searched for some steps."""
+    (tmp_path / "run").mkdir()
+    points, triangles = cube_surface(1.2, 2.8)
+    stl = tmp_path / "run" / "cube.stl"
+    write(stl, points - [0, 0, 0.3], {"triangle": triangles}, binary=True)
+    log = run_interpreted(AGAIN + "deactivate(a)\nactivate(a)\nrun(1)\n").log
+    assert log.f_z[1] < 0 and log.f_z[14] == 0 and log.f_z[15] < 0
+
+
 HULL = (
     CUBE.format(region="skin")
     .replace("(0.1, 0, -1)", "(0.1, 0, 0), spin=(0, 0, 2)")
