@@ -33,6 +33,7 @@ def do(said: list[str]) -> int:
 
     from karamelo_py.app.start import main
     from karamelo_py.compiler.disk import cache
+    from karamelo_py.language import registry
 
     cache._began = time.time()  # sources that are older are those that this process has read
 
@@ -42,6 +43,7 @@ def do(said: list[str]) -> int:
     os.environ.update(word.split("=", 1) for word in words[: int(count)])
     del words[: int(count)]
     sys.path[:0] = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    registry.forget()  # other packages may offer styles here
     while words[0] == "-W":
         action, _, message = words[1].partition(":")
         warnings.filterwarnings(action, message)

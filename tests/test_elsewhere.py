@@ -159,7 +159,6 @@ def test_a_queue_of_jobs(folder, monkeypatch, queue, submit, cancel):
     monkeypatch.setenv("PATH", f"{folder / 'bin'}:{os.environ['PATH']}")
     dask.config.refresh()  # defaults of dask-jobqueue that the end of an earlier set has removed
     job = {"cores": 1, "memory": "1GB", "interface": "lo", "python": REAL, "death-timeout": 30}
-    job["worker-extra-args"] = ["--no-nanny"]  # which would start a second process
     with dask.config.set({f"jobqueue.{queue}.{name}": value for name, value in job.items()}):
         assert main(["sweep", "in.lin", *WORDS, "-jobs", "1", "-on", queue, "-o", "far.csv"]) == 0
     (script,) = folder.glob("job.*.sh")

@@ -293,6 +293,7 @@ STEP = np.dtype([
 MOTION = np.dtype([
     ("rate", np.float64),  # max over points of c + max |v_i - common_i|
     ("new_rate", np.float64),  # rate found in the last sweep
+    ("closing", np.float64),  # rate of the first step if cells close at the speed of their points
     ("common", np.float64, (1, 3)),  # reference velocity for speeds
     ("weight", np.float64),  # weight of the common drift; 1: `common` is 0
     ("wave", np.float64),  # wave speed when `common` was measured

@@ -62,7 +62,8 @@ def choose_dt(control: Control) -> None:
     if motion.weight > 1:
         # The drift may have rotated since it was measured; `speed` is an upper bound.
         motion.rate = max(motion.rate, motion.wave + motion.speed * step.spacing)
-    limit = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
+    rate = max(motion.rate, motion.closing)
+    limit = step.courant * step.spacing / rate if rate > 0 else inf
     dt = min(step.dt_factor * limit, step.heat_factor * heat.heat_limit)
     if motion.weight != 1 and motion.speed * dt > STRIDE:
         dt = STRIDE / motion.speed
@@ -104,7 +105,7 @@ def finish(control: Control) -> None:
     motion.path += motion.move
     motion.pace = max(motion.pace, motion.move)
     motion.speed = motion.move / dt if dt > 0 else 0.0
-    motion.move = 0.0
+    motion.move = motion.closing = 0.0
     if motion.path > STILL:
         step.courant, step.dt_factor = step.courant_moving, step.dt_factor_moving
     choose_dt(control)

@@ -203,21 +203,21 @@ def advance(kind: StepKind, s: Setup, hooks: Tag, count: int) -> int:
 def _fastest(frame, kin, points, laws, control):
     points, laws = at_hand(points), at_hand(laws)
     motion = control.motion[0]
-    rate, first = 0.0, control.step[0].last_dt == 0
+    rate, closing, first = 0.0, 0.0, control.step[0].last_dt == 0
     common = clocks.common_velocity(kin, motion, motion.rate)
     for p in range(points.mass.size):
         law, state = state_at(kin, points, laws, p)
         f = deformation_of(frame, kin, points, (law, state), p)
         shorter = inverse_stretch_squared(frame, kin, f, points.mass[p])
         v = (load_vector(kin, points.v, p) - common).largest()
+        rate = max(rate, sqrt(wave_speed_squared(law, kin, state) * shorter) + v)
         if first:
             state = meeting(law, state, v)
-        speed = sqrt(wave_speed_squared(law, kin, state) * shorter)
-        rate = max(rate, speed + v)
-    motion.rate = max(motion.rate, rate)
+            closing = max(closing, sqrt(wave_speed_squared(law, kin, state) * shorter) + v)
+    motion.rate, motion.closing = max(motion.rate, rate), max(motion.closing, closing)
 
 
 def measure(s: Setup) -> None:
-    s.control.motion[0].rate = 0.0
+    s.control.motion[0].rate = s.control.motion[0].closing = 0.0
     for block in s.blocks:
         _fastest(s.frame, s.kin, block.points, block.laws, s.control)

@@ -267,7 +267,8 @@ def ruling_limit(state: SceneState) -> str:
     dt, heat = state.control.values[DT], state.control.heat[0]
     if step.fixed_dt > 0:
         return "set_dt"
-    waves = step.courant * step.spacing / motion.rate if motion.rate > 0 else inf
+    rate = max(motion.rate, motion.closing)
+    waves = step.courant * step.spacing / rate if rate > 0 else inf
     of_waves, of_heat = step.dt_factor * waves, step.heat_factor * heat.heat_limit
     if motion.weight != 1 and motion.speed * dt * (1 + 1e-9) >= STRIDE:
         return "speed"
@@ -276,12 +277,12 @@ def ruling_limit(state: SceneState) -> str:
     if of_heat < of_waves:
         return "conduction"
     speed = state.fastest(motion.common[0])
-    if speed > 0.5 * motion.rate:
+    if speed > 0.5 * rate:
         return "speed"
     undeformed = [elastic_speed(state, solid) for solid in state.hub.solids.values()]
     without = max(wave for wave, _ in undeformed)
     slowed = any(viscous for _, viscous in undeformed)
-    if slowed and 0 < without < (motion.rate - speed) / SLOWED:
+    if slowed and 0 < without < (rate - speed) / SLOWED:
         return "viscosity"
     own = state.hub.update.scheme.traits.solves_pressure
     if step.courant < corrected_share(state.hub) and not own:

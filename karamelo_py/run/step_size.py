@@ -182,14 +182,15 @@ class StepSize:
         simulation, motion = self.simulation, self.motion
         motion.common[:] = common_velocity(simulation, weight)
         measure(simulation.setup)
-        motion.rate = simulation.comm.allreduce_max(np.array([motion.rate]))[0]
+        rates = simulation.comm.allreduce_max(np.array([motion.rate, motion.closing]))
+        motion.rate, motion.closing = rates
 
     def rate_with(self, weight: float) -> float:
         motion = self.motion
-        common, rate = motion.common.copy(), float(motion.rate)
+        before = motion.common.copy(), float(motion.rate), float(motion.closing)
         self._measure(weight)
         other = float(motion.rate)
-        motion.common[:], motion.rate = common, rate
+        motion.common[:], motion.rate, motion.closing = before
         return other
 
     @property
@@ -199,7 +200,7 @@ class StepSize:
     @property
     def limit_moving(self) -> float:
         """Stable step of points that cross cells, to which fractions in scripts refer."""
-        step, rate = self.step, self.motion.rate
+        step, rate = self.step, max(self.motion.rate, self.motion.closing)
         waves = step.courant_moving * step.spacing / rate if rate > 0 else np.inf
         return float(min(waves, self.control.heat[0].heat_limit))
 
