@@ -25,7 +25,7 @@ class Body(NamedTuple):
 class BasicFacts:
     def __init__(self, hub: Hub, simulation: Simulation, duration: float):
         self.hub, self.simulation = hub, simulation
-        self.duration = duration if isfinite(duration) else 300 * simulation.dt
+        self.duration = duration if isfinite(duration) else 300 * simulation.steps.later_dt
         self.method, self.scheme = hub.update.method, hub.update.scheme
         self.transfer, self.basis = hub.update.transfer, self.method.basis
         self.basis_name = self.method.basis_name

@@ -78,7 +78,8 @@ def drift_of(facts: BasicFacts) -> Noise | None:
             speed, cells = free_speed / facts.waves, path
     if not cells:
         return None
-    return Noise(cells * facts.simulation.dt * facts.waves / facts.spacing / bound, speed, cells)
+    courant = facts.simulation.steps.later_dt * facts.waves / facts.spacing
+    return Noise(cells * courant / bound, speed, cells)
 
 
 def _thrown(facts: BasicFacts) -> bool:
@@ -96,7 +97,7 @@ def turn_of(facts: BasicFacts) -> Noise | None:
     turns = facts.moments or (facts.moves and facts.kept > 0.9)
     if not (facts.scheme.traits.conserving and turns and facts.d > 1) or facts.hub.domain.kin.hoops:
         return None
-    limits, dt, most = drift_limits(facts.basis), facts.simulation.dt, None
+    limits, dt, most = drift_limits(facts.basis), facts.simulation.steps.later_dt, None
     bound = (limits.rim_averaged if facts.scheme.traits.allows_drift else limits.rim)[facts.sparse]
     for body in vibrating(facts):
         spin, reach = body.motion.spin, body.motion.reach

@@ -261,7 +261,7 @@ def scouted(hub: Hub, lines: Sequence[str]) -> Scouted | None:
         run, simulation = reached.run, other.simulation
         simulation.begin(run.end_time)
         steps = inf if run.steps is None else run.steps
-        duration = min(run.end_time - simulation.time, steps * simulation.dt)
+        duration = min(run.end_time - simulation.time, steps * simulation.steps.later_dt)
         return Scouted(other, simulation, duration)
     return None
 

@@ -103,9 +103,10 @@ def _is_water_at_rest(fix: Fix) -> bool:
 
 def warn_about_length(hub: Hub, simulation: Simulation, end_time: float) -> None:
     span = end_time - simulation.time
-    if not (isfinite(span) and span > ENDLESS * simulation.dt > 0):
+    dt = simulation.steps.later_dt
+    if not (isfinite(span) and span > ENDLESS * dt > 0):
         return
-    about = f"about {span / simulation.dt:.2g} steps of {simulation.dt:.3g} from here to time"
+    about = f"about {span / dt:.2g} steps of {dt:.3g} from here to time"
     why, hint = mixed_units(hub, simulation), UNITS
     if hub.update.fixed_dt is not None:
         why, hint = "", "a larger step with set_dt, or an earlier end"

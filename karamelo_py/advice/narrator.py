@@ -43,7 +43,7 @@ class Narrator(Listener):
             self._tell_of_end(run, simulation)
             return
         steps = inf if run.steps is None else run.steps
-        duration = min(run.end_time - simulation.time, steps * simulation.dt)
+        duration = min(run.end_time - simulation.time, steps * simulation.steps.later_dt)
         if simulation.implicit:
             known_failures.warn_about_factor(hub)
             known_failures.warn_about_steps_of_1(hub, simulation.time, steps)

@@ -84,7 +84,7 @@ def uneven(facts: BasicFacts) -> Uneven:
     Because of a heavy point at a node of mostly light mass, the stable step is shorter by the
     factor sqrt(rho_light / rho_heavy).
     """
-    most, dt = Uneven(), facts.simulation.dt
+    most, dt = Uneven(), facts.simulation.steps.later_dt
     if not (facts.moves and facts.linear and facts.waves > 0 and dt * STEPS < facts.duration):
         return most
     bodies = vibrating(facts)

@@ -75,7 +75,7 @@ def report(hub: Hub, end_time: float = inf) -> None:
         if (step := own_step_instead_of(simulation)) is not None:
             say(f"own dt         {words_of_own_step(simulation, step)}")
         say(f"limited by     {words_of_limit(simulation)}")
-        if (n := (end_time - simulation.time) / simulation.dt) < inf:
+        if (n := (end_time - simulation.time) / simulation.steps.later_dt) < inf:
             one = seconds_of_step(hub, simulation.count)
             after = step_after_motion(simulation)
             most = f" ({n / after:.0f} if points move from the start)" if after < 1 else ""

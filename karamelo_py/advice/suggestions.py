@@ -68,7 +68,7 @@ def _unused(hub: Hub, simulation: Simulation) -> Words:
 
 def _output(hub: Hub, simulation: Simulation) -> Words:
     span = simulation.control.step[0].end_time - hub.update.time
-    steps = span / simulation.dt
+    steps = span / simulation.steps.later_dt
     if not np.isfinite(steps):
         return
     count = sum(solid.count for solid in hub.solids.values())

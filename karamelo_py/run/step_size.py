@@ -194,6 +194,14 @@ class StepSize:
         return other
 
     @property
+    def later_dt(self) -> float:
+        """The step after the first one, which is shorter if cells may close (`motion.closing`)."""
+        motion, dt = self.motion, self.simulation.dt
+        if self.step.fixed_dt > 0 or not 0 < motion.rate < motion.closing:
+            return dt
+        return dt * float(motion.closing / motion.rate)
+
+    @property
     def limit(self) -> float:
         return float(self.step.limit)
 
