@@ -54,10 +54,8 @@ def count_loss(pt, v, dv, moment):
     lost = pt.of(TransferLoss)
     if lost is None or laws.is_rigid(pt.w.laws):
         return
-    (kind,) = [type(one) for one in pt.w.points.fields if isinstance(one, TransferLoss)]
-    old, moments = pt.v, (eq.moment(pt), moment)
-    if not kind.work_with_update:
-        moments = tuple([for_second_mapping(pt, one) for one in moments])
+    kind, old = _kind(pt), pt.v
+    moments = _again(kind, pt, (eq.moment(pt), moment))
     if pt.w.transfer.traits.series:
         dv = _change(pt, dv)
     gone = 0.5 * dot(dv - (v - old), old + v)
@@ -70,10 +68,38 @@ def count_loss(pt, v, dv, moment):
     increase(lost, pt.p, (pt.w.points.mass[pt.p] * gone,))
 
 
-def count_rotation(pt, r, change, before, after):
-    """Add the energy lost in the velocity around an axis; angular velocities at radius `r`."""
-    gone = 0.5 * r * r * (change - (after - before)) * (before + after)
-    increase(pt.of(TransferLoss), pt.p, (pt.w.points.mass[pt.p] * gone,))
+def count_rotation(pt, before, after, change, around):
+    """Add the energy lost in the velocity around an axis.
+
+    Points `before` and `after` the step have the inertia, angular velocity (twice) and moment;
+    ``around(node)`` returns w, w* and its change at a node.
+    """
+    lost = pt.of(TransferLoss)
+    if lost is None:
+        return
+    kind, zero = _kind(pt), after.v - after.v
+    old, new = before.v[0], after.v[0]
+    gone = 0.5 * (change - (new - old)) * (old + new)
+    moments = _again(kind, pt, (before.moment, after.moment))
+    for node in pt.nodes if len(after.moment) else ():
+        for one in moments:
+            gone += 0.5 * around(node)[2] * _velocity(pt, node, zero, one)[0]
+    for node in pt.nodes if kind.strains_by_update else ():
+        omega, _, more = around(node)
+        gone += more * (node.N * omega - _velocity(pt, node, after.v, after.moment)[0])
+    increase(lost, pt.p, (after.mass * gone,))
+
+
+def _kind(pt):
+    (kind,) = [type(one) for one in pt.w.points.fields if isinstance(one, TransferLoss)]
+    return kind
+
+
+def _again(kind, pt, moments):
+    """Return moments as in the second mapping of velocities, if there is one."""
+    if kind.work_with_update:
+        return moments
+    return tuple([for_second_mapping(pt, one) for one in moments])
 
 
 def _velocity(pt, node, v, moment):

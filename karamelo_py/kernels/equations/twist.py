@@ -219,6 +219,13 @@ def _increment_at_twisted(kin, pt, gradient):
     return times_radius(increment(pt.dt, gradient), pt.of(RadiusAfterMove)[0, pt.p], f)
 
 
+def rotation_at(node):
+    """Return w, w* and its change at a node."""
+    zero = node.N - node.N
+    (omega,) = row(node.of(AngularVelocity), node.i, 0, (zero,))
+    return omega, *row(node.of(UpdateAround), node.i, 0, (zero, zero))
+
+
 class Rotate(eq.Task):
     """Gathers w* and its change; updates the velocity around the axis and the angle."""
 
@@ -240,14 +247,17 @@ class Rotate(eq.Task):
 
     def updated(task, pt, total, totals, fastest):
         (at_nodes, change, moment), r = total, pt.of(RadiusAfterMove)[0, pt.p]
-        old = pt.of(VelocityAround)[0, pt.p] / r
-        new = transfers.updated_velocity(pt.w.transfer, old, at_nodes, change)
-        count_rotation(pt, r, change, old, new)
+        before = rotation(pt, r)
+        new = transfers.updated_velocity(pt.w.transfer, before.v[0], at_nodes, change)
+        affine = transfers.affine_part(pt.w.transfer, moment)
+        moment = transfers.with_affine_part(pt.w.transfer, pt.kin, affine)
+        after = before._replace(v=vector(pt.kin, (new, new)), moment=moment)
+        count_rotation(pt, before, after, change, rotation_at)
         store(pt.of(VelocityAround), pt.p, (r * r * new / pt.y[0],))
         store(pt.of(RadiusAfterMove), pt.p, (pt.y[0],))
         store(pt.of(AngleAround), pt.p, (pt.of(AngleAround)[0, pt.p] + pt.dt * at_nodes,))
         if len(moment):
-            store(pt.of(MomentAround), pt.p, transfers.affine_part(pt.w.transfer, moment)[:2])
+            store(pt.of(MomentAround), pt.p, affine[:2])
         for push in torque_of_force(pt):
             work = pt.w.kick * push * (at_nodes - 0.5 * change)
             increase(pt.of(WorkOfForces), pt.p, (work,))
