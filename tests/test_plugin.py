@@ -830,6 +830,17 @@ def test_wrong_names_of_classes_next_to_the_script(tmp_path, site, wrong, said):
     assert done.returncode == 1 and said in done.stderr and "in.file:8" in done.stderr
 
 
+def test_the_loss_of_a_scheme_of_a_plug_in_is_not_known(run_interpreted):
+    text = VIBRATION.partition("compute(")[0].replace("{law}", "linear, rho, E, 0")
+    text += "scheme(plain-usl)\nset_dt(0.04)\nrun(60)\n"
+    text = re.sub("FLIP, ([a-z]+), [0-9.]+", r"FLIP, \1, 0.9", text)
+    done = run_interpreted(text)
+    assert "  energy " in done.out and "lost by transfer" not in done.out
+    compute = "compute(lost, transfer_loss, all)\nset_dt("
+    said = run_interpreted(text.replace("set_dt(", compute), status=1).err
+    assert "compute transfer_loss does not support scheme plain-usl" in said
+
+
 def test_rubber_of_a_plug_in_is_the_built_in(run_interpreted):
     """A law of F in Python: the same stress along three paths as by its energy."""
     paths = {"pull": "exx=1, syy=0, szz=0", "sheet": "exx=0.6, eyy=0.4, szz=0", "shear": "gxy=0.8"}

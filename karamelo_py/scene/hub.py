@@ -150,16 +150,17 @@ class Update:
     @property
     def point_fields(self) -> tuple[type, ...]:
         before = (VelocityBefore,) if self.half_start else ()
-        return (*before, self.scheme.traits.loss) if self.loses_in_transfer else before
+        loss = self.scheme.traits.loss
+        return (*before, loss) if loss and self.loses_in_transfer else before
 
     @property
     def loses_in_transfer(self) -> bool:
         """Return True if the loss of the transfer is counted without being asked for."""
-        transfer = self.transfer
-        if transfer is None or self.scheme.traits.implicit:
+        transfer, loss = self.transfer, self.scheme.traits.loss
+        if transfer is None or self.scheme.traits.implicit or loss is None:
             return False
         # Other losses need a further loop over the nodes of each point.
-        further = stores_moment(transfer) or self.scheme.traits.loss.work_with_update
+        further = stores_moment(transfer) or loss.work_with_update
         further = further or transfer.traits.series
         return not further and flip_coefficient(transfer) < 1
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.strain import Strain
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.schemes.traits import SchemeTraits
 
 
@@ -20,6 +21,7 @@ class MUSL(NamedTuple):
 
     traits = SchemeTraits(
         maps_velocity_again=True,
+        loss=TransferLoss,
         conserving=((0.9, 0.9), (0.4, 0.2), (0.2, 0.2)),  # docs/energy.md
     )
     rows = (

@@ -41,7 +41,7 @@ class SchemeTraits(NamedTuple):
     damps: bool = False
     # solves for the pore pressure at the end of a step
     solves_pressure: bool = False
-    # energy that points lose in the transfer (`kernels.equations.transfer_loss`)
-    loss: type = TransferLoss
+    # energy that points lose in the transfer (`kernels.equations.transfer_loss`); None: not known
+    loss: type[TransferLoss] | None = None
     # returns the parameters that damp vibrations, as text
     damping: Callable[[Any], str] = lambda scheme: ""

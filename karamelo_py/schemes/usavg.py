@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from karamelo_py.kernels import table
 from karamelo_py.kernels.equations.strain import SecondStrain, Strain
+from karamelo_py.kernels.equations.transfer_loss import TransferLoss
 from karamelo_py.schemes.traits import SchemeTraits
 
 
@@ -20,6 +21,7 @@ class USAVG(NamedTuple):
 
     traits = SchemeTraits(
         strained_before=0.5,
+        loss=TransferLoss,
         allows_drift=True,
         conserving=((0.9, 0.9), (0.9, 0.5), (0.45, 0.45)),  # docs/energy.md
     )
