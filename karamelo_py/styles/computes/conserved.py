@@ -188,9 +188,11 @@ class LostByTransfer(Energy):
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
         # Passes of other schemes already scatter to the sums of which XPIC needs the old values.
-        schemes = {"scheme": ("musl", "usavg")} if self.hub.update.transfer.traits.series else {}
-        if self.hub.update.scheme.traits.loss is None:  # a scheme of a plug-in
-            schemes = {"scheme": ("musl", "usavg", "usf", "usl")}
+        schemes: dict[str, tuple[str, ...]] = {}
+        if self.hub.update.transfer.traits.series:
+            schemes["scheme"] = "musl", "usavg"
+        elif self.hub.update.scheme.traits.loss is None:  # a scheme of a plug-in
+            schemes["scheme"] = "musl", "usavg", "usf", "usl"
         instead = "no compute transfer_loss"
         return Restrictions("transfer_loss", instead, only=schemes, without=("implicit",))
 
