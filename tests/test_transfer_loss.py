@@ -98,3 +98,19 @@ def test_the_loss_goes_on_in_another_scheme(run_interpreted):
     log = run_interpreted(script).log
     first, last = (log.L[list(log.Step).index(step)] for step in (60, 120))
     assert last == pytest.approx(first) and first > 1e-4
+
+
+@pytest.mark.parametrize("scheme", ["usl", "usf"])
+def test_few_points_that_touch(run_interpreted, scheme):
+    """So few scatter directly to the nodal sums, in the pass that counts the loss."""
+    touch = """
+region(other, block, 13, 15)
+solid(other, region, other, 2, rubber, 1)
+group(other, particles, region, other, solid, other)
+fix(w, initial_velocity_particles, other, -0.2)
+fix(c, contact/friction, bar, other, 0.3)
+"""
+    script = BAR.format("ulmpm/contacts, FLIP, linear, 1", scheme)
+    result = run_interpreted(script.replace("compute(", touch + "compute(", 1))
+    (change,) = re.findall(r"  energy +(\S+) % of the largest", result.out)
+    assert abs(float(change)) < 0.15

@@ -501,6 +501,7 @@ LOSS = SceneTask(
     "kinetic energy that the nodes lose, as heat to the points",
 )
 COMPANY = SceneTask(at_nodes_with(NodalMass, loss.KeepMass()))
+OF_LOSS = SceneTask(at_nodes_with(loss.MassInStep, loss.KeepMassInStep()))
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in a pass over the points")
 CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
@@ -536,6 +537,7 @@ UPDATE = (
     FRICTION,
     LOSS,
     COMPANY,
+    OF_LOSS,
     HEAT,
     BEFORE_LOADS,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),

@@ -13,10 +13,11 @@ Usl strains by v*, not by w: forces at nodes do the work f dt . (v* - w) that no
 usl count the work of contact with (v_i + v*) / 2, which is too much by half of that.
 """
 
+from karamelo_py.compiler import real
 from karamelo_py.compiler.fields import Field, increase
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.arrays import MASS, of_momentum, vector_at
-from karamelo_py.kernels.equations.loss import OnePoint
+from karamelo_py.kernels.equations.loss import MassInStep, OnePoint
 from karamelo_py.kernels.equations.mass_momentum import ContactImpulse, for_second_mapping
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import dot
@@ -122,8 +123,9 @@ def _not_taken(kind, node, v, again):
     impulse, (star, dv) = node.of(ContactImpulse), node.v_star(v)
     work = v[0] - v[0]
     if impulse is not None:
-        mass = node.w.nodes.sums[node.i, MASS]
-        by_contact = vector_at(node.kin, impulse, node.i, 0, v) / mass
+        mass = node.of(MassInStep)[node.i, 0]
+        impulse = vector_at(node.kin, impulse, node.i, 0, v)
+        by_contact = impulse / max(mass, real(1e-36, mass))
         work += 0.5 * dot(by_contact, node.N * star - again)
         dv = dv - by_contact
     if kind.strains_by_update:

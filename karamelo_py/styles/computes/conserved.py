@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from karamelo_py.kernels.equations.loss import MassInStep
 from karamelo_py.language.rules import Restrictions
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.units import ENERGY, Powers
@@ -184,6 +185,10 @@ class LostByTransfer(Energy):
     def point_fields(self) -> tuple[type, ...]:  # type: ignore[override]
         loss = self.hub.scheme_of_steps.traits.loss
         return () if loss is None else (loss,)
+
+    @property
+    def node_fields(self) -> tuple[type, ...]:  # type: ignore[override]
+        return (MassInStep,) if self.point_fields[0].work_with_update else ()
 
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
