@@ -188,7 +188,7 @@ class LostByTransfer(Energy):
 
     @property
     def node_fields(self) -> tuple[type, ...]:  # type: ignore[override]
-        return (MassInStep,) if self.point_fields[0].work_with_update else ()
+        return (MassInStep,) * any(loss.work_with_update for loss in self.point_fields)
 
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
