@@ -66,7 +66,7 @@ def state_of(hub: Hub) -> dict[str, np.ndarray]:
     nodes = hub.fields.node("mass")
     arrays["nodal mass"] = nodes.sum()
     arrays |= {"-".join(k.__name__ for k in kind): a.T for kind, a in state.laws.items()}
-    arrays |= {kind.__name__: a.T for kind, a in state.fields.items()}
+    arrays |= {getattr(kind, "__name__", kind): a.T for kind, a in state.fields.items()}
     return arrays
 
 

@@ -194,7 +194,7 @@ def test_xpic_of_the_first_order_is_pic(state_interpreted, scheme):
             "scheme(musl)", f"scheme({scheme})"
         )
         states.append(state_interpreted(text))
-    states[0].pop("TransferLoss", None)  # of XPIC, only if a compute asks for it
+    states[0].pop("transfer loss", None)  # of XPIC, only if a compute asks for it
     assert states[0].keys() == states[1].keys()
     for name, array in states[0].items():
         assert np.array_equal(array, states[1][name]), name
