@@ -35,6 +35,16 @@ def test_a_loss_without_contact_is_told(run_interpreted):
     assert "contact_loss 'L' stays 0: the scene has no contact" in run_interpreted(script).err
 
 
+def test_a_loss_of_one_solid_is_told(run_interpreted):
+    script = HIT.format(basis="linear", scheme="musl", law="steel", motion="", more="")
+    lines = [x for x in script.splitlines() if "soft" not in x and not x.startswith("fix(f")]
+    text = "\n".join(x for x in lines if not x.startswith(("group(a", "compute(A")) and "L, T" not in x)
+    text = text.replace("run(4)", "fix(v, velocity_particles, b, 0.1, 0)\nrun(1)")
+    said = run_interpreted(text).err
+    assert "contact_loss 'L' stays 0" in said
+    assert "transfer_loss 'T' stays 0: all points are gas, rigid or soil with pore water" in said
+
+
 FREE = "fix(b, rigid_body, b, velocity=(0.2, -0.9), spin=0.1)"
 THROWN = "fix(v, initial_velocity_particles, b, 0.2 - 0.1*(y0 - 5.2), -0.9 + 0.1*(x0 - 5))"
 LED = "fix(v, velocity_particles, b, 0.2, -0.9)"

@@ -131,6 +131,7 @@ class LostByContact(Compute):
 
     published = ("",)
     unit = ENERGY
+    restrictions = Restrictions("contact_loss", "no compute contact_loss", without=("implicit",))
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -144,7 +145,7 @@ class LostByContact(Compute):
     def refresh(self) -> None:
         hub = self.hub
         touching = [fix for fix in hub.fixes.values() if fix.presses or fix.touches or fix.solids]
-        no_contact = not (touching or hub.update.method.fields_per_solid)
+        no_contact = not (touching or (hub.update.method.fields_per_solid and len(hub.solids) > 1))
         if no_contact and hub.update.first_time("contact loss"):
             hub.warn(
                 f"compute contact_loss '{self.id}' stays 0: the scene has no contact",
@@ -180,6 +181,16 @@ class LostByTransfer(Energy):
 
     published = ("",)
     measured = "transfer loss"
+
+    def refresh(self) -> None:
+        super().refresh()
+        if not self.hub.counts_transfer and self.hub.update.first_time("transfer loss"):
+            self.hub.warn(
+                f"compute transfer_loss '{self.id}' stays 0: all points are gas, rigid or soil with "
+                "pore water, whose loss is not counted",
+                mark=self.mark,
+                hint="remove this compute",
+            )
 
     @property
     def point_fields(self) -> tuple[type, ...]:  # type: ignore[override]
