@@ -205,7 +205,8 @@ def words_of_error(hub: Hub, fraction: float, counted: bool) -> str:
         if collides(hub):
             takers.append("collisions")
         by = f"; {' and '.join(takers)} {'dissipates' if len(takers) == 1 else 'dissipate'} energy"
-        by += " (compute transfer_loss measures it)" * (of_transfer in takers and hub.counts_transfer)
+        if of_transfer in takers and hub.counts_transfer:
+            by += " (compute transfer_loss measures it)"
     # The sum of losses may exceed the largest energy.
     fraction = round(fraction, 2) + 0.0  # prints no -0.00
     much = f"{fraction:+.2f} % of" if fraction > -100 else f"{fraction / 100:+.2f} times"

@@ -186,8 +186,8 @@ class LostByTransfer(Energy):
         super().refresh()
         if not self.hub.counts_transfer and self.hub.update.first_time("transfer loss"):
             self.hub.warn(
-                f"compute transfer_loss '{self.id}' stays 0: all points are gas, rigid or soil with "
-                "pore water, whose loss is not counted",
+                f"compute transfer_loss '{self.id}' stays 0: all points are gas, rigid or soil "
+                "with pore water, whose loss is not counted",
                 mark=self.mark,
                 hint="remove this compute",
             )
