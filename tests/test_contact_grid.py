@@ -364,6 +364,7 @@ MESSAGES = {
     "negative": ("fix(f, contact/friction, a, b, -0.1)", "-0.1"),
     "unknown": ("fix(f, contact/friction, a, c, 0.1)", "unknown solid 'c'"),
     "no second solid": ("fix(f, contact/friction, a, 0.1)", "solid2 is missing"),
+    "a word like it": ("fix(f, contact/friction, a, b, noslip)", "did you mean 'no-slip'?"),
     "no coefficient": ("fix(f, contact/friction, a, b)", "mu|no-slip is missing"),
 }
 

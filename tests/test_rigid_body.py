@@ -213,6 +213,8 @@ MISTAKES = {
     "spin=1": ("inertia=-1", "no body has", "above 0"),
     "fixed=(x)": ("fixed=(z)", "no direction 'z'", "some of x, y, rz"),
     "gravity=(0, -1)": ("gravity=(0, 0, -1)", "3 components", "2 formulas"),
+    "gravity=(0, -9.81)": ("gravity=(0, -9,81)", "3 components", "with a decimal point: -9.81"),
+    "gravity=(0, -3)": ("gravity=-3", "1 component", "2 formulas\nhint: such as (0, -3)"),
     "gravity=(0, 1)": ("pivot=(2, 3), velocity=(1, 0)", "pivot already holds the body", "spin=..."),
     "motion=(1, 0)": ("motion=(1, 0), fixed=(x)", "motion prescribes it", "one of the two"),
     "velocity=(0, 1)": ("velocity=(0, 1), motion=(NULL, 2)", "motion sets 2", "NULL or 2 for y"),

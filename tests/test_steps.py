@@ -139,6 +139,12 @@ def test_the_program_chooses_the_step_again_after_set_dt(run_interpreted):
     assert log.dt == pytest.approx([0.003, 0.003, 0.003, own, own], rel=1e-6)
 
 
+def test_set_dt_after_a_run_does_not_warn_of_the_factor_of_that_run(run_interpreted):
+    factor, fixed = "dt_factor(0.5)", ("set_dt(0.003)", "run(1)")
+    assert "has no effect" in run_interpreted(block(1, factor, *fixed)).err
+    assert "has no effect" not in run_interpreted(block(1, factor, "run(1)", *fixed)).err
+
+
 def test_as_many_steps_as_fit():
     """17500 additions of 2e-4 are not quite 3.5; there is no step more for that."""
     control = new_control(np.zeros(3))

@@ -91,7 +91,7 @@ def set_dt(hub: Hub, dt: Annotated[float, Positive] | None) -> None:
     if dt is None:
         return
     hub.values.set("dt", dt)
-    if hub.update.dt_factor is not None:
+    if hub.update.dt_factor is not None and not hub.begun:
         _warn_of_factor(hub)
 
 

@@ -138,7 +138,7 @@ def swapped(
     return None
 
 
-def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | None:
+def comma_in_number(arguments: Sequence[Argument], surplus: int) -> str | None:
     """Suggest 0.5 for 0,5, and 12500 for 12,500.
 
     A comma counts as a decimal comma if the line has blanks after its other commas, or if the
@@ -149,7 +149,7 @@ def comma_in_number(arguments: Sequence[Argument], error: ScriptError) -> str | 
         if one.mark.column + one.mark.length + 1 == two.mark.column
         and one.text.lstrip("+-").isdigit() and two.text.isdigit()
     ]  # fmt: skip
-    exact = len(adjacent) == error.surplus
+    exact = len(adjacent) == surplus
     if not adjacent or not (exact or ", " in adjacent[0][0].mark.text):
         return None
     if not exact and any(
@@ -172,6 +172,16 @@ def in_parentheses(arguments: Sequence[Argument]) -> str | None:
             return (
                 f"with a decimal point: {name}={first}.{two.text}; {vector}" if decimal else vector
             )
+    return None
+
+
+def decimal_of_name(arguments: Sequence[Argument], wrong: ScriptError) -> str | None:
+    """Suggest x=0.5 for x=0,5 if the 5 is the wrong argument."""
+    for one, two in pairwise(arguments):
+        named, begins = one.keyword(), one.mark.column + one.mark.length + 1
+        touching = two.mark == wrong.mark and begins == two.mark.column
+        if named and touching and named[1].text.lstrip("+-").isdigit() and two.text.isdigit():
+            return f"with a decimal point: {named[0]}={named[1].text}.{two.text}"
     return None
 
 

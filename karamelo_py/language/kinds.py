@@ -351,6 +351,8 @@ def _union(kinds: list[Kind]) -> Kind:
                 return kind.convert(hub, argument)
             except (Unfit, ScriptError) as error:
                 last = error
+        if isinstance(last, ScriptError) and last.code == "unknown-name":
+            last.hint = meant(last.name or "", words) or last.hint
         raise last or Unfit(argument.text)
 
     return Kind(" or ".join(kind.text for kind in kinds), convert, words, nullable)

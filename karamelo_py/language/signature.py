@@ -152,7 +152,9 @@ def call(
     except ScriptError as error:
         for wrong in () if error.complete else (error, *error.others):
             if not wrong.code.startswith("unknown-"):
-                wrong.hint = explain.comma_in_number(arguments, wrong) or wrong.hint
+                wrong.hint = explain.comma_in_number(arguments, wrong.surplus) or wrong.hint
+            if wrong.code == "argument":
+                wrong.hint = explain.decimal_of_name(arguments, wrong) or wrong.hint
             if wrong.surplus:
                 wrong.hint = explain.in_parentheses(arguments) or wrong.hint
             if wrong.code == "arguments" and wrong.hint is None and (gap := with_gap(arguments)):

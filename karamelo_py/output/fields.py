@@ -403,6 +403,8 @@ def unknown_column(message: str, name: str, names: Iterable[str], **where: Any) 
             last = name[-1].translate(str.maketrans("123", "xyz"))
             error.alike = f"u{last}" if last in "xyz" else "ux"
             error.hint = f"did you mean '{error.alike}'?"
+    if name in ("pore_pressure", "saturation"):
+        error.hint = "only points of a material with pore_water(...) have this column"
     if name[:2] in ("v_", "c_"):  # as in LAMMPS
         error.hint = f"log_modify(custom, step, time, {name[2:]}) writes one number"
     return error

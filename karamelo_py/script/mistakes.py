@@ -222,7 +222,7 @@ def _comma(at: _Stop) -> Mistake:
     before = at.last
     if before is None or before in ("(", ",") or before.type in _OPERATORS:
         return at.mistake("something is missing before this comma")
-    digits = re.match(r"\s*([\d.]+)", at.code[at.end :]) if before.type == "NUMBER" else None
+    digits = re.match(r"\s*(\d+([eE][+-]?\d+)?)", at.code[at.end :]) if before.isdigit() else None
     return at.mistake(
         "a comma separates the arguments of a call; there is no call here",
         "an operator or the end of the expression",
@@ -264,11 +264,10 @@ def _side_by_side(at: _Stop) -> Mistake:
             hint = f"a power of 10 is written {before}e6"
         elif re.fullmatch(r"(_\d+)+", here):
             hint = f"digits are not grouped: {before}{here.replace('_', '')}"
-        elif (
-            unit := re.fullmatch("([kMG]|m(?=.))?(Pa|N|m|s|J|W|Hz|K)", here)
-        ) and "e" not in before:
+        elif unit := re.fullmatch("([kMG]|m(?=.))?(kg|Pa|N|m|s|J|W|Hz|K)", here):
             factor = {"k": "e3", "M": "e6", "G": "e9", "m": "e-3"}.get(unit[1], "")
-            hint = f"numbers have no units: {before}{factor}"
+            times = "*1" if factor and "e" in before.lower() else ""
+            hint = f"numbers have no units: {before}{times}{factor}"
         return Mistake(message, start, end, "an operator, such as *", hint)
     if len(at.before) == 1 and before.type == "NAME":
         words = [word.strip(",") for word in code[at.start :].strip().rstrip(",").split()]

@@ -9,6 +9,7 @@ from karamelo_py.kernels import rigid_motion as kernel
 from karamelo_py.kernels.equations import RigidSums
 from karamelo_py.kernels.free_bodies import GRIP
 from karamelo_py.language.arguments import NULL
+from karamelo_py.language.explain import comma_in_number
 from karamelo_py.language.rules import Restrictions, known_failure
 from karamelo_py.language.signature import Argument, NonNegative, Positive
 from karamelo_py.output.point_table import PointTable
@@ -310,11 +311,16 @@ class RigidBody(Fix):
         items: list[Expression | None] = [None] * size
         if components is None:
             return items
-        if len(components.items) != len(ways):
+        parts = components.argument.listed()
+        if len(parts) != len(ways):
             noun = "formulas" if len(ways) != 1 else "formula"
             expected = f"{len(ways)} {noun}" if ways else "nothing: it does not rotate here"
-            raise _wrong(components.argument, plural(len(components.items), "component"), expected)
-        parts = components.argument.listed()
+            error = _wrong(components.argument, plural(len(parts), "component"), expected)
+            if ", " in components.argument.text:
+                error.hint = comma_in_number(parts, len(parts) - len(ways))
+            elif len(parts) == 1 and ways:
+                error.hint = f"such as ({'0, ' * (len(ways) - 1)}{parts[0].text})"
+            raise error
         for way, item, part in zip(ways, components.items, parts, strict=True):
             items[way % 3] = item
             if item is None:
