@@ -297,6 +297,7 @@ def advice(lowered):
             heat=[SimpleNamespace(heat_limit=inf)],
         )
         known = {"dt": dt, "limit": limit, "control": control, "implicit": False}
+        known["steps"] = SimpleNamespace(later_dt=dt)
         found = suggestions(hub, SimpleNamespace(**known, fastest=lambda: 0.0))
         return "\n".join(f"{suggestion.reason} / {suggestion.cure}" for suggestion in found)
 
@@ -777,7 +778,8 @@ def test_output_that_takes_longer_than_the_steps(lowered):
     """35 000 steps of 416 points take 1.5 s; a line of the log 0.5 ms."""
     hub = lowered(INPUTS / "in.two_disks")
     step = SimpleNamespace(end_time=35.0)
-    simulation = SimpleNamespace(dt=0.001, control=SimpleNamespace(step=[step]))
+    steps = SimpleNamespace(later_dt=0.001)
+    simulation = SimpleNamespace(steps=steps, control=SimpleNamespace(step=[step]))
     assert not [*output(hub, simulation)]
     hub.output.log.every = 1
     ((said, _),) = output(hub, simulation)
