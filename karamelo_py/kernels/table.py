@@ -500,8 +500,7 @@ LOSS = SceneTask(
     at_nodes_with(loss.EnergyLoss, loss.KeepLoss()),
     "kinetic energy that the nodes lose, as heat to the points",
 )
-COMPANY = SceneTask(at_nodes_with(NodalMass, loss.KeepMass()))
-OF_LOSS = SceneTask(at_nodes_with(loss.MassInStep, loss.KeepMassInStep()))
+NODAL_MASS = SceneTask(at_nodes_with(NodalMass, loss.KeepMass()))
 AVERAGED = SceneTask(average_stress, "force of the averaged mean stress in a pass over the points")
 CONTACT = SceneTask(
     lambda s: (*s.bodies.rows_first, *s.contact.rows, *s.bodies.rows_last), "contact of v*"
@@ -536,8 +535,7 @@ UPDATE = (
     SEAM,
     FRICTION,
     LOSS,
-    COMPANY,
-    OF_LOSS,
+    NODAL_MASS,
     HEAT,
     BEFORE_LOADS,
     AtNodes(arrays.POST_PARTICLES_TO_GRID, arrays.ON_SUMS),

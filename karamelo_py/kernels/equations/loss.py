@@ -65,22 +65,12 @@ class KeepLoss(NamedTuple):
             lost[n, 2] = mass
 
 
-class MassInStep(StepField):
-    """Mass at the nodes, for passes that already scatter the sums of the next step."""
-
-
 @node_task
 class KeepMass(NamedTuple):
     goes_through = ("sums", "nodal mass")
-    kind = transfers.NodalMass
 
     def at_node(task, kin, nodes, n, dt):
-        field(nodes.fields, task.kind)[n, 0] = nodes.sums[n, MASS]
-
-
-class KeepMassInStep(KeepMass):
-    goes_through = ("sums", "mass in step")
-    kind = MassInStep
+        field(nodes.fields, transfers.NodalMass)[n, 0] = nodes.sums[n, MASS]
 
 
 @node_task

@@ -83,11 +83,11 @@ class Move(Task):
 def towards_walls(pt, moment):
     """Return the part of the moment that a point retains at a wall, where D may vanish.
 
-    The limit is for isolated points. If nodal masses are known, it is less for points in company.
+    The limit is for isolated points. Some transfers retain more if other points are near.
     """
     kept = retained(pt.w.basis, pt.stencil) if len(moment) else ()
-    mass = field(pt.w.nodes.fields, transfers.NodalMass)
-    if kept and mass is not None:
+    if kept and pt.w.transfer.traits.by_company:
+        mass = field(pt.w.nodes.fields, transfers.NodalMass)
         own = pt.w.points.mass[pt.p]
         share, least = own - own, real(1e-36, own)
         for node in pt.nodes:

@@ -17,13 +17,13 @@ from karamelo_py.compiler import real
 from karamelo_py.compiler.fields import Field, increase
 from karamelo_py.kernels import equations as eq
 from karamelo_py.kernels.arrays import MASS, of_momentum, vector_at
-from karamelo_py.kernels.equations.loss import MassInStep, OnePoint
+from karamelo_py.kernels.equations.loss import OnePoint
 from karamelo_py.kernels.equations.mass_momentum import ContactImpulse, for_second_mapping
 from karamelo_py.points import laws
 from karamelo_py.points.kinematics import dot
 from karamelo_py.points.laws.eos import taken_heat
 from karamelo_py.points.laws.pore_water import Saturated
-from karamelo_py.points.transfers import nodal_momentum
+from karamelo_py.points.transfers import NodalMass, nodal_momentum
 
 
 class TransferLoss(Field):
@@ -123,7 +123,7 @@ def _not_taken(kind, node, v, again):
     impulse, (star, dv) = node.of(ContactImpulse), node.v_star(v)
     work = v[0] - v[0]
     if impulse is not None:
-        mass = node.of(MassInStep)[node.i, 0]
+        mass = node.of(NodalMass)[node.i, 0]
         impulse = vector_at(node.kin, impulse, node.i, 0, v)
         by_contact = impulse / max(mass, real(1e-36, mass))
         work += 0.5 * dot(by_contact, node.N * star - again)

@@ -25,6 +25,8 @@ class TransferTraits(NamedTuple):
     share_in_total: float = 1.0
     # fractions of the stable step of isolated points in flowing material, with musl and with usl
     lone_shares: tuple[float, float] = (1.0, 1.0)
+    # points retain more of their gradients at walls if other points are near
+    by_company: bool = False
     restrictions: Restrictions | None = None
 
 
@@ -35,7 +37,7 @@ class Moment(Field):
 
 
 class NodalMass(StepField):
-    """Mass at the nodes, for transfers that treat isolated points separately."""
+    """Mass at the nodes in this step, for passes that already scatter the sums of the next."""
 
 
 def flip_coefficient(transfer) -> float:

@@ -60,6 +60,7 @@ class PolyPICQuadratic(NamedTuple):
         # A dam break with three points per cell gained energy at 0.6 and 0.4 of the stable step of
         # isolated points, and ran to its end with 0.4 and 0.25.
         lone_shares=(0.4, 0.25),
+        by_company=True,
         restrictions=Restrictions(
             "transfer PolyPIC/quadratic", "APIC",
             only={"method": ("ulmpm", "ulmpm/contacts"), "basis": ("cubic-spline",)},

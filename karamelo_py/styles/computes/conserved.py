@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from karamelo_py.kernels.equations.loss import MassInStep
 from karamelo_py.language.rules import Restrictions
 from karamelo_py.output.point_table import PointTable
 from karamelo_py.output.units import ENERGY, Powers
 from karamelo_py.points.kinematics import total
 from karamelo_py.points.kinematics.twist import Twisted
+from karamelo_py.points.transfers import NodalMass
 from karamelo_py.scene.group import ParticleGroup
 from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import Compute, Fix
@@ -199,7 +199,7 @@ class LostByTransfer(Energy):
 
     @property
     def node_fields(self) -> tuple[type, ...]:  # type: ignore[override]
-        return (MassInStep,) * any(loss.work_with_update for loss in self.point_fields)
+        return (NodalMass,) * any(loss.work_with_update for loss in self.point_fields)
 
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
