@@ -195,7 +195,7 @@ class StepSize:
 
     @property
     def later_dt(self) -> float:
-        """The step after the first one, which is shorter if cells may close (`motion.closing`)."""
+        """Size of later steps; the first one is shorter if cells may close (`motion.closing`)."""
         motion, dt = self.motion, self.simulation.dt
         if self.step.fixed_dt > 0 or not 0 < motion.rate < motion.closing:
             return dt
