@@ -15,7 +15,7 @@ def shape(snapshots):
     """Height of the points at the end, and the diameter at the waist, in mm."""
     first, last = snapshots[0], snapshots[-1]
     radius, height = 1e3 * np.hypot(last.x, last.y), 1e3 * last.z
-    # The outermost points lie inside the surface by as much as at the start.
+    # The outermost points are as far inside the surface as at the start.
     margin = R0 - 1e3 * np.hypot(first.x, first.y).max()
     waist = radius[np.abs(height - 0.2 * L0) < 0.02 * L0].max() + margin
     return height, 2 * waist

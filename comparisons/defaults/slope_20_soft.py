@@ -1,4 +1,4 @@
-"""A block slides down an elastic slope of 20 degrees, with the friction 0.2."""
+"""A block slides down an elastic slope of 20 degrees, with a friction coefficient of 0.2."""
 
 from comparisons.slopes import slope
 
