@@ -41,7 +41,7 @@ def describe_parameter(parameter: Parameter) -> str:
     family, text, default = parameter.kind.family, parameter.kind.text, parameter.default
     if parameter.keyword and parameter.optional and default is None:
         text = text.removesuffix(" or NULL")
-    if text == "anything":  # the command or style checks the value
+    if text == "anything":  # the command or style itself checks the value
         return ""
     parts = ["one of " + ", ".join(registry.names(family)) if family else text]
     if parameter.variadic and parts[0].startswith("one of "):
@@ -264,7 +264,7 @@ def _arguments(word: str) -> dict[str, Parameter]:
     parameters = {}
     for family in families():
         for name in registry.names(family):
-            with suppress(ScriptError):  # broken plug-ins
+            with suppress(ScriptError):  # plug-ins may be broken
                 help_ = help_of(family, name)
                 for parameter in help_.parameters:
                     if word == parameter.name or word in parameter.kind.words:
@@ -290,7 +290,7 @@ class _Page(Console):
     def _write(self, text: str) -> None:
         super()._write(text)
         if self._broken:
-            raise BrokenPipeError  # nothing else is left to do
+            raise BrokenPipeError  # ends quietly: nothing else is left to do
 
     def heading(self, text: str) -> None:
         self.say()

@@ -156,7 +156,7 @@ def _dispatch(arguments: list[str]) -> int:
             )
         return launch.ERROR
     options.command_line = arguments
-    if options.act is not _run:  # `_run` calls `begun` after its imports
+    if options.act is not _run:  # `_run` itself calls `begun`, after its imports
         begun()
     with ExitStack() as options.ends:
         return options.act(options)
@@ -359,7 +359,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.input and options.script:
         raise ScriptError(f"two scripts: {options.script} and {script}", expected="one script")
     if launched()[0] > 1 and not options.checking:
-        with leaving_at_once():  # before MPI starts
+        with leaving_at_once():  # set before MPI starts
             import_module("karamelo_py.scene.hub")
         return launch.together(
             options.ranks, lambda comm: _carry_out(options, script, comm), debugging=options.debug

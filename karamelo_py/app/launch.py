@@ -56,7 +56,7 @@ GRACE = 2.0  # seconds after the end of mpiexec in which processes must end
 AT_ONCE = 3  # number of signals after which processes are killed
 LONGEST_FOLDER = 70  # characters, since names of sockets must be short
 A_CORE = 16  # processes per core; a larger number is a mistake
-# Seconds until a failed process ends the others. In this time, rank 0 can report the error.
+# Seconds until a failed process ends the others. Meanwhile, rank 0 can report the error.
 PATIENCE, LONGER = 2.0, 6.0
 
 
@@ -125,7 +125,7 @@ def launch(ranks: int, arguments: Sequence[str], module: str = "karamelo_py.app.
 class Launcher:
     def __init__(self, ranks: int, command: list[str], name: str, said: BinaryIO):
         self.ranks, self.command, self.name, self.said = ranks, command, name, said
-        self.links: dict[socket.socket, Message] = {}  # empty until the rank is known
+        self.links: dict[socket.socket, Message] = {}  # empty message until the rank is known
         self.reports: dict[int, Message] = {}
         self.lost: list[Message] = []  # processes that ended without a report, in order
         self.over = False
@@ -147,7 +147,7 @@ class Launcher:
             end = time.monotonic() + GRACE
             while self.links and time.monotonic() < end:
                 self._listen()
-            for one in filter(None, self.links.values()):  # connections that are still open
+            for one in filter(None, self.links.values()):  # connections still open
                 with suppress(ProcessLookupError):
                     os.kill(one["pid"], signal.SIGKILL)
         status = self._outcome()
@@ -337,7 +337,7 @@ def together(
         return end(status, text, tells=True, stays=True)
     patience = inf
     if not status and rank == 0:
-        _report(over=True)  # reported before it waits for the others
+        _report(over=True)  # reports before it waits for other processes
     if status:
         patience = LONGER if rank else PATIENCE
         if status == INTERRUPTED or comm.failed_within:

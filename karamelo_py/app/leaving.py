@@ -5,7 +5,7 @@ An interrupt during an import can raise any exception.
 
 import os
 
-SIGNALLED = 128  # exit status: this, plus the number of the signal
+SIGNALLED = 128  # exit status minus the number of the signal
 INTERRUPTED = SIGNALLED + 2
 
 
@@ -57,7 +57,7 @@ class leaving_at_once:
     def __enter__(self) -> None:
         try:
             self.before = signal.signal(signal.SIGINT, _leave)
-        except ValueError:  # not the main thread
+        except ValueError:  # this is not the main thread
             self.before = None
 
     def __exit__(self, *_) -> None:

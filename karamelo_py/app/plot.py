@@ -33,7 +33,7 @@ def read_text(path: Path, expected: str | None = None) -> str:
 def read_rows(path: str | Path) -> list[dict[str, float]]:
     """Return the rows of a log as dictionaries by column name. Words become NaN.
 
-    A line that begins with # lists new columns; an incomplete line is skipped.
+    A line that begins with # names new columns; an incomplete line is skipped.
     """
     names: list[str] = []
     path, rows = Path(path), []
@@ -55,7 +55,7 @@ def read_rows(path: str | Path) -> list[dict[str, float]]:
 
 
 def read_log(folder: Path, name: str = "log.mpm") -> dict[str, np.ndarray]:
-    """Return the columns of a log; {} if it cannot be read."""
+    """Return the columns of a log, or {} if the log cannot be read."""
     try:
         rows = read_rows(folder / name)
     except ScriptError:

@@ -268,7 +268,7 @@ class Simulation:
         hub.output.log.rows = []
         hub.output.writes = out is not None
         self._numbers = itertools.count(1)
-        self._at_work = threading.RLock()  # held by the thread that calls the simulation
+        self._at_work = threading.RLock()  # lock of the thread that calls the simulation
         self._name = "a scene"
         with _as_simulation_error():
             hub.settings.threads = _threads_of(threads)
@@ -303,7 +303,7 @@ class Simulation:
             raise ScriptError(
                 f"{script!r} is not a script", expected=SCRIPT, hint="variables by name, as in N=3"
             )
-        exists = os.path.exists(script)  # also False if the text is too long for a name
+        exists = os.path.exists(script)  # False also if the text is too long for a name
         is_text = isinstance(script, str) and not exists and any(c in script for c in "\n(=")
         self._name = "a script" if is_text else str(script)
         try:
@@ -424,7 +424,7 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Present time."""
+        """Present time of the simulation."""
         return self.hub.update.time
 
     @property
@@ -439,17 +439,17 @@ class Simulation:
 
     @property
     def points(self) -> PointColumns:
-        """Columns of the points (x, vy, s11, seq ...), arrays (n,) by id, which can be set."""
+        """Columns of the points (x, vy, s11, seq ...) that can be set, as arrays (n,) by id."""
         return PointColumns(self.hub)
 
     @property
     def nodes(self) -> Columns:
-        """Columns of the nodes (x, vx, mass ...): arrays (n,)."""
+        """Columns of the nodes (x, vx, mass ...), as arrays (n,)."""
         return Columns(self.hub.fields.node_names, self.hub.fields.node)
 
     @property
     def log(self) -> Columns:
-        """Columns of the log, as arrays; only the rows since the columns changed."""
+        """Columns of the log as arrays, of the rows since the last change of columns."""
         rows = self.hub.output.log.rows
         names = rows[-1][0] if rows else []
         last = np.array([numbers for at, numbers in rows if at == names])
@@ -512,8 +512,8 @@ class Simulation:
     def live(self) -> LivePage:
         """Open a browser page that follows later runs.
 
-        The page has buttons to pause, step and stop. Its ``.close()`` closes it, as does closing
-        the simulation. The package plotly is needed.
+        The page has buttons to pause, step and stop. To close the page, call its ``.close()``, or
+        close the simulation. The package plotly is needed.
         """
         from karamelo_py.app.live.run import RunPage
 

@@ -21,7 +21,7 @@ def main() -> int:
 
 
 def _open_what_is_closed() -> None:
-    """Open closed standard streams; otherwise later files would get their descriptors."""
+    """Open closed standard streams, whose descriptors later files would get."""
     while (handle := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(handle)

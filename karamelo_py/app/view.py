@@ -167,7 +167,7 @@ def _log_beside(
 ) -> dict[int, dict[str, float]]:
     formulas = [options.column, options.only, *Caption.PIECE.findall(options.title or "")]
     text = " ".join(filter(None, formulas))
-    words = re.findall(r"[^\W\d]\w*\b(?! *\()", text)  # without calls
+    words = re.findall(r"[^\W\d]\w*\b(?! *\()", text)  # names, except names of calls
     names = {*first.columns, *named_sets(scene), "time", "timestep", "step", "and", "or", "not"}
     if names.issuperset(words) and not (options.script and options.outlines):
         return {}
@@ -274,7 +274,7 @@ class Drawing:
         columns, field, only = snapshot.columns, self.look["field"], self.look["only"]
         values, row = self.scene.values, self.log.get(snapshot.step, {})
         for name in values.names():
-            values.set(name, row.get(name, np.nan))  # only runs know the value
+            values.set(name, row.get(name, np.nan))  # only a run knows this value
         values.set("time", snapshot.time)
         values.set("timestep", snapshot.step)
         formulas = [one.formula for one in (field, only) if isinstance(one, ColumnFormula)]

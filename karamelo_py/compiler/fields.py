@@ -14,8 +14,7 @@ shape
 kept
     whether values persist between steps and runs (default `True`);
 start
-    initial value: a number (default 0), or a function of the kinematics with one number per
-    component;
+    initial value: a number (default 0), or a function of the kinematics, a number per component;
 summed
     whether points add to this nodal field (default `False`), tile by tile
     (:mod:`karamelo_py.kernels.sums`);
@@ -90,17 +89,17 @@ class Field(NamedTuple):
 
     @staticmethod
     def shown(values: np.ndarray, table: Any) -> np.ndarray:
-        """Return the numbers (n, components) for the columns, from values in a table of points."""
+        """Return the values (n, components) of the columns, from values in a table of points."""
         return values
 
     @staticmethod
     def position(kin: Any) -> int | None:
-        """Return the first component of a stored position, which periodic directions shift."""
+        """Return the first component that is a position, which periodic directions shift."""
         return None
 
     @staticmethod
     def needed(tag: Any) -> bool:
-        """Return whether points of a law, or nodes of a basis, have this field."""
+        """Return True if points of a law, or nodes of a basis, have this field."""
         return True
 
 
@@ -117,7 +116,7 @@ class SummedField(StepField):
 
 
 class FieldMappedAgain(SummedField):
-    """A nodal field that moved points add to, together with the momentum that is mapped again."""
+    """A nodal field of sums over moved points, made with the momentum that is mapped again."""
 
 
 def name_of(kind: type) -> str:
@@ -137,7 +136,7 @@ def rows_of_points(
 ) -> np.ndarray:
     """Make an array (..., n) for points: rows start at cache lines, an odd number of lines apart.
 
-    Thus no vector load crosses a cache line, and the dozens of rows that a pass reads in parallel
+    Then no vector load crosses a cache line, and the dozens of rows that a pass reads in parallel
     are in different cache sets (contiguous rows would be in the same set for n = 512 or 512 000).
     Rows always have gaps: an array without gaps has another type, so kernels would be compiled
     again. Memory `room` (k,) is used if it is long enough (`length_of_rows`).

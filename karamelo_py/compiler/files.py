@@ -15,7 +15,7 @@ from pathlib import Path
 import platformdirs
 
 _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
-# Do not follow links and do not wait for pipes, if the system has these flags.
+# Where the system has these flags, links are not followed and pipes not waited for.
 _AS_IT_IS = sum(vars(os).get(flag, 0) for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
@@ -36,7 +36,7 @@ def _guard(directory: Path) -> None:
     """Raise an error if other users can write to a folder; make the user's folders private."""
     for one in (directory, directory.parent):
         about = one.stat()
-        if about.st_mode & stat.S_ISVTX:  # other users may not delete files there
+        if about.st_mode & stat.S_ISVTX:  # others may not delete files there
             continue
         if hasattr(os, "geteuid") and about.st_uid == os.geteuid() and about.st_mode & _BY_OTHERS:
             one.chmod(stat.S_IMODE(about.st_mode) & ~_BY_OTHERS)
@@ -88,7 +88,7 @@ def telling(tell: Callable[[str], None]) -> Iterator[None]:
 
 
 def write(path: Path, content: bytes) -> None:
-    """Write a file for `read`, completely or not at all."""
+    """Write a file that `read` accepts, completely or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     _guard(path.parent)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix="new-")

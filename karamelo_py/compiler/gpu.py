@@ -30,13 +30,13 @@ from karamelo_py.compiler.trace.primitives import implements
 from karamelo_py.compiler.trace.session import session
 from karamelo_py.compiler.trace.values import in_one, intrinsic
 
-THREADS = 128  # per block
+THREADS = 128  # threads per block
 USUAL = Path("/usr/local/cuda/nvvm/libdevice/libdevice.10.bc")  # default path of NVIDIA's library
 TRIPLE = "nvptx64-nvidia-cuda"
 
 
 class NoCard(Exception):
-    """No GPU can be used; text and hint are for the user."""
+    """No GPU can be used; text and hint of the error are for the user."""
 
     def __init__(self, reason: str, hint: str):
         super().__init__(reason)
@@ -206,7 +206,7 @@ def bandwidth(card: Any, size: int = 1 << 30) -> float:
 
 class Code(NamedTuple):
     name: str
-    code: bytes  # empty if it is to be read from the file
+    code: bytes  # empty if the code is to be read from the file
     file: str
     needs: tuple
     modules: frozenset[str]
@@ -228,7 +228,7 @@ class _Coded:
         if key not in self._known:
             code = self._found(function, kinds, called)
             self._load(code)
-            if "<locals>" in function.__qualname__:  # local: created for each scene
+            if "<locals>" in function.__qualname__:  # local functions are created for each scene
                 return self._entries[code.name]
             self._known[key] = self._entries[code.name]
         return self._known[key]
@@ -254,7 +254,7 @@ class _Coded:
 class Emulator(_Coded):
     name, processor, on_card = "emulated", "processor", False
     made = staticmethod(machine.compile_text)
-    copies = 1  # copies of the totals to which threads add
+    copies = 1  # copies of the totals, to which threads add
 
     def __init__(self) -> None:
         super().__init__()
@@ -489,7 +489,7 @@ class Images:
         if image_of is None:
             size, at = _extent(array), array.ctypes.data
             if not size or any(room <= at < room + n for room, n in self._rooms.items()):
-                return array  # already on the device, or empty
+                return array  # the array is empty or on the device already
             address = self._room(size)
             memory = (ctypes.c_char * size).from_address(address)
             made = np.ndarray(array.shape, array.dtype, memory, 0, array.strides)

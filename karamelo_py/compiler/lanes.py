@@ -41,7 +41,7 @@ from karamelo_py.compiler.trace.primitives import (
 )
 from karamelo_py.compiler.trace.values import intrinsic
 
-# LLVM would split wider vectors, and there would not be enough registers.
+# LLVM would split wider vectors, and registers would not suffice.
 REGISTER_BYTES = 64 if "+avx512f" in machine.features() else 32
 AHEAD = 256  # bytes of point arrays to prefetch ahead
 
@@ -167,7 +167,7 @@ def spread(tag, value):
 
 
 def room_for(points, numbers):
-    """Return an array (components, points) for such numbers, on the stack."""
+    """Return an array (components, points) on the stack for such numbers."""
     return np.zeros((len(numbers), points), np.asarray(numbers[0]).dtype)
 
 
@@ -344,7 +344,7 @@ def at_lane(builder, kind, array, of, at, k, *rest):
     pointer = llvm.item_pointer(builder, kind, array, [first, *rest])
     if steps is None:
         return pointer
-    # Use addresses relative to the first node, so that neighbours need a single address.
+    # Addresses are relative to the first node, so that neighbours need a single address.
     stride = llvm.ArrayParts(builder, kind, array).strides[0]
     return llvm.byte_pointer(builder, pointer, builder.mul(steps, stride))
 

@@ -10,7 +10,7 @@ from llvmlite import ir
 from numba import types
 
 I1, I8, I32, I64 = (ir.IntType(bits) for bits in (1, 8, 32, 64))
-NOTHING = I8.as_pointer()  # None, classes and functions
+NOTHING = I8.as_pointer()  # type of None, classes and functions
 _REALS = {32: ir.FloatType(), 64: ir.DoubleType()}
 
 
@@ -202,7 +202,7 @@ def _order(items: tuple[int, ...]) -> ir.Constant:
 
 
 def overloaded(kind: ir.Type) -> str:
-    """Return f64, v4f64, ..."""
+    """Return LLVM's name of a type in function names: f64, v4f64, ..."""
     if isinstance(kind, ir.VectorType):
         return f"v{kind.count}{kind.element.intrinsic_name}"
     return kind.intrinsic_name
@@ -338,7 +338,7 @@ def of_library(name: str) -> Callable:
 
 @contextmanager
 def counted(builder: ir.IRBuilder, count: ir.Value) -> Iterator[Any]:
-    """Write a loop over [0, count) around this context."""
+    """Write a loop over [0, count), whose body is written in this context."""
     before = builder.block
     head, body, end = (builder.append_basic_block(name) for name in ("head", "body", "end"))
     builder.branch(head)

@@ -44,7 +44,7 @@ class _Bits(NamedTuple):
     """Layout of the bits of a number, or of each lane."""
 
     number: ir.Type
-    whole: ir.Type  # the same bits
+    whole: ir.Type  # integers of the same size
     short: ir.Type  # 32-bit integers, which every processor converts to reals
     mantissa: int
     bias: int
@@ -150,7 +150,7 @@ def _exponential(x):
     def exponential(x):
         """Compute e^x = 2^n e^r with |r| up to ln 2 / 2; beyond `most`, e^x is 0 or infinite."""
         x = min(max(x, -most), most)
-        n = (x * (1 / _LN_2) + far) - far  # nearest integer
+        n = (x * (1 / _LN_2) + far) - far  # rounds to the nearest integer
         r = fma(-n, _REST, fma(-n, _LN_2, x))
         return _scaled(_series(r, r * r, _EXPONENTIAL), n)
 

@@ -18,16 +18,16 @@ from karamelo_py.compiler.trace.values import is_literal, rebuilt
 
 @algebra
 class Dual(namedtuple("Dual", "value slopes")):
-    """A number and its derivatives, which may be literal 0s."""
+    """A number and its derivatives; derivatives may be literal zeros."""
 
     __slots__ = ()
-    __array_ufunc__ = None  # NumPy leaves operations to these
+    __array_ufunc__ = None  # NumPy leaves operations to this class
 
     def constant(self, value: Any) -> "Dual":
         return Dual(value, (0,) * len(self.slopes))
 
     def chain(self, value: Any, slope: Any) -> "Dual":
-        """Return a function of this number, from its value and derivative."""
+        """Return a function of this number, given the function's value and derivative."""
         return Dual(value, tuple([times(slope, s) for s in self.slopes]))
 
     def __add__(self, other):
@@ -68,7 +68,7 @@ class Dual(namedtuple("Dual", "value slopes")):
         return self.chain(quotient, -quotient / self.value)
 
     def __pow__(self, other):
-        if type(other) is int and 1 <= other <= 4:  # also if the base is negative
+        if type(other) is int and 1 <= other <= 4:  # right also for a negative base
             square = self * self
             return (self, square, square * self, square * square)[other - 1]
         return _raised(self, other, self.value ** value_of(other))
@@ -223,7 +223,7 @@ def _atan2(y, x):
 def _hypot(x, y):
     a, b = value_of(x), value_of(y)
     made = math.hypot(a, b)
-    over = where(made > 0, made, 1)  # 0 at 0, as for norms
+    over = where(made > 0, made, 1)  # the slope is 0 at 0, as for norms
     return combined(made, a / over, x, b / over, y)
 
 
@@ -276,7 +276,7 @@ def _power(x, y):
 
 
 def _raised(x, y, made):
-    """Add slopes to the power `made`; for base 0 they are 0, except for exponent 1."""
+    """Add slopes to the power `made`: 0 for base 0, except for exponent 1."""
     base, exponent = value_of(x), value_of(y)
     above = base > 0
     some = base != 0  # a negative base needs an integer exponent

@@ -135,7 +135,7 @@ def _add_among(array, i, j, value):
     return types.none(array, types.int64, types.int64, types.int64), codegen
 
 
-# address of the arguments, index, address of the `Failure`
+# Parameters of a task: address of the arguments, index, address of the `Failure`.
 _TASK = ir.FunctionType(ir.VoidType(), [I64] * 3)
 _PART = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 5)
 _SHARE_OUT = [ctypes.c_int64] * 6
@@ -148,7 +148,7 @@ class _Pools(threading.local):
 
 _pools = _Pools()
 if hasattr(os, "register_at_fork"):
-    # a forked process has no threads
+    # a forked process has no other threads
     os.register_at_fork(after_in_child=lambda: _pools.of.cache_clear())
 
 
@@ -165,7 +165,7 @@ def _share_out(
         for pair in pairs:
             others.append(_pools.of(threads - 1).submit(do, task, arguments, *pair, failure))
         do(task, arguments, *ends[:2], failure)
-    except BaseException as error:  # also Ctrl-C, as threads still use these arguments
+    except BaseException as error:  # catches Ctrl-C, too, as threads still use these arguments
         note(error, failure)
     while others:
         try:
@@ -256,9 +256,9 @@ def _in_parallel(lowering: Any, count: Any, task: Value, arguments: Value, threa
 # The words are in separate cache lines:
 _STATE, _SIZE, _TASK_AT, _ARGUMENTS, _COUNT, _DONE, _EPOCH = range(0, 7 * 64, 64)
 _RESULT, _TICKETS = range(7 * 64, 9 * 64, 64)
-_WAITS, _LEADS, _ENDED = range(3)  # in _STATE
+_WAITS, _LEADS, _ENDED = range(3)  # values of _STATE
 _SHORT = 8000  # pauses (0.3 ms) before a waiting thread sleeps, so that others can use its core
-_APART, _LOOKS = 10, 64  # pauses between two looks at another range, number of looks (30 us in all)
+_APART, _LOOKS = 10, 64  # pauses between looks at another range; number of looks (30 us in all)
 _PATIENCE = 11000  # pauses until a thread no longer waits for a leader
 _LEFT = (1 << 32) - 1  # bits of a ticket with the number of indices; the upper bits are the loop
 

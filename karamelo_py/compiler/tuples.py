@@ -1,6 +1,6 @@
 """Records of arrays, and nested tuples as flat sequences.
 
-Comprehensions build lists, which take 67 % of the time of tuples when interpreted.
+Comprehensions build lists: when interpreted, this takes 67 % of the time of building tuples.
 """
 
 

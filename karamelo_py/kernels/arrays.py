@@ -100,7 +100,7 @@ def made_of(points: Points, arrays: Iterable[np.ndarray]) -> Points:
 
 
 class Tiling(NamedTuple):
-    # (3,) int64: number of occupied tiles; of parts of the points; of parts for other processes
+    # (3,) int64: numbers of occupied tiles, of parts of the points, of parts for other processes
     count: np.ndarray
     share: np.ndarray  # (S + 1,) int64: part k is order[share[k]:share[k + 1]]
     order: np.ndarray  # (T + 1,) int64: occupied tiles in the order in which threads take them
@@ -196,7 +196,7 @@ HOOK = np.dtype([
     ("begin", np.int64),  # range of members; begin is -1 for all
     ("end", np.int64),
     ("slot", np.int64),  # slot of the published total; -1: none
-    ("uses_before", np.int64),  # also needs values of the formulas one step earlier
+    ("uses_before", np.int64),  # also needs the formulas one step earlier
     ("uses_share", np.int64),  # uses 1 / number of members with mass
     ("holds", np.int64),  # sets or bounds the velocity
     ("uses_place", np.int64),  # formulas depend on position
@@ -266,11 +266,11 @@ POST_ROTATION_TO_GRID = 13
 # Node array that a hook changes.
 ON_SUMS, ON_UPDATE, ON_VELOCITY = 0, 1, 2
 
-# Step size (`kernels.clock`, `run.step_size`)
+# Clock of the step size (`kernels.clock`, `run.step_size`).
 STEP = np.dtype([
     ("fixed_dt", np.float64),  # set_dt, or 0
     ("dt_factor", np.float64),  # fraction of the stable step
-    ("dt_factor_moving", np.float64),  # the same after points have moved
+    ("dt_factor_moving", np.float64),  # dt_factor after points have moved
     ("heat_factor", np.float64),  # fraction of conduction's stable step
     ("end_time", np.float64),
     ("last_dt", np.float64),  # 0 at the start and after load steps
@@ -281,7 +281,7 @@ STEP = np.dtype([
     ("last_contact_dt", np.float64),
     ("spacing", np.float64),  # smallest cell size
     ("courant", np.float64),  # stable step * rate / cell size
-    ("courant_moving", np.float64),  # once points have moved
+    ("courant_moving", np.float64),  # `courant` once points have moved
     ("kept", np.float64),  # FLIP coefficient
     ("kept_by_time", np.float64),  # exponent of `kept` per stable step; 0: `kept` is constant
     ("first_limit", np.float64),  # initial stable step
@@ -316,10 +316,10 @@ ENERGY = np.dtype([
     ("kinetic", np.float64),
     ("stored", np.float64),  # includes dissipated energy
     ("lost_by_transfer", np.float64),
-    ("lost_with_deleted", np.float64),  # part of points that have been deleted
-    ("lost_before", np.float64),  # one step earlier
+    ("lost_with_deleted", np.float64),  # loss of points that have been deleted
+    ("lost_before", np.float64),  # `lost_by_transfer` one step earlier
     ("born_with", np.float64),  # initial internal energy of gases
-    ("stored_before", np.float64),  # one step earlier
+    ("stored_before", np.float64),  # `stored` one step earlier
     ("moving_before", np.float64),  # kinetic energy minus work one step earlier
     ("stored_at", np.int64),  # step number of `stored_before` and `moving_before`
     ("looks", np.int64),  # number of checks
@@ -338,7 +338,7 @@ ENERGY = np.dtype([
     ("largest_mean", np.float64),
     ("of_bodies", np.float64),  # kinetic energy of free rigid bodies, not in the balance
     ("largest_energy", np.float64),  # largest kinetic, stored, rigid-body energy or work
-    ("largest_own", np.float64),  # the same without drift
+    ("largest_own", np.float64),  # `largest_energy` without drift
     ("of_drift", np.float64),  # kinetic energy of centres of mass
     ("elastic", np.float64),  # elastic energy at the last check
     ("carried", np.float64, (1, 3)),  # elastic energy times cells moved through
@@ -359,10 +359,10 @@ HEAT = np.dtype([
     ("watch_heat", np.int64),  # 1: all heat sources are known
     ("coldest", np.float64),  # bounds on temperatures from the initial state, fixes and sources
     ("hottest", np.float64),
-    ("T_low", np.float64),  # extremes at the last check
+    ("T_low", np.float64),  # extremes of temperature at the last check
     ("T_high", np.float64),
     ("own_heat", np.float64),  # largest temperature rise of a point by dissipation
-    ("set_low", np.float64),  # extremes set by fixes at nodes
+    ("set_low", np.float64),  # extremes of temperature set by fixes at nodes
     ("set_high", np.float64),
     ("rise", np.float64),  # largest heating rate by fixes
     ("fall", np.float64),

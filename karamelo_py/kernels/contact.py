@@ -62,7 +62,7 @@ from karamelo_py.points.kinematics import dot, vector, zero_vector
 
 # Squared sine of the scatter of a body's outward directions about their mean:
 SCATTER = 0.003  # scatter of a plane face
-EDGE = 0.03  # above it, a face ends or is round
+EDGE = 0.03  # scatter above which a face ends or is round
 FACING = 0.3  # directions with a larger cosine count as the same
 FULL = 1.05  # filled fraction of the cells around a node above which a liquid has no gap
 MEMORY = 100  # steps after a contact in which bodies without a firm surface approach a wall slowly
@@ -160,7 +160,7 @@ class Touched(NamedTuple):
 
 class Together(NamedTuple):
     node: int
-    count: int  # bodies that meet there
+    count: int  # number of bodies that meet at the node
 
 
 class Side(NamedTuple):
@@ -304,8 +304,7 @@ def _across(direction, other):
 def _entering_corner(bodies, n, other, velocity):
     """Return the part of a velocity that enters the faces of a hollow corner.
 
-    The remainder is along a face or an edge, or 0. As parts are perpendicular, one impulse is
-    enough.
+    The remainder is along a face or edge, or 0. As parts are perpendicular, one impulse is enough.
     """
     least = 1e-6 * sqrt(dot(velocity, velocity))
     first = _entering(bodies, n, other, velocity, least)
@@ -478,7 +477,7 @@ def _excess_of(bodies, pair, where):
 
 @noinline
 def _friction_of(yielding, friction, push, slide, share):
-    """Return the tangential impulse per sliding speed, and whether it stops all sliding."""
+    """Return tangential impulse / sliding speed, and whether the impulse stops all sliding."""
     compliance = dot(slide, slide, yielding)
     if not compliance > 0:
         return 0.0, False
@@ -572,7 +571,7 @@ def _touch_pair(bodies, control, i, j, where):
     normal = pair.outward._make([outward / size for outward in pair.outward])
     compliance = dot(normal, normal, pair.yielding)
     if not compliance > 0:
-        return  # both velocities are prescribed
+        return  # both velocities are prescribed, so there is no impulse
     push = share * excess / compliance
     left = _left(pair, push / size)
     # Friction does not act on the normal velocity that closes the gap.

@@ -23,7 +23,8 @@ from karamelo_py.points.kinematics import zero_vector
 from karamelo_py.points.laws.rigid import Rigid
 
 SOFT = 0.1  # fraction of penetration removed per step
-# spring force (3), mean load, unused friction, step of the last touch, position in the body (3)
+# Columns of `grip`: spring force (3), mean load, unused friction, step of the last touch, position
+# in the body (3).
 GRIP = 9
 DEEP = 0.125  # penetration in cells above which the spring hardens, for heavy bodies on few points
 
@@ -127,7 +128,7 @@ def _list_point(body, surface, s, block, p):
     arm = [x[c] - state.x[c] if c < d else 0.0 for c in range(3)]
     local = motion.to_start(state, (arm[0], arm[1], arm[2]))
     y = none._make([local[c] + constants.start[c] for c in range(d)])
-    side = clear[1] if clear[0] > move else 0.0  # far enough for the point not to have passed
+    side = clear[1] if clear[0] > move else 0.0  # 0 if the point may have passed the face
     clear[0], clear[1], nearest = free_way(surface.shape, kin, y, max(close, h), side)
     if clear[0] > close or (clear[0] > 0 and nearest < 0):
         return False
@@ -172,7 +173,7 @@ def _recall(grip, control, state, contact):
     contact.usual, contact.spare = times.kick * memory[3], times.kick * (1 - NEW) * memory[4]
     stiff = SOFT * times.kick / (times.contact_dt * times.contact_kick)
     slid = motion.from_start(state, (memory[6] - at[0], memory[7] - at[1], memory[8] - at[2]))
-    for c in range(3):  # from positions, as velocities are noisy
+    for c in range(3):  # computed from positions, as velocities are noisy
         contact.hold[c] = times.kick / contact.mass * memory[c] + stiff * slid[c]
         along += contact.normal[c] * contact.hold[c]
     for c in range(3):
@@ -253,7 +254,7 @@ def _give_to_points(body, s, block, number, measures):
 
 @noinline
 def _work_on_points(body, s, block, number, now):
-    """Add the work on points, with mean nodal velocities; `now` (N, d): those after the step."""
+    """Add the work on points, with mean nodal velocities; `now` (N, d) are those after the step."""
     kin, nodes, points, work = s.kin, s.nodes, block.points, 0.0
     first = arrays.of_momentum(kin)
     for i in range(body.count[0]):

@@ -174,7 +174,7 @@ class Stage:
             where = location_of(pt)
             is_inside = inside(pt.w.grid, c.kin, where)
             for k in range(corners):
-                number = 0  # the run ends
+                number = 0  # outside: the run ends
                 if is_inside:
                     stencil = locate(c.basis, c.kin, pt.w.grid, where)
                     number = entry(c.basis, c.kin, pt.w.grid, stencil, k * count)[0]

@@ -106,7 +106,7 @@ SHOW = (
     Sweep(MAP, gathers=False, moves=False, at=_of_heat, reported=None),
     NodeTask(SumsToVelocity(), at_its_nodes, step_size),
 )
-# The rows of `SHOW`, then the heat flow with present gradients.
+# The heat flow with present gradients, after the rows of `SHOW`.
 FLOW_TO_NODES = (
     *SHOW,
     NodeTask(TakeMean(), at_its_nodes, step_size),

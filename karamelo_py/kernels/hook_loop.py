@@ -36,7 +36,7 @@ END = np.iinfo(np.int64).max  # larger than any member
 TURN = 4 * BLOCK  # points that a thread takes at a time
 COUNT, ACT, RUB = 0, 1, 2  # tasks
 LOADS, LOADS_AGAIN = 3, 4  # targets for the work of loads: with v*, or with the re-mapped velocity
-DONE, FREE = -1, 1e-3  # no stage; smallest fraction of the force for which a node counts as held
+DONE, FREE = -1, 1e-3  # no stage; fraction of the force above which a node counts as held
 
 _call_node_function = caller_of(kinds.NODE_FUNCTION)
 _call_point_function = caller_of(kinds.POINT_FUNCTION)
@@ -447,7 +447,7 @@ def _change_update(members, call, c, q):
         before = _take_over(call, q, c, total)
     moved = values[1] + star if hook.uses_before and holds else v + star
     impulse = mass * (star - old_star + kept * (old - v))
-    # Contact may still change the velocities of free nodes, rigid bodies those at any node.
+    # Later, contact may change velocities of free nodes, and rigid bodies velocities of any node.
     late = hook.stage == arrays.POST_UPDATE_GRID_STATE or hook.stage == arrays.POST_CONTACT
     rigid = field(nodes.fields, RigidSums)
     is_taken = rigid is not None and rigid[n, arrays.MASS] > 0
@@ -466,7 +466,8 @@ def _change_update(members, call, c, q):
 def _change_velocity(members, call, c, q):
     kin, nodes, hooks, n = members.kin, members.nodes, call.hooks, call.hooks.chosen[q]
     hook, v, last = hooks.table[call.h], nodes.velocity[n, c], nodes.update[n, c]
-    # Strain before the forces uses the velocity of the last step, and the hooks that held it.
+    # Strain before the forces uses the nodal velocity of the last step, so the hooks that held it
+    # then act again.
     strains_first = hook.stage == arrays.POST_UPDATE_GRID_STATE and hook.holds > 0
     value = hooks.scratch[BEFORE if strains_first and hook.uses_before else VALUE, q]
     # v* is from the last step

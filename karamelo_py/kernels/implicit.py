@@ -73,7 +73,7 @@ class Tangent(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Stress after trial displacements; t components of a tensor."""
+    """Increments and stresses after trial displacements, each with t components."""
 
     increment: np.ndarray  # (t, n) H
     stress: np.ndarray  # (t, n) V0 P

@@ -43,7 +43,7 @@ from karamelo_py.points.laws import advance, jacobian, kirchhoff_stress, specifi
 
 
 class Averages(NamedTuple):
-    """Averages at the n points of a block; t components of a tensor."""
+    """Averages at the n points of a block; tensors have t components."""
 
     volume: np.ndarray  # (1, n) V
     grown: np.ndarray  # (1, n) V J

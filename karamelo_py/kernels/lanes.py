@@ -46,7 +46,7 @@ def one_loop_each(lanes: Tag, visit: Any) -> bool:
 
 
 def lanes_of_update(lanes: Tag, visit: Any) -> Tag:
-    """Return twice as many lanes, as operations of an update wait for each other."""
+    """Return twice as many lanes: operations of an update wait for each other."""
     return EightLanes() if one_loop_each(lanes, visit) else lanes
 
 

@@ -49,20 +49,18 @@ class Push(NamedTuple):
     kin: Tag
     reach: float  # largest distance between touching points along an axis
     step: float  # time since the previous positions
-    dt: float  # sets the stiffness, with `kick`
+    dt: float  # dt of the stiffness, with `kick`
     kick: float
 
 
 class Cells(NamedTuple):
-    """Scratch of the search."""
-
     start: np.ndarray  # (c + 1,) int64, room for c cells
-    cell: np.ndarray  # (n,) int64; -1: touches nothing
+    cell: np.ndarray  # (n,) int64; -1 if the point touches nothing
     order: np.ndarray  # (n,) int64: points of the second body
-    corner: np.ndarray  # (3,) lower
-    length: np.ndarray  # (3,) of the covered region
+    corner: np.ndarray  # (3,) lower corner of the covered region
+    length: np.ndarray  # (3,) lengths of the covered region
     count: np.ndarray  # (3,) int64 number of cells
-    contact: np.ndarray  # (7,) of a point (`_touch`)
+    contact: np.ndarray  # (7,) sums over the partners of a point (`_touch`)
     total: np.ndarray  # (3,) force on the first body
 
 
@@ -161,7 +159,7 @@ def _lay_cells(d, bodies, cells, reach):
         lo1, hi1 = _range(bodies.x, 0, n, k)
         lo2, hi2 = _range(bodies.x, n, m, k)
         cells.corner[k] = max(lo1, lo2) - width
-        # also for NaN
+        # also ends here for NaN
         length = min(hi1, hi2) + width - cells.corner[k]
         if not 0 <= length < inf:
             return 0.0
@@ -236,7 +234,7 @@ def _touch(push, bodies, cells, i, j):
     """Add the normal force between two points; return 1 if they touch, else 0.
 
     For the friction on `i`, `cells.contact` sums load, normal force, and stiffness times tangential
-    velocity over the partners.
+    velocity over the partners of `i`.
     """
     kin, contact = push.kin, cells.contact
     force, d = _push_between(push, bodies, i, j), kin.dimension
@@ -263,7 +261,7 @@ def _rub(push, bodies, i, contact):
     grip, none, d = bodies.grip, zero_vector(kin, 0.0), kin.dimension
     normal = kin.Vector._make([contact[1 + k] for k in range(d)])
     slide = kin.Vector._make([contact[1 + d + k] for k in range(d)])
-    slid = push.step if grip[i, d] > 0 else 0.0  # 0 for a point without contact before
+    slid = push.step if grip[i, d] > 0 else 0.0  # a point without contact before has not slid
     hold = along(vector_at(kin, grip, i, 0, none) + slid * slide, normal)
     force = rubbed(push.law.friction, contact[0], hold, push.dt * slide, (grip, i))
     for k in range(d):

@@ -1,7 +1,7 @@
 """Rigid bodies on a common grid: nodes near them take their velocity.
 
 Rigid points scatter to separate sums (`RigidSums`), so the usual nodal sums belong to other solids,
-for any density of the rigid solid. Its force acts on these solids.
+for any density of the rigid solid. The force of the rigid solid acts on these solids.
 """
 
 from typing import NamedTuple
@@ -28,7 +28,7 @@ def _at_nodes(s):
 
 @noinline
 def _impose(at, dt, control, n):
-    """Set the velocity of a node with rigid points, and store the force in `rigid`.
+    """Set the velocity of a node with rigid points, and store the force of the solid in `rigid`.
 
     Work is as for a prescribed velocity. The change v* - v includes this force, otherwise points
     would not get the velocity of the rigid solid with FLIP.
@@ -105,5 +105,5 @@ class RigidBodies(NamedTuple):
     rows_work = ()
 
     force: np.ndarray  # (n,) slot of the force on each point's solid, or -1
-    torque: np.ndarray  # (n,)
+    torque: np.ndarray  # (n,) slot of the torque, or -1
     slots: np.ndarray  # (r,) of forces and torques

@@ -50,16 +50,16 @@ COLLISIONS = 50  # largest number per contact
 CONTACT, HOLD, HOLD_ROTATION = range(3)
 _NUMBER, _VECTOR, _MATRIX = (np.float64,), (np.float64, 3), (np.float64, (3, 3))
 LINK = np.dtype([
-    ("kind", np.int64), ("first", np.int64), ("second", np.int64),  # bodies
+    ("kind", np.int64), ("first", np.int64), ("second", np.int64),  # indices of the bodies
     ("at", *_VECTOR), ("ways", *_MATRIX),  # a contact's first direction is its normal
     ("gap", *_NUMBER), ("mu", *_NUMBER), ("restitution", *_NUMBER),
     ("stiff", *_VECTOR), ("bias", *_VECTOR),  # by direction
     ("constant", *_NUMBER),  # impulse along the first direction
     ("impulse", *_VECTOR), ("hit", *_VECTOR),  # impulse on the first body; part due to collisions
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
-    ("bound", *_NUMBER), ("most", *_NUMBER),  # largest friction; prescribed bound
+    ("bound", *_NUMBER), ("most", *_NUMBER),  # largest friction; prescribed bound of friction
     ("slot", np.int64), ("torque", np.int64),  # indices of published force, torque; torque 0: none
-    ("sign", *_NUMBER),  # 1 if they act on the first body, -1 if on the second
+    ("sign", *_NUMBER),  # 1 if the slots are of the first body, -1 of the second
 ])  # fmt: skip
 JOINT = np.dtype([
     ("first", np.int64), ("second", np.int64),
@@ -102,18 +102,18 @@ class Links(NamedTuple):
     count: np.ndarray  # (1,) int64
     dt: np.ndarray  # (1,)
     states: np.ndarray  # (B + 1,) motion.STATE: x, R
-    constants: np.ndarray  # (B + 1,) motion.CONSTANTS: start, bound
+    constants: np.ndarray  # (B + 1,) motion.CONSTANTS of the bodies: start, bound
     free: np.ndarray  # (B + 1, 6) int64: index of the unknown, or -1
-    u: np.ndarray  # (B + 1, 6) velocities
+    u: np.ndarray  # (B + 1, 6) velocities at the end of the step
     old: np.ndarray  # velocities before the step
     jump: np.ndarray  # velocity change due to collisions
     trial: np.ndarray
     rest: np.ndarray
     trial_rest: np.ndarray
-    given: np.ndarray  # impulses of links
+    given: np.ndarray  # (B + 1, 6) sums of the impulses of links
     inverse: np.ndarray  # (B + 1, 6, 6) inverse mass matrix, 0 where prescribed
-    slope: np.ndarray  # (m, m + 1), right-hand side last
-    jacobian: np.ndarray  # (2, 3, 6): A, B
+    slope: np.ndarray  # (m, m + 1) matrix of the Newton step, right-hand side in the last column
+    jacobian: np.ndarray  # (2, 3, 6): A and B of the present link
     weight: np.ndarray  # (3, 4): A M^-1 A^T + B M^-1 B^T, right-hand side last
 
 
@@ -601,7 +601,7 @@ def _solve(links, bodies):
     if _iterate(links, bodies, False):
         return
     # With friction bounds by the previous normal impulses, the problem is convex and Newton's
-    # method converges. The first pass has no friction.
+    # method converges. The first pass has no friction, so it finds normal impulses.
     for n, body in enumerate(bodies):
         links.u[n] = body.solution.u
     _iterate(links, bodies, True)
@@ -762,7 +762,7 @@ def solve(links, bodies, control):
             link.impulse[c] += link.hit[c]
         _set_jacobians(links, link)
         _publish(link, values, kick)
-    # including collisions, for published forces
+    # Published forces include collisions.
     _sum_impulses(links)
     for n, body in enumerate(bodies):
         body.solution.given[:] = links.given[n]

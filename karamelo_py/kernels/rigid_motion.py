@@ -55,17 +55,17 @@ CONSTANTS = np.dtype([
 CONTACT = np.dtype([
     ("at", *_VECTOR), ("normal", *_VECTOR), ("gap", *_NUMBER),
     ("mass", *_NUMBER), ("v", *_VECTOR),  # mass and velocity of the other body
-    ("mu", *_NUMBER), ("share", *_NUMBER),  # s
+    ("mu", *_NUMBER), ("share", *_NUMBER),  # fraction s of the approach removed
     ("hold", *_VECTOR), ("local", *_VECTOR),  # h; position in the body's initial frame
-    ("usual", *_NUMBER), ("spare", *_NUMBER),  # mean impulse; unused friction of earlier steps
+    ("usual", *_NUMBER), ("spare", *_NUMBER),  # mean impulse; friction not used in earlier steps
     ("impulse", *_VECTOR),
     # values of the last iteration:
     ("slip", *_VECTOR), ("speed", *_NUMBER), ("push", *_NUMBER), ("rub", *_NUMBER),
     ("bound", *_NUMBER), ("lean", *_NUMBER),  # largest friction, and its derivative by the push
     ("most", *_NUMBER),  # prescribed bound
     ("block", np.int64), ("point", np.int64), ("number", np.int64),  # of a point, and its id
-    ("slot", np.int64),  # of its force
-    ("torque", np.int64),  # slot, or 0
+    ("slot", np.int64),  # slot of the force
+    ("torque", np.int64),  # slot of the torque, or 0
     ("area", np.int64), ("face", *_NUMBER),  # slot of the area of contact; area of the point
 ])  # fmt: skip
 PASSES_AT_MOST, HALVINGS, BOUNDS_AT_MOST = 60, 12, 60
@@ -85,23 +85,23 @@ class Formulas(NamedTuple):
 class Solution(NamedTuple):
     """Work arrays of a step, (6,): translation, then rotation."""
 
-    momentum: np.ndarray  # momentum without contact
-    u: np.ndarray  # velocities
+    momentum: np.ndarray  # (6,) momentum without contact
+    u: np.ndarray  # (6,) velocities
     trial: np.ndarray
     residual: np.ndarray
     trial_residual: np.ndarray
-    total: np.ndarray  # impulses
-    given: np.ndarray  # impulses of other bodies
-    after: np.ndarray  # momentum with contact
+    total: np.ndarray  # (6,) sum of impulses
+    given: np.ndarray  # (6,) impulses of other bodies
+    after: np.ndarray  # (6,) momentum with contact
     before: np.ndarray  # centre before the step, (3,)
-    mass: np.ndarray  # (6, 6)
-    slope: np.ndarray  # (6, 7), right-hand side last
+    mass: np.ndarray  # (6, 6) mass matrix
+    slope: np.ndarray  # (6, 7) matrix of the Newton step, right-hand side in the last column
     jacobian: np.ndarray  # (3, 6): A, whose first half is the unit matrix
 
 
 class FreeBody(NamedTuple):
     field: int  # velocity field, for contact at nodes
-    ids: np.ndarray  # (2,) ids of its points: first, end
+    ids: np.ndarray  # (2,) ids of the body's points: first, end
     dofs: np.ndarray  # (6,) int64: 1 free, 0 prescribed
     constants: np.ndarray  # (1,) CONSTANTS
     state: np.ndarray  # (1,) STATE
@@ -173,7 +173,7 @@ def _axis(constants, k):
 
 @noinline
 def _along_axis(body, k):
-    """Return angular momentum about principal axis `k`."""
+    """Return the angular momentum about principal axis `k`."""
     state, (a, b, c), total = body.state[0], _axis(body.constants[0], k), 0.0
     R, L = state.R, state.momentum
     for i in range(3):
@@ -483,7 +483,7 @@ def _velocities_of(body, momentum):
 
 @noinline
 def work_of(body):
-    """Return half of the work that contact in the step would do with the present velocity."""
+    """Return half of the work that the contact in the step would do at the present velocity."""
     state, total, work = body.state[0], body.solution.total, 0.0
     for k in range(3):
         work += 0.5 * (total[k] * state.v[k] + total[3 + k] * state.spin[k])
@@ -571,7 +571,7 @@ def _set_angle(state, dt, dimension):
 def _about_origin(body, k):
     """Return the torque of contact about the origin.
 
-    It is taken with the position of the centre before this step.
+    The position of the centre is the one before this step.
     """
     state, before, i, j = body.state[0], body.solution.before, (k + 1) % 3, (k + 2) % 3
     return state.torque[k] + before[i] * state.force[j] - before[j] * state.force[i]

@@ -41,7 +41,7 @@ class SortedOrder(NamedTuple):
     width: int  # number of points in a group
     ends: np.ndarray  # (parts, T) ends of tiles; the last row is final
     share: np.ndarray  # (parts + 1,) first tile of each part, by number of points
-    boxes: np.ndarray  # (2, T, d) first and last nodes in stencils of the points of a tile
+    boxes: np.ndarray  # (2, T, d) first and last nodes in the stencils of each tile's points
     bins: np.ndarray  # (parts, 2, cells of a tile) scratch
     order: np.ndarray  # (n,) previous indices
     tile: np.ndarray  # (n,)
@@ -54,7 +54,7 @@ def cell_of(grid: Grid, direction: int, at: Number) -> int:
 
 
 def _seen(grid, around, g, direction, at):
-    """Return the first and last node in the stencil of a point of grid `g`, at `at` cells."""
+    """Return the first and last node in the stencil of a point at `at` cells in grid `g`."""
     first = cell_of(grid, direction, at - around.reach)
     last = cell_of(grid, direction, at + around.reach)
     top = around.top[g, direction]

@@ -1,6 +1,6 @@
 """Gather and scatter over the nodes of a stencil, one by one or all at once.
 
-Moments, affine sums and corners of domains are done for all nodes at once.
+Moments, affine sums and domain corners are computed for all nodes of a stencil at once.
 """
 
 from karamelo_py.compiler import all_lanes, point_function, real

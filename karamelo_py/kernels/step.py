@@ -36,7 +36,7 @@ def rows_of(scheme: Any, visits: Any) -> list[Any]:
 
 
 def first_rows(scheme: Any, visits: Any) -> list[Any]:
-    """List the rows before the first fused step, which make the nodal sums that it needs."""
+    """List the rows that make the nodal sums needed by the first fused step."""
     if visits is not Fused:
         return []
     return [rows_of(scheme, Fused)[-1]._replace(gathers=False, only_if_more=False, moves=False)]
@@ -143,7 +143,7 @@ def _taking(rows_of_kind: Callable) -> Callable[[StepKind, Setup, Tag, bool], bo
     return take_all
 
 
-# Take a step, or the rows before the first. With `more`, a fused step leaves sums for the next.
+# Take a step, or the rows before the first step; with `more`, a fused step leaves sums.
 step, begin = _taking(rows_of), _taking(first_rows)
 
 

@@ -46,7 +46,7 @@ def surface_of(faces: np.ndarray, margin: float, *, odd: bool = False) -> Surfac
     middle = faces.mean(axis=1)
     extent = np.maximum(np.ptp(middle, axis=0).max(initial=0), TINY)
     index = ((middle - middle.min(axis=0, initial=np.inf)) / extent * 1023).astype(np.int64)
-    code = np.zeros(count, np.int64)  # along a Morton curve (1966)
+    code = np.zeros(count, np.int64)  # positions along a Morton curve (1966)
     for bit in range(10):
         for k in range(d):
             code |= (index[:, k] >> bit & 1) << (d * bit + k)
@@ -149,7 +149,7 @@ def closest(kin, surface, x, reach):
     leaves = surface.low.shape[0] // 2
     best, face = reach * reach, -1
     k = 1
-    while k < leaves:  # first descend to a near face, so that few boxes are searched
+    while k < leaves:  # descends to a near face first, so that few boxes are searched
         left, right = _from_box(kin, surface, 2 * k, x), _from_box(kin, surface, 2 * k + 1, x)
         if min(left, right) >= best:
             break
@@ -230,7 +230,7 @@ def _crossed(a, b, point):
     (ax, ay), (bx, by), (x, y) = a, b, point
     if (ay > y) == (by > y):
         return 0
-    if ay < by:  # so that operations are the same for both faces of an edge
+    if ay < by:  # makes the operations the same for both faces of an edge
         return 1 if x < ax + (y - ay) / (by - ay) * (bx - ax) else 0
     return -1 if x < bx + (y - by) / (ay - by) * (ax - bx) else 0
 

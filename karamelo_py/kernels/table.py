@@ -73,7 +73,7 @@ class Gather(NamedTuple):
 
     task: NamedTuple
     share: float = 1.0
-    of_last_step: bool = False  # uses the velocity before the update
+    of_last_step: bool = False  # True: uses the velocity before the update
 
 
 class Scatter(namedtuple("Scatter", "quantities weights")):
@@ -89,9 +89,9 @@ class Scatter(namedtuple("Scatter", "quantities weights")):
 class NodeTask(NamedTuple):
     """Carries out a task at every node in use."""
 
-    task: Any  # a tag, or the class of tags that `make` returns
+    task: Any  # a tag, or the class of the tags that `make` returns
     at: Any = None  # maps the setup to a setup with other nodes
-    length: Any = None  # maps the setup to a time interval, used instead of `kick`
+    length: Any = None  # maps the setup to a time interval that replaces `kick`
     make: Any = None  # maps the setup to the tag
 
 
@@ -147,7 +147,7 @@ class Sweep(NamedTuple):
     moves: bool = True  # new positions go to the other array
     only_if_more: bool = False  # the scatter is for the next step
     at: Any = None
-    reported: Any = take_reports  # takes the reports of points, unless None
+    reported: Any = take_reports  # takes the reports of points, if not None
 
 
 def each_node(function: Any) -> EachNode:
@@ -170,7 +170,7 @@ def each_point(function: Any, law: type) -> EachPoint:
 
 
 def _tasks(gathers: list[Gather]) -> tuple:
-    """List the tasks of a pass. Strain depends on an earlier move and the velocity's step."""
+    """List the tasks of a pass. Strain depends on earlier moves and on the step of the velocity."""
     kind: type = strain.Strain
     if any(isinstance(g.task, Move) for g in gathers):
         kind = strain.StrainInMove
@@ -188,7 +188,7 @@ class _FusedStep:
     def __init__(self, rows: Iterable[Any]):
         self.rows: list[Any] = []
         self.visits: list[Visit] = []
-        self.gathers: list[Gather] = []  # gathers of the next pass
+        self.gathers: list[Gather] = []  # gathers collected for the next pass
         self.next_sums: Scatter | None = None  # the first scatter, for the last pass
         for row in rows:
             _FUSED.get(type(row), _FusedStep.add)(self, row)
@@ -292,8 +292,8 @@ COMBINED = frozenset({Gather, Scatter, Repeated, SceneTask})
 class Added(NamedTuple):
     """Rows and tasks that accompany a task or quantity in a scene (`Setup.additions`)."""
 
-    before: tuple = ()  # rows before it
-    instead: Any = None  # replaces it
+    before: tuple = ()  # rows before the task or quantity
+    instead: Any = None  # replaces the task or quantity
     first: tuple = ()  # in the same pass, before it
     then: tuple = ()  # in the same pass, after it
 
@@ -403,7 +403,7 @@ def _hold_node(s, n):
 
 def hold_axis(s: Setup) -> tuple:
     """Set v_r = 0 on an axis of symmetry, where N / r is unbounded."""
-    # normals on the axis are axial
+    # normals on the axis are along the axis
     return (EachNode(_hold_node, _hold_axis),) if s.kin.hoops else ()
 
 
@@ -459,7 +459,7 @@ def any_node(s):
 
 
 def light_node(s):
-    """Return the task that limits gradients at nodes below a mass (USL): d (c dt / h)^2 of a point.
+    """Return the task that limits gradients at nodes lighter than d (c dt / h)^2 of a point (USL).
 
     This fraction is at most 1. At nodes of less mass, strain would change faster than stress can
     follow. There is no limit with moments in the total frame, which return the whole nodal velocity

@@ -69,7 +69,7 @@ def add_many(totals, row, terms, count):
     Terms are summed as integers of two sizes, except terms 2^30 times smaller than the largest. The
     last bits of a number plus 1.5 2^52 are its integer part, so the loop vectorises.
     """
-    if many_threads():  # each has one or two terms
+    if many_threads():  # each thread has one or two terms
         for q in range(count):
             add_to(totals, row, terms[q])
         return
@@ -158,7 +158,7 @@ def _round_all(totals, values):
 
 
 def values_of(totals: np.ndarray) -> np.ndarray:
-    """Round totals (k, LIMBS). A quantile has thousands, most of which are 0."""
+    """Round totals (k, LIMBS). Quantiles have thousands of totals, most of which are 0."""
     values, some = np.zeros(len(totals)), totals.any(axis=1)
     others = values[some]
     _round_all(totals[some], others)

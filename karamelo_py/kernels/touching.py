@@ -44,11 +44,11 @@ class Touch(NamedTuple):
     values: tuple
     shape: NamedTuple
     mu: float
-    reach: float  # largest known depth
-    lost: int  # address of a function for points without a way out
+    reach: float  # largest depth that is computed
+    lost: int  # address of a function that reports points without a way out
 
     of_nodes = False
-    of_time = True  # formulas of time are evaluated at the end of the step, too
+    of_time = True  # evaluates formulas of time also at the end of the step
 
 
 def direction_of(falls, step):
@@ -59,7 +59,7 @@ def direction_of(falls, step):
 
 @point_function()
 def memory_of(tag, members):
-    """Return the arrays of lever, grip (or None) and loss of a fix."""
+    """Return the fix's arrays of lever, grip (or None) and loss."""
 
 
 def ball_at_first(ball, within, closer):

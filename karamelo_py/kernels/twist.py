@@ -1,4 +1,4 @@
-"""Rows of a step for rotation around an axis; nodes have one such component of velocity."""
+"""Rows of a step for rotation around an axis; nodes have one velocity component around the axis."""
 
 from typing import Any, NamedTuple
 

@@ -12,7 +12,7 @@ from karamelo_py.kernels.arrays import MASS, of_change, of_force, of_momentum
 from karamelo_py.kernels.equations.loss import FrictionalHeat, warm_node
 from karamelo_py.kernels.totals import add_to, add_torque, counts
 
-FRICTION = 3  # program of the coefficient, after the components
+FRICTION = 3  # index of the coefficient's program, after the components
 
 
 @noinline
@@ -59,13 +59,13 @@ def rub(members, call, q, mu):
                 if torque > 0:
                     x = (positions[0, q], positions[1, q], positions[2, q])
                     add_torque(control.totals, torque, x, c, -mass * taken / dt)
-    # the wall takes no heat
+    # heat goes to the node, as the wall takes none
     warm_node(field(nodes.fields, FrictionalHeat), n, work)
 
 
 @noinline
 def stick(kin, nodes, programs, n):
-    """Stop a sticking node also in the velocity that strains; stress would do spurious work."""
+    """Stop a sticking node also in the straining velocity: stress would do spurious work."""
     d = kin.dimension
     for c in range(d):
         if programs[c].begin < 0 and nodes.update[n, c] != 0:

@@ -235,7 +235,7 @@ def take_drift(s):
 
 
 def note_crossing(control, d):
-    """Add the path (in cells) that elastic energy has travelled since the last check.
+    """Add the path (in cells) that elastic energy has moved since the last check.
 
     New energy has no path; vibrations renew the energy within a wave period.
     """
@@ -314,7 +314,7 @@ def judge(control):
         energy.supplied,
         energy.of_bodies,
     )
-    # The energy of another body may be a small part of the energy of a rigid body that hits it.
+    # A rigid body may have far more energy than the body that it hits.
     vibrating = max(abs(energy.stored), energy.kinetic - energy.of_drift, energy.of_bodies)
     energy.largest_own = max(energy.largest_own, vibrating)
     way = 0.0
@@ -326,7 +326,7 @@ def judge(control):
         if loss > energy.lost:
             energy.lost = loss
             energy.crossed = way
-            # means, as a single check contains the shortest waves
+            # compares means, as a single check contains the shortest waves
     unit = unit_of(energy)
     if energy.looks == FEW:
         energy.first_few = energy.first_mean = energy.largest_mean = (
@@ -348,7 +348,7 @@ def judge(control):
         energy.grown = max(energy.grown, growth(energy.first_mean, mean, unit))
         energy.largest_mean = max(energy.largest_mean, mean)
     reference = abs(energy.first_balance) + energy.supplied
-    # False for NaN
+    # also False for NaN
     return balance - energy.first_balance <= max(BOUND * reference, energy.energy_floor)
 
 
@@ -360,7 +360,7 @@ def _range_of_heat(kin, points, laws, control):
         capacity = heat_capacity(law, points.mass[p])
         if capacity > 0:
             T = float(temperature(law, kin, state))
-            # written so that NaN is stored, too
+            # `not <=` stores NaN, too
             heat.T_low = T if not heat.T_low <= T else heat.T_low
             heat.T_high = T if not heat.T_high >= T else heat.T_high
             work = dissipated_energy(law, kin, state) * specific_volume(law)

@@ -1,4 +1,4 @@
-"""Back ends of a run: CPU, GPU, MPI rank, Newton's method."""
+"""Back ends of a run: the CPU, a GPU, one MPI rank, or Newton's method."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from karamelo_py.run.step_size import StepSize
 
 
 class Backend(SceneState, Protocol):
-    """A scene that can take steps.
+    """A scene in arrays that can take steps.
 
     A run calls `begin` or `go_on`, then `compile`, then `advance`.
     """

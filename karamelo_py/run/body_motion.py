@@ -15,12 +15,12 @@ class BodyMotion(NamedTuple):
     number: int
     mass: float
     centre: np.ndarray  # (d,) centre of mass
-    velocity: np.ndarray  # (d,) of the centre
+    velocity: np.ndarray  # (d,) velocity of the centre of mass
     spread: np.ndarray  # (d, d) sum m X X, where X is the position relative to the centre
     shear: np.ndarray  # (d, d) sum m X V, with velocities V relative to the centre
-    low: np.ndarray  # (d,) bounding box
+    low: np.ndarray  # (d,) corners of the bounding box: low, high
     high: np.ndarray
-    slow: np.ndarray  # (d,)
+    slow: np.ndarray  # (d,) extreme velocity components: slow, fast
     fast: np.ndarray
 
     @property
@@ -32,7 +32,7 @@ class BodyMotion(NamedTuple):
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocity (3,), I^-1 L. It is 0 about an axis on which all points lie."""
+        """Angular velocity (3,), I^-1 L, but 0 about an axis on which all points lie."""
         spread, shear = np.zeros((2, 3, 3))
         d = len(self.centre)
         spread[:d, :d], shear[:d, :d] = self.spread, self.shear

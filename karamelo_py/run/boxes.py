@@ -15,20 +15,20 @@ SPAN = 256  # nodes in a span
 
 
 class Boxes(NamedTuple):
-    order: np.ndarray  # order of summation
-    grid: np.ndarray  # (b,)
-    lo: np.ndarray  # (b, d)
-    hi: np.ndarray  # (b, d)
+    order: np.ndarray  # (b,) order of summation
+    grid: np.ndarray  # (b,) grid of each box
+    lo: np.ndarray  # (b, d) first node in each direction
+    hi: np.ndarray  # (b, d) last node in each direction
     rows: np.ndarray  # (b, r, 2) as `Tiling.rows`
 
 
 class Reached(NamedTuple):
     """Overlaps between boxes and tiles of nodes, one entry per pair."""
 
-    box: np.ndarray  # (k,)
-    tile: np.ndarray  # (k,)
-    begin: np.ndarray  # (k, d) nodes of the overlap
-    end: np.ndarray  # (k, d)
+    box: np.ndarray  # (k,) number of the box
+    tile: np.ndarray  # (k,) number of the tile
+    begin: np.ndarray  # (k, d) first nodes of the overlap
+    end: np.ndarray  # (k, d) last nodes of the overlap
     size: np.ndarray  # (k,) number of nodes
 
 
@@ -90,7 +90,7 @@ def between(begin: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 
 def ragged(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for all items of `counts` lists, the list's number and the index in the list."""
+    """For lists with `counts` (k,) items, return the list and the index in it of each item (n,)."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - (np.cumsum(counts) - counts)[of]
 
@@ -134,7 +134,7 @@ def read_beside(nodes: Nodes) -> list[np.ndarray]:
 
 
 def beyond(contact: Tag) -> int:
-    """Return the number of cells beyond the nodes in use that contact reads."""
+    """Return how many cells beyond the nodes in use contact reads."""
     return contact.looks_beyond if isinstance(contact, SeparateFields) else 0
 
 

@@ -79,7 +79,7 @@ SHEARS = {3: (0, 1), 4: (0, 2), 5: (1, 2)}
 
 ITERATIONS = 40
 SEARCH_HALVINGS = 8
-CONTRACTS = 0.1  # residual / the one before, below which slopes are used again
+CONTRACTS = 0.1  # residual / previous residual, below which slopes are reused
 DIVISIONS = 8  # halvings of an increment that does not converge
 TOLERANCE = 1e-10  # residual / stress, or / the stress change in elastic increments
 UNRESOLVED = 1e-13  # stress / modulus below which a stress is round-off
@@ -94,7 +94,7 @@ class Loading(NamedTuple):
     turn: float
     shear: tuple[int, ...]
     prescribed: np.ndarray  # components with a prescribed stress
-    begin: np.ndarray  # the stress of these components at the beginning
+    begin: np.ndarray  # (k,) stress of these components at the beginning
     end: np.ndarray
 
 
@@ -109,7 +109,7 @@ class Point:
         if T is not None:
             self.state = laws.with_temperature(self.law, kin, self.state, T)
         self.stress = self._stress(self.state)
-        self.slopes: np.ndarray | None = None  # of the stress, found last along this path
+        self.slopes: np.ndarray | None = None  # d(stress) / d(strain) found last along this path
         self.strain = np.zeros(6)  # sum of symmetric parts of dt grad v
         self.time = 0.0
         self.work = 0.0  # work per reference volume
@@ -179,7 +179,7 @@ class Point:
                 if laws.jacobian(self.law, self.kin, state) > 0 and np.isfinite(stored):
                     return state, self._stress(state)
             except (ArithmeticError, ValueError):
-                pass  # logarithm of a negative stretch, overflow
+                pass  # the logarithm of a negative stretch, or an overflow
             return None
 
         def misfit(unknown: np.ndarray) -> np.ndarray:
@@ -255,7 +255,7 @@ class Point:
             else:
                 if new:
                     break
-                self.slopes, residual = None, misfit(unknown)  # which restores the increment
+                self.slopes, residual = None, misfit(unknown)  # misfit() restores the increment
         self.slopes = None
         raise Unreachable("the law does not reach the prescribed stress")
 
@@ -365,7 +365,7 @@ class Response:
         right.set_ylabel("von Mises stress q")
         for axes in (left, right):
             tidy(axes)
-            # There is space for labels such as 0.0025; longer ones get a power of ten.
+            # Labels such as 0.0025 fit; longer ones get a power of ten.
             axes.locator_params(axis="x", nbins=6)
             axes.ticklabel_format(scilimits=(-3, 4))
             if axes.get_legend_handles_labels()[0]:

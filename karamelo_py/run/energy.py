@@ -79,7 +79,7 @@ class EnergyWatch:
         update = simulation.hub.update
         watch.watch_energy = int(not unknown_work(simulation.hub) and simulation.moves)
         anew = not self.followed or set_anew
-        self.followed = simulation.moves  # the balance does not include load steps
+        self.followed = simulation.moves  # load steps are not in the balance
         if anew:
             self.told_of_growth = self.told_of_loss = False
         if watch.watch_energy:
@@ -155,8 +155,7 @@ class EnergyWatch:
             return False
         if not watch.watch_energy:
             return True
-        # Include the last window: noise that grows by 50 % in 100 steps has already spoiled the
-        # state.
+        # Include the last window: noise that grows 50 % in 100 steps has already spoiled the state.
         before = watch.first_mean if watch.looks >= FEW else watch.first_balance
         return bool(keeps(before, watch.balance, unit_of(watch)))
 
@@ -168,7 +167,7 @@ class EnergyWatch:
     def change(self) -> float | None:
         if not self.watch.watch_energy or self.watch.looks <= FEW:
             return None
-        # Relative to the first balance, which `forget_growth` leaves unchanged.
+        # The loss is relative to the first balance, which `forget_growth` leaves unchanged.
         return -100 * self.lost_fraction()
 
     def error(self) -> float | None:
@@ -178,7 +177,7 @@ class EnergyWatch:
         return None if change is None else change + 100 * float(lost) / self._largest()
 
     def forget_growth(self) -> None:
-        """Measure growth from the present state, after a warning."""
+        """After a warning, measure growth from the present state."""
         watch = self.watch
         watch.first_few = watch.first_mean = watch.largest_mean
         watch.windows, watch.grown = 0, 0.0

@@ -204,7 +204,7 @@ class StepsOnCard:
             yield self.launch(gpu.order_cell, cells.cell.size, cells, come_from)
             tables = [as_rows(self.images.of(array)) for _, array in arrays.arrays_of(block.points)]
             room, most = cells.boxes.reshape(-1), max(rows.nbytes for rows in tables)
-            if room.nbytes < most:  # else reuse the memory of cell sums
+            if room.nbytes < most:  # else the memory of cell sums is reused
                 room = self.images.new((-(-most // 8),), np.int64)
             for rows in tables:
                 target = room.view(np.uint8)[: rows.nbytes].view(rows.dtype).reshape(rows.shape)
@@ -323,7 +323,7 @@ class StepsOnCard:
         return self.launch(fixes.publish, 1, self.s, self.hooks, (*numbers, always))
 
     def _publish_at_once(self, h: int) -> list[KernelLaunch]:
-        """Publish a hook's totals right after it, if formulas read values that hooks publish."""
+        """Publish totals right after their hook, if formulas read values that hooks publish."""
         slots = range(*self._slots())
         if self.table[h].slot < 0 or all(read not in slots for read in self._slots_read()):
             return []
@@ -349,7 +349,7 @@ class StepsOnCard:
         return [*launches, before], [*launches, behind]
 
     def send(self) -> None:
-        self.use[:] = 2  # nodes may contain values of any step
+        self.use[:] = 2  # nodes may contain values of earlier steps
         self.images.send([*arrays_in((self.s, self.hooks)), self.use, self.copies])
         self.ordered = -np.inf
 

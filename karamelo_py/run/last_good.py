@@ -39,7 +39,7 @@ class LastGood(NamedTuple):
         good.return_to(simulation)
         if writes:
             path = self._write()
-        present.give(self.hub)  # the files of outputs have not changed
+        present.give(self.hub)  # outputs have not written to their files since
         end = step - (status in (GAINED, HEATED))
         if end - simulation.step <= MOST_REPEATED:
             good.again(simulation.advance, end)
@@ -64,7 +64,7 @@ class LastGood(NamedTuple):
         else:
             good.return_to(simulation)
             if status not in (GAINED, HEATED, STOPPED):
-                # Nodal values depend on the number of steps per call, which must be reproducible.
+                # Repeat the same calls: nodal values depend on the number of steps per call.
                 good.again(simulation.advance, step)
         if status not in (GAINED, HEATED) and step > simulation.step:
             before = watch.energy()

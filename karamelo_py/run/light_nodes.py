@@ -32,15 +32,15 @@ LANCZOS_STEPS = 24  # enough for the highest frequency within 1 %
 
 
 class _Line(NamedTuple):
-    first: np.ndarray  # (n,)
-    weights: np.ndarray  # (n, m)
-    slopes: np.ndarray  # (n, m)
+    first: np.ndarray  # (n,) first node of the stencil
+    weights: np.ndarray  # (n, m) weights of the nodes
+    slopes: np.ndarray  # (n, m) gradients of the weights
 
 
 def stable_share(hub: Hub, grids: NamedTuple) -> float:
     """Return the stable step / (h/c) for the nodes of all solids; inf if it is unknown.
 
-    The result is rounded down to four digits, so that it does not depend on the order of sums.
+    The result is rounded down to four digits, so that the order of sums cannot change it.
     """
     if not along.defined(type(hub.update.method.basis)):
         return inf
@@ -77,7 +77,7 @@ def _stable_share(hub: Hub, solid: Solid, grids: NamedTuple) -> float:
     limit = LIGHT_SHARE * filled.max()
     while True:
         seen = (filled > 0) & (filled < limit)
-        for _ in range(2):  # points of the nodes, then points of the nodes of those points
+        for _ in range(2):  # points of light nodes, then points with a node of these
             near = np.any([seen[nodes(k)] for k in pairs], axis=0)
             seen = np.zeros(count, bool)
             for k in pairs:

@@ -28,22 +28,22 @@ class Listener:
     """Receives the events of a run; subclasses override what they need."""
 
     def begun(self, run: Any, simulation: Any, *, resumed: bool = False) -> None:
-        """The first step is chosen, nothing is compiled; `resumed`: from a restart file."""
+        """Handle the start, before compilation; `resumed` is True for a restart file."""
 
     def ready(self, simulation: Any, *, resumed: bool) -> None:
-        """Compilation is done."""
+        """Handle the end of compilation."""
 
     def stepped(self, simulation: Any) -> None:
-        """Some steps have succeeded."""
+        """Handle steps that have succeeded."""
 
     def wrong(self, simulation: Any, status: int, too_large: bool) -> Trouble | None:
-        """Explain `status` (DONE: an energy gain); return None if this listener cannot.
+        """Explain `status` (DONE for an energy gain), or return None.
 
-        `too_large`: the step was too large from the start of the run.
+        `too_large`: the step was already too large at the start of the run.
         """
 
     def ended(self, run: Any, simulation: Any, first_step: int, wall: float) -> None:
-        """The run has ended; steps from `first_step` on took `wall` seconds."""
+        """Handle the end of a run whose steps, from `first_step` on, took `wall` seconds."""
 
     def signalled(self, number: int) -> None:
-        """A signal has arrived; the run ends after the present steps."""
+        """Handle a signal; the run ends after the present steps."""

@@ -51,7 +51,7 @@ class RunLoop:
     first_step: int = field(init=False)
     first_time: float = field(init=False)
     last_step: float = field(init=False)
-    ruined: bool = field(init=False)  # whether the step was too large in an earlier run
+    ruined: bool = field(init=False)  # True if the step was too large in an earlier run
 
     def __post_init__(self, halve: bool) -> None:
         self.rollback = RollBack(self.hub, self.tell, halve=halve)
@@ -98,7 +98,8 @@ class RunLoop:
                 with counted("output"):
                     hub.console.end_run()
                     if self.interrupted:
-                        # Restart files come first: a longer run would not have the final output.
+                        # Restart files come first: a longer run that reads them lacks the final
+                        # output.
                         hub.output.write_last()
                     hub.output.end()
                 self._agree(simulation)  # no further run starts after a signal

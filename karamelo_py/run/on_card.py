@@ -64,7 +64,7 @@ class SimulationOnCard(Simulation):
 
     @property
     def nodes(self) -> NodesByNumber:
-        """Nodes after the last step. There may be many, so they are fetched only when used."""
+        """Nodes after the last step, fetched only when used, as there may be many."""
         if self._nodes_ahead:
             self._fetch()
             self._nodes_ahead = False
@@ -110,7 +110,7 @@ class SimulationOnCard(Simulation):
 
     def in_tiles(self) -> bool:
         self.sort_if_due()
-        self._sent = False  # points store the work of forces
+        self._sent = False  # the energy check resets the work of forces at points
         return super().in_tiles()
 
     def refuse(self) -> None:

@@ -14,7 +14,7 @@ from karamelo_py.scene import boundary
 from karamelo_py.scene.hub import Hub
 from karamelo_py.script.errors import ScriptError
 
-HALVINGS = 5  # largest number of halvings in a run
+HALVINGS = 5  # largest number of halvings of the step in a run
 CONTINUE, HALVE, STOP = "continue", "halve", "stop"
 RETURNS = 2  # returns to a state before an energy gain; two halvings without effect are enough
 
@@ -44,7 +44,7 @@ class RollBack:
         """
         self.simulation, self.first_step, self._always = simulation, first_step, looks
         self.too_large = simulation.steps.too_large
-        # Returning to an earlier state cannot restore points that a fix deletes.
+        # Points that a fix has deleted cannot be restored by a return to an earlier state.
         deletes = any(fix.every for fix in self.hub.fixes.values())
         lost = ruined or deletes or self.hub.update.boundary == "delete"
         self.begun_at = -1 if lost else simulation.step

@@ -104,7 +104,7 @@ class SceneArrays:
         self.tiles.mode = self.mode
         self.domain = Subdomain(self) if comm.size > 1 else WholeDomain(self)
         self.control = self.setup.control
-        self.version = 0  # increases when fields change without a step
+        self.version = 0  # increases when fields change between steps
         self.rollback: RollbackPoint | None = None  # last good state of the last run
         self.mapped = False  # whether nodes show the present state
 
@@ -168,7 +168,7 @@ class SceneArrays:
 
     def fastest(self, common: Sequence[float] = (0.0, 0.0, 0.0)) -> float:
         velocities = (block.points.v for block in self.setup.blocks)
-        # Avoids a copy, as there may be millions of points.
+        # Velocities are passed by component, without a copy, as there may be millions of points.
         components = ((a, c) for v in velocities if v.size for a, c in zip(v, common, strict=False))
         largest = max((max(a.max() - c, c - a.min()) for a, c in components), default=0.0)
         return float(self.comm.allreduce_max(np.array([largest], float))[0])
@@ -229,7 +229,7 @@ class SceneArrays:
             self.sort()
 
     def bring(self) -> None:
-        """Make the whole state available on the CPU, with points in the order of tiles."""
+        """Update the whole state on the CPU, with points in the order of tiles."""
         sorted_before = any(block.tiling.count[0] for block in self.setup.blocks)
         if self.comm.allreduce_max(np.array([sorted_before], int))[0] and np.isinf(
             self.control.motion[0].drift

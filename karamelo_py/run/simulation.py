@@ -122,7 +122,7 @@ class Simulation(SceneArrays):
         self.present[ids] = False
         self.keep_present()
         self.tiles.unsort(self.control)
-        # Energy balance and rate still belong to the last step, even if a run begins here.
+        # Energy balance and rate belong to the last step, even if a run begins here.
         super().changed()
         self.steps.measured = True
         return mass, kinetic + stored
@@ -167,7 +167,7 @@ class Simulation(SceneArrays):
         Load steps call `between` with a progress message, and end if it returns True.
         """
         self.between = between
-        self.control.motion[0].wrong = 0  # may be set by earlier steps
+        self.control.motion[0].wrong = 0  # an earlier call may have set it
         with self.comm.joint():
             from_python = bool(self.fixes.lasting.in_python) or self.begins
             self.domain.begin(self.hooks, from_python=from_python)
@@ -177,7 +177,7 @@ class Simulation(SceneArrays):
 
     def _advance_to(self, target: int) -> int:
         while True:
-            self.sort_if_due()  # not after the last step, since its nodes may be output
+            self.sort_if_due()  # not after the last step: output may read the present nodes
             try:
                 status = self._advance(target - self.step)
             except PointsMoved:
@@ -234,7 +234,7 @@ class Simulation(SceneArrays):
         names = {name for fix in lasting.fixes for name in fix.hooks()}
         self.visits = Staged() if lasting.in_python or names & set(POINT_STAGES) else Fused()
         for fix in self.fixes.once:
-            # This stage comes first in a step, so the fix may act before the first output.
+            # This stage is the first of a step, so the fix may act before the first output.
             self._set_initial(fix)
         self.begun |= set(self.fixes.once)
         rigid = any(solid.rigid for solid in self.hub.solids.values())

@@ -71,7 +71,7 @@ def conserving_fraction(hub: Hub) -> float:
 
 
 def _retains_velocities(hub: Hub) -> bool:
-    """Return True if points retain unresolved velocities: FLIP-like transfers, not in usl."""
+    """Return True for FLIP-like transfers, except in usl: points retain unresolved velocities."""
     update = hub.update
     return (
         update.method.frame.moves
@@ -95,9 +95,9 @@ def lone_point(hub: Hub) -> float:
     """Return the stable step / (h/c) of an isolated point that stores a moment.
 
     The pressure accelerates the stored velocity gradient L by dL/dt = -p / (rho D). This is an
-    oscillator of frequency c sqrt(d / D), which is stable up to dt = 2 sqrt(D / d) / c. If points
-    store gradients, sums of |grad N|^2 / N replace 1 / D. Points of flowing material may become
-    isolated; points of gases then store no moments (`kernels.equations.loss.in_company`).
+    oscillator of frequency c sqrt(d / D), stable up to dt = 2 sqrt(D / d) / c. If points store
+    gradients, sums of |grad N|^2 / N replace 1 / D. Points of flowing material may become isolated;
+    points of gases then store no moments (`kernels.equations.loss.in_company`).
     """
     update = hub.update
     keeps = stores_moment(hub.update.transfer) and update.method.frame.moves
@@ -134,9 +134,9 @@ def allows_drift(hub: Hub) -> bool:
 def own_weight_of_drift(hub: Hub) -> float:
     """Return the weight of the common velocity in the default step.
 
-    The standard rule h/(c + |v|) has weight 1; if drift is harmless, the weight is 0. It is larger
-    for two or more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks that drift
-    at 0.05 to 0.5 of the wave speed, the energy gain increases with speed.
+    The standard rule h/(c + |v|) has weight 1; if drift is harmless, the weight is 0. The weight is
+    larger for two or more boxes (ugimp, cpgimp) per cell: at edges of vibrating bars and blocks
+    that drift at 0.05 to 0.5 of the wave speed, the energy gain increases with speed.
     """
     if allows_drift(hub):
         return 0.0
@@ -171,7 +171,7 @@ def courant_number(hub: Hub, *, longer: bool) -> float:
 
 
 def corrected_share(hub: Hub) -> float:
-    """Return the factor of the stable step with mass=corrected."""
+    """Return the factor by which mass=corrected changes the stable step."""
     method = hub.update.method
     if not method.corrected:
         return 1.0
@@ -186,7 +186,7 @@ def courant_of(hub: Hub, scheme: Tag) -> tuple[float, float]:
 
 
 def _is_all_wet(hub: Hub) -> bool:
-    """Return whether water at least as stiff as the soil fills all solids."""
+    """Return True if water at least as stiff as the soil fills all solids."""
     kin = Space()
     for solid in hub.solids.values():
         law, fluid = solid.material.whole, solid.material.fluid
@@ -246,8 +246,8 @@ def elastic_speed(simulation: SceneState, solid: Solid) -> tuple[float, bool]:
 def stable_conduction(hub: Hub) -> float:
     """Return the smallest stable step of conduction in undeformed bodies.
 
-    It is h^2 / (4 d) capacity / conductivity. This is half of the bound for lumped finite elements,
-    since points may be anywhere in a cell.
+    The step is h^2 / (4 d) capacity / conductivity. This is half of the bound for lumped finite
+    elements, since points may be anywhere in a cell.
     """
     if not hub.update.thermal:
         return inf

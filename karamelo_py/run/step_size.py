@@ -32,7 +32,7 @@ NO_STRIDE = 1e9  # path in cells that points never reach
 class StepPolicy(NamedTuple):
     still: tuple[float, float]  # stable step / (h/c), and the fraction used, at rest
     moving: tuple[float, float]
-    weight: float  # weight of the common velocity
+    weight: float  # weight of the common velocity in the rate
     fixed_dt: float  # 0 if the step adapts to the fastest point
     heat_factor: float  # fraction of the limit of conduction
 
@@ -43,7 +43,7 @@ class StepPolicy(NamedTuple):
         if update.dt_factor is None and update.fixed_dt is None:
             still, moving = (own_step_of_waves(hub, still=still) for still in (True, False))
             return cls(still, moving, own_weight_of_drift(hub), fixed, DEFAULT_SHARE)
-        # Fractions that scripts set refer to h/(c + |v|), also at rest.
+        # Fractions that scripts set refer to h/(c + |v|), even if the points are at rest.
         asked = courant_number(hub, longer=False), update.dt_factor or conserving_fraction(hub)
         return cls(asked, asked, 1.0, fixed, update.dt_factor or DEFAULT_SHARE)
 
@@ -64,7 +64,7 @@ Carried = tuple[float, float, float, float]
 
 
 def carried_on(control: Control) -> Carried:
-    """Return the last dt, contact dt, path, and loss of deleted points, for the next lowering."""
+    """Return last dt, contact dt, path and loss of deleted points, for the next lowering."""
     step, path, lost = control.step[0], control.motion[0].path, control.energy[0].lost_with_deleted
     return float(step.last_dt), float(step.last_contact_dt), float(path), float(lost)
 
@@ -89,7 +89,7 @@ class StepSize:
     def __init__(self, simulation: SceneState):
         self.simulation, self.control = simulation, simulation.control
         self.step, self.motion = self.control.step[0], self.control.motion[0]
-        self.measured = False  # whether motion.rate belongs to the present state
+        self.measured = False  # True if motion.rate is measured in the present state
 
     def begin(self, end_time: float) -> None:
         self.policy = StepPolicy.of(self.simulation.hub)

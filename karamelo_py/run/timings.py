@@ -41,7 +41,7 @@ class Timings:
             yield
 
     def on_start(self, _: str) -> None:
-        """Note that a kernel is being compiled, by this process or by another that it waits for."""
+        """Note that this process compiles a kernel, or waits for another one that does."""
         self._depth += 1
         if self._depth == 1:
             self._begun = _clocks()

@@ -1,4 +1,4 @@
-"""Points at the edge of the domain."""
+"""Reflection, deletion and periodic return of points at the edge of the domain."""
 
 from collections.abc import Callable
 from typing import Any

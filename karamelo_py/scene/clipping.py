@@ -16,7 +16,7 @@ HALVED = 5  # number of halvings of a box in each direction
 PLANE = 0.01  # tolerated distance of the surface from a plane / box size
 EDGE = 0.05  # tolerance for the smallest sub-boxes
 SHEET = 0.01  # tolerance for a surface that may belong to a thin sheet
-LEAST = 0.1  # fraction of a box; smaller pieces are merged with a neighbour
+LEAST = 0.1  # smallest fraction of a box; smaller pieces are merged with a neighbour
 NOTHING = 1e-9  # round-off / box size
 # Tolerated fraction of a box in smallest sub-boxes whose surface is not plane. It is ROUGH/3 at a
 # corner in 2D or an edge in 3D, and larger in thin sheets.
@@ -29,7 +29,7 @@ SLOPE = 1e-3  # smaller slopes, relative to the largest, count as 0: sums would 
 class Pieces(NamedTuple):
     number: np.ndarray  # (n,) number of the box, ascending
     middle: np.ndarray  # (n, d) centroids
-    fraction: np.ndarray  # (n,) of the box volume
+    fraction: np.ndarray  # (n,) volume / box volume
     # (m,) fraction of each box that lies in smallest sub-boxes with a surface that is not plane
     rough: np.ndarray
 
@@ -44,8 +44,7 @@ def clip(region: Region, x: np.ndarray, size: float, first: int) -> tuple[np.nda
 
     Returns the mask of boxes that reach into the region, and the pieces of cut boxes.
 
-    Boxes are first cut at the domain and the region's bounding box, so that faces along axes are
-    exact.
+    Boxes are first cut at the domain and the region's bounding box, so faces along axes are exact.
     """
     d = x.shape[1]
     half = size / 2
@@ -113,7 +112,7 @@ def join(region: Region, boxes: Any, pieces: Pieces) -> Pieces:
 def _measure(
     region: Region, lo: np.ndarray, edges: np.ndarray, size: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return volume fraction (n,), first moment (n, d) and `Pieces.rough` of clipped boxes."""
+    """Return volume fractions (n,), first moments (n, d) and `Pieces.rough` of clipped boxes."""
     n, d = lo.shape
     sums: np.ndarray = np.zeros((1 + d, n))
     rough: np.ndarray = np.empty(0)
@@ -198,7 +197,7 @@ def _plane(mean: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _simplices(mean: np.ndarray, m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the results of `_plane` for slopes -`m` < 0 (d, n).
+    """Return the results of `_plane` for slopes -`m` (d, n), with m > 0.
 
     The volume is the simplex at the lowest corner, minus its overhangs beyond the cube, which are
     simplices at the other corners (inclusion and exclusion).

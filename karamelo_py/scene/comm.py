@@ -42,9 +42,9 @@ class SerialComm:
     rank, size = 0, 1
     beside = 1  # number of processes on the same cores, including this one
     on_machine = 1
-    waited = 0.0  # seconds
+    waited = 0.0  # seconds spent waiting for other processes
     failed_within = False
-    at_end = False  # all processes have reached the same end of the run
+    at_end = False  # True if all processes have reached the same end of the run
 
     @property
     def leads(self) -> bool:

@@ -30,7 +30,7 @@ THIN = Restrictions("thin", "plane strain or 1D strain", but=NO_F_BAR)
 
 
 class Domain:
-    """A box with a grid of square cells that begins at its lower corner.
+    """A box with a grid of square cells, which begins at the lower corner of the box.
 
     If a side is not a multiple of `h`, the grid extends past the upper corner by less than a cell.
     `lo` and `hi` (3,) are 0 in unused directions. If `h` is not given, the first solid sets it.
@@ -66,15 +66,15 @@ class Domain:
         return round((self.hi[k] - self.lo[k]) / (self.h or 1.0))
 
     def with_images(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return both ends (3,) of the grid; it extends past the domain in periodic directions."""
+        """Return both ends (3,) of the grid, including images beyond periodic directions."""
         more = np.zeros(3)
         more[list(self.periodic)] = GHOSTS * (self.h or 0.0)
         return self.lo - more, self.hi + more
 
     def depth(self, x: np.ndarray) -> np.ndarray | float:
-        """Return the factor from area (2D) or length (1D) to volume at `x` (n, d).
+        """Return volume / area (2D) or volume / length (1D) at positions `x` (n, d).
 
-        It is the thickness or cross-section; in axisymmetry, the length or area per radian.
+        In axisymmetry, the factor is the length or area per radian.
         """
         hoops = self.kin.hoops
         return x[:, 0].astype(float) ** hoops if hoops else self.thickness

@@ -85,7 +85,7 @@ class ParticleGroup(AnyGroup):
     def __len__(self) -> int:
         return sum(map(len, self.pieces()))
 
-    ids = AnyGroup.members  # ids - 1
+    ids = AnyGroup.members  # returns ids - 1
 
     def total(self) -> int:
         return sum(solid.count for solid in self.hub.solids.values())
@@ -107,7 +107,7 @@ class ParticleGroup(AnyGroup):
         return any(self.has(ids).any() for ids in _numbers_of(solid))
 
     def bits(self, count: int) -> np.ndarray:
-        """Return the membership of `count` points as bits, in whole 64-bit words."""
+        """Return a bit per point of `count` points, 1 for members, in whole 64-bit words."""
         size = -(-count // 64) * 8
         if self.all:
             return np.full(size, 255, np.uint8)
@@ -153,7 +153,7 @@ class NodeGroup(AnyGroup):
 
     kind = "nodes"
     script_kind = "a group of nodes, or all"
-    awaits_solids = False  # members may come with later solids
+    awaits_solids = False  # True if later solids may bring members
 
     def __init__(self, hub: Scene, *, everything: bool = False):
         super().__init__(hub, everything=everything)

@@ -140,7 +140,7 @@ class Update:
         self.boundary_mark: Mark | None = None
         self.warned_of_bounces = False
         self.warned_of: list[str] = []
-        # Largest speed / wave speed, and the wave speed, if a run began faster than its waves.
+        # Largest speed / wave speed, and the wave speed, if a run began with supersonic points.
         self.above_waves: list[float] = []
         self.moving: tuple[list[Any], float] = ([], 0.0)  # fixes of the last run; its start
 
@@ -157,7 +157,7 @@ class Update:
 
     @property
     def loses_in_transfer(self) -> bool:
-        """Return True if the loss of the transfer is counted without being asked for."""
+        """Return True if the loss of the transfer is counted, even if no compute asks for it."""
         transfer, loss = self.transfer, self.scheme.traits.loss
         if transfer is None or self.scheme.traits.implicit or loss is None:
             return False
@@ -214,7 +214,7 @@ class Hub:
         self.scouting = False  # ends the rehearsal at the first run
         self.begun = 0  # runs begun, including those in the rehearsal
         self.answered = False  # the script has printed or written something
-        self.checking = False  # for ``check``: the first run only reports
+        self.checking = False  # True for ``check``: the first run only reports
         self.pausing = False  # stops before runs, for a Python program that controls them
         self.open_ended = False  # a Python program may add commands after the script
         self.in_runs: list[Any] = []
@@ -243,7 +243,7 @@ class Hub:
         self.functions: dict[str, Any] = {}  # Python functions passed by a program
         self.in_run = 0
         self.listeners: list[Any] = []  # `run.listening.Listener`
-        self._fits_run = 0  # number of the last run whose arrays still fit the scene
+        self._fits_run = 0  # number of the last run whose arrays still describe the scene
         self.runs: list[dict[str, float]] = []
         self.record = RunRecord()
         self.warned: list[tuple[float, str]] = []
@@ -329,7 +329,7 @@ class Hub:
                         item.mark,
                         hint="in the plug-in, call self.publish in refresh, or set published = ()",
                     )
-        # Published values of all processes must agree, even if a plug-in uses random numbers.
+        # Published values of all processes must agree, even if a plug-in draws random numbers.
         self.values.array[:] = self.settings.comm.bcast(self.values.array)
 
     def warn(

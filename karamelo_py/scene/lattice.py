@@ -10,7 +10,7 @@ import numpy as np
 from karamelo_py.points.grid import Grid
 from karamelo_py.script.errors import ScriptError
 
-# Points up to this distance past a face (in cells) are on it.
+# Points up to this distance past a face (in cells) count as points on the face.
 RELATIVE_TOLERANCE = 1e-9
 MAX_NODES = 2**31 - 1  # limit of 32-bit numbers in kernels
 # Points or nodes per batch: enough to hide NumPy's overhead, few enough for caches and memory.
@@ -68,7 +68,7 @@ class Lattice:
         return np.stack(np.unravel_index(numbers - self.first, self.shape), axis=1)
 
     def positions(self, numbers: np.ndarray | None = None) -> np.ndarray:
-        """Return positions (n, 3) of nodes, of all by default."""
+        """Return the positions (n, 3) of nodes, by default of all nodes."""
         if numbers is None:
             numbers = self.first + np.arange(self.node_count)
         return self.lo + self.places(numbers) * self.spacing

@@ -43,7 +43,7 @@ def machine_memory(processes: int = 1, root: Path = Path("/")) -> MachineMemory 
     import psutil
 
     try:
-        with warnings.catch_warnings(action="ignore"):  # warnings about numbers that are not used
+        with warnings.catch_warnings(action="ignore"):  # of numbers that are not used
             machine, swap = psutil.virtual_memory(), psutil.swap_memory()
     except (OSError, RuntimeError):
         return None
@@ -109,7 +109,7 @@ def in_words(count: float) -> str:
 
 
 class Room(NamedTuple):
-    whole: float  # bytes
+    whole: float  # bytes of the machine or job
     of_one: int  # smallest number of bytes of a point
     already: int
     single: bool  # single precision

@@ -12,7 +12,7 @@ class MaterialPart(Named):
 
     `kind` is a family such as ``eos``, and `style` its member.
 
-    `made` is the law, or several laws by kind; `arguments` are those in the script.
+    `made` is the law, or several laws by kind; `arguments` are the part's arguments in the script.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class MaterialPart(Named):
 class Material(MaterialPart):
     script_kind = "the ID of a material"
     catalogue = "materials"
-    flat: type | None = None  # wrapper of the law for thin bodies and generalised plane strain
+    flat: type | None = None  # wraps the law for thin bodies and generalised plane strain
     fluid: Any = None  # pore water; ``around(law)`` wraps the law
 
     @property

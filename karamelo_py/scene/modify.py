@@ -44,7 +44,7 @@ __all__ = [
 ]
 
 
-FIRST, USUAL, LAST = range(3)  # order within a stage; USUAL: as in the script
+FIRST, USUAL, LAST = range(3)  # order of fixes within a stage; USUAL: as in the script
 FROM_PYTHON = 3e-4  # cost of a call of a Python hook, seconds
 
 
@@ -63,7 +63,7 @@ class Publisher:
     # Declared fields (`compiler.fields`); `Force` if ``initial_integrate`` sets forces on points.
     point_fields: tuple[type, ...] = ()
     node_fields: tuple[type, ...] = ()
-    restrictions: Restrictions | None = None  # options of a scene that it does not support
+    restrictions: Restrictions | None = None  # options of a scene that are not supported
 
     def publish(self, name: str, value: float) -> None:
         if name not in self.published:
@@ -100,42 +100,41 @@ class Fix(Publisher):
     """Base of fixes, which act on a `group` during a run. Class attributes are traits."""
 
     group: Any = None
-    formulas: tuple = ()  # for compiled hooks: a formula or None per component
+    formulas: tuple = ()  # for compiled hooks: one formula or None per component
     components: tuple = ()  # for a force in Python: a formula or None per direction
     first_step_only = False  # acts only in the first step after its definition
     # True: Python hooks treat each point or node separately and move none. Hooks then get the
     # points of this process in any order; before the first step, they get them in several calls.
     # Sums need ``total``.
     point_by_point = False
-    for_method = False  # used by the method; the fix itself has no hooks
+    for_method = False  # the method acts for the fix, which has no hooks
     # Prescribes nodal velocities in ``post_update_grid_state``, in directions with a formula.
     # Contact does not change these velocities.
     prescribes_velocity = False
     prescribes_rotation = False  # prescribes the angular velocity of nodes, whose torque is ID_s
-    # Directions in which nodes are held or bounded. Splines are modified at faces whose nodes are
-    # all held.
+    # Directions in which nodes are held or bounded. Splines change at faces with all nodes held.
     held_directions: tuple[int, ...] = ()
     # Friction coefficient (formula) of this wall in directions without a formula, or None.
     wall_friction: Any = None
     by_sizes = False  # computes point sizes from volumes, for a thickness of 1
-    impulsive = False  # removes a penetration within one step
+    impulsive = False  # removes a penetration in a single step
     leads_points = False  # prescribes velocities of points
     reads_itself = False  # formulas may contain values that this fix publishes
     moves: Any = None  # rigid solid that this fix moves by the forces on it
     touches: Any = None  # rigid solid that is in contact with points
-    links = False  # is a contact or joint between rigid bodies
+    links = False  # True for a contact or joint between rigid bodies
     ignites = False
     follows_points = False  # the force depends on positions of points (tools)
     depth_of: Any = None  # function: depth (n,) of positions in a tool, for outlines in pictures
     faces_of: Any = None  # function: present faces (m, d, d) of a tool or a body
     accelerates = False  # formulas are forces per unit mass
-    exerts = False  # publishes a force as ID_x, ID_y, ID_z and, if used, its torque
+    exerts = False  # publishes a force as ID_x, ID_y, ID_z and, if used, the torque of this force
     pressure: Any = None  # formula of a pressure on whole surfaces; None for other fixes
     presses = False  # exerts the force of a surface on points
     brakes = False
     water_only = False  # prescribes the pressure of pore water
     order = USUAL  # FIRST or LAST at each stage, regardless of the order in the script
-    # True: Python hooks do no work that is not summed. False: the energy balance is not monitored.
+    # True: all work of Python hooks, if any, is summed. False: the energy balance is not monitored.
     conserves = False
     # Steps between calls of ``between_steps()`` (0: none), which returns True if it deleted points.
     every = 0
@@ -183,11 +182,11 @@ class Fix(Publisher):
         return mask, values
 
     def points_within(self) -> np.ndarray | None:
-        """Return numbers of the points on which the fix acts, or None for all of its group."""
+        """Return the numbers of the points on which the fix acts, or None for its whole group."""
         return None
 
     def defined(self) -> None:
-        """Called once the fix has its ID."""
+        """Called after the fix has got its ID."""
 
     def deleted(self) -> None:
         """Called before the fix is deleted; raises ScriptError if other fixes need it."""

@@ -17,7 +17,7 @@ from karamelo_py.script.errors import ScriptError
 
 MAX_POINTS = 2**31 - 1
 SAMPLE = 4096
-LOOKS = 9  # doublings of the sample size, up to a million
+LOOKS = 9  # number of times that the sample is doubled, up to a million
 FITS_EVERYWHERE = 1_000_000  # number of points that any machine can store
 # Above this number, points outside the domain are not counted for the warning.
 _MAX_COUNTED = 20_000_000
@@ -27,13 +27,13 @@ class Placement(NamedTuple):
     """Points and their initial domains. A value that is equal for all points may be a scalar."""
 
     x0: Any  # (n, d) positions: array or Filled
-    volume: float | np.ndarray  # (n,) per unit thickness or area, without the factor radius
-    half_size: np.ndarray  # (n, d) of initial domains
-    lo: np.ndarray  # (d,) of the solid
+    volume: float | np.ndarray  # (n,) volumes per unit thickness or area, without the factor radius
+    half_size: np.ndarray  # (n, d) half edges of the initial domains
+    lo: np.ndarray  # (d,) lower corner of the solid's box
     hi: np.ndarray
     outside: float = 0
     shape: str = "box"  # "box" or a meshio cell type
-    corners: np.ndarray | None = None  # (n, c, d) of domains other than boxes
+    corners: np.ndarray | None = None  # (n, c, d) corners of domains other than boxes
     missed: float = 0
 
 
@@ -122,7 +122,7 @@ def lattice_of(region: Region, domain: Domain, h: float, *, apart: bool) -> Latt
 
 
 def offsets(ppc: int, rule: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions (ppc,) of points along a cell of length 1, from its centre, and lengths.
+    """Return positions (ppc,) of points along a unit cell, from its centre, and their lengths.
 
     Rule ``gauss`` is Gauss-Legendre. The default is Karamelo's rule: equally spaced, except that
     three points are rounded Gauss points with equal lengths.

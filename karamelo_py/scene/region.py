@@ -70,7 +70,7 @@ class Region(Named):
 
     @property
     def flat(self) -> bool:
-        """True if a part is a line or surface without an inside."""
+        """True if a part is a line or surface, which has no inside."""
         return any(region.flat for region in self.parts)
 
     @property
@@ -79,7 +79,7 @@ class Region(Named):
 
     @property
     def volume(self) -> float | None:
-        """Volume in the domain; None if unknown."""
+        """Volume in the domain; None if it is not known."""
         return None
 
     def contains(self, x: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ class Region(Named):
         return Outside(shape) if self.exterior and shape is not None else shape
 
     def depth(self, x: np.ndarray, reach: float) -> np.ndarray:
-        """Return the depth (n,) in the region, as `distance` does, with `exterior`."""
+        """Return the depth (n,) of `x` in the region, as `distance` does, but with `exterior`."""
         depth = self.distance(x, reach)
         return -depth if self.exterior else depth
 

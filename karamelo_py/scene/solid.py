@@ -19,7 +19,7 @@ from karamelo_py.scene.region import Region
 from karamelo_py.script.errors import ScriptError, plural
 
 _SAMPLE = 5000
-COLD, WARM = 60.0, 200.0  # K: a T0 below COLD, if others are WARM higher, is in Celsius
+COLD, WARM = 60.0, 200.0  # K: a T0 below COLD is in Celsius if other solids are warmer by WARM
 
 
 class Solid(Named):
@@ -44,7 +44,7 @@ class Solid(Named):
     elements = ""
     region: Region | None = None
     ppc, cut = 0, False  # points per cell and direction; True if clipped at the edge of the region
-    warm = False  # points have different temperatures
+    warm = False  # True if points have different temperatures
 
     @property
     def rigid(self) -> bool:
@@ -127,7 +127,7 @@ class Solid(Named):
         volume = np.asarray(placement.volume, float)
         if self.domain.kin.hoops:
             radius = placement.x0[:][:, 0]
-            if count and radius.min() <= 0:  # a point on the axis has no mass
+            if count and radius.min() <= 0:  # a point on the axis would have no mass
                 raise ScriptError(
                     f"points at x = {radius.min():g}: x is the radius here "
                     f"({self.domain.kin.word}), and points lie at x > 0",
@@ -137,7 +137,7 @@ class Solid(Named):
             volume = volume * self.domain.depth(placement.x0[:])
         else:
             volume = volume * self.domain.thickness
-        # As in `Placement`, but per radian if axisymmetric; read-only; equal values are stored
+        # As in `Placement`, but per radian if axisymmetric; read-only. Equal values are stored
         # once.
         self.places = placement.x0
         self.volume0 = np.broadcast_to(volume, (count,))
@@ -163,7 +163,7 @@ class Solid(Named):
 
     @property
     def x0(self) -> np.ndarray:
-        """Initial positions (n, d); for large solids they are computed at each access."""
+        """Initial positions (n, d); for large solids, each access computes them."""
         return self.places[:]
 
     def x0_of(self, numbers: np.ndarray) -> np.ndarray:

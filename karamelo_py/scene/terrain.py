@@ -140,7 +140,7 @@ def outline_of(x: np.ndarray, z: np.ndarray, ends: tuple, bottom: float) -> np.n
     """Return segments (m, 2, 2) around the ground below a profile, counter-clockwise."""
     x, z = np.concatenate([ends[:1], x, ends[1:]]), np.concatenate([z[:1], z, z[-1:]])
     corners = np.column_stack([np.append(x, ends)[::-1], np.append(z, [bottom] * 2)[::-1]])
-    corners[:2] = corners[1::-1]  # left to right at the bottom
+    corners[:2] = corners[1::-1]  # bottom corners from left to right
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 

@@ -109,7 +109,7 @@ class View:
             self._handed_out[key] = array, array.copy() if written else array
         return self._handed_out[key][0]
 
-    _get: Callable[[type], np.ndarray]  # returns a declared field, (n, components)
+    _get: Callable[[type], np.ndarray]  # returns the field (n, components) of a class
     _put: Callable[[type, np.ndarray], None]
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -26,7 +26,7 @@ CLOSE = (
 PUBLISHED = "iterations", "residual", "parts"
 
 
-# A larger tolerance would accept the first correction without equilibrium; a smaller one is below
+# A larger tolerance could accept the first correction without equilibrium; smaller ones are below
 # round-off.
 Tolerance = Constraint("from 1e-14 to 0.01", lambda value: 1e-14 <= value <= 0.01)
 
@@ -50,9 +50,9 @@ class QuasiStatic(NamedTuple):
         Ghost stabilisation (Coombs 2023) for nodes that overlap only a sliver of the body: jumps of
         gradients at the border are penalised with this fraction of Young's modulus. 0: none.
     limit
-        Action if no equilibrium is found even with 1/1024 of a step: ``error``, or ``stop``, which
-        ends the run. After ``stop``, the script continues with the `time` of the last equilibrium,
-        which gives the limit load.
+        What to do if even 1/1024 of a step has no equilibrium: ``error``, or ``stop``, which ends
+        the run. After ``stop``, the script continues with the `time` of the last equilibrium, which
+        gives the limit load.
 
     Example
     -------

@@ -31,7 +31,7 @@ class SemiImplicit(NamedTuple):
 
     Notes
     -----
-    It needs a material with pore_water, method tlmpm, FLIP or PIC and linear. Nodes of fix
+    The scheme needs a material with pore_water, method tlmpm, FLIP or PIC and linear. Nodes of fix
     seepage_face remain open or closed for a step, by the pressure at its beginning. Not supported:
     bounds and friction in velocity_nodes; fixes local_damping, absorbing and ground_motion;
     velocity_particles on soil; ``--ranks`` and ``--gpu``.

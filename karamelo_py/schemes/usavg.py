@@ -11,7 +11,7 @@ from karamelo_py.schemes.traits import SchemeTraits
 class USAVG(NamedTuple):
     """Do half of the stress update before the forces, and half after them as in musl.
 
-    It conserves energy best, at the cost of two stress updates per step (Nairn 2003, "Material
+    USAVG conserves energy best, at the cost of two stress updates per step (Nairn 2003, "Material
     point method calculations with explicit cracks"). The halves add up to the whole increment of F.
 
     Example

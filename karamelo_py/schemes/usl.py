@@ -18,7 +18,7 @@ LIMITED = NodeTask(UpdateToVelocity, make=light_node)
 class USL(NamedTuple):
     """Update the stress after the forces, with the gradient of the updated nodal velocity.
 
-    This is the fastest scheme, with one pass over the points per step. It is slightly dissipative.
+    This is the fastest scheme, with one pass over the points per step. USL is slightly dissipative.
 
     The stable step is 0.65 h/c, or 0.4 h/c with one point per cell; with bernstein-quadratic it is
     30 % shorter. Points do not retain the velocity of some nodal modes; the strain of these modes
@@ -80,7 +80,7 @@ class USLUnlimited(NamedTuple):
 
     A point that has just entered a cell gives the far node almost no mass m but a finite force f.
     The velocity change f dt / m of that node, and the strain increment that the point gets from it,
-    are then huge. This scheme is meant for comparison with usl.
+    are then huge. Use this scheme only for comparison with usl.
 
     Example
     -------

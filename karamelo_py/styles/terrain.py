@@ -135,7 +135,6 @@ def _next_to(at: np.ndarray, lo: float, hi: float) -> np.ndarray:
 
 
 def _filled(z: np.ndarray, nearest: list[np.ndarray]) -> np.ndarray:
-    """Fill unknown heights outside the domain with the nearest known heights."""
     return np.where(np.isnan(z), z[np.ix_(*nearest)], z)
 
 

@@ -43,7 +43,7 @@ class Measurement(NamedTuple):
     triad: float = 0.0  # memory bandwidth, bytes/s
     debug: bool = False
     ranks: int = 1
-    scaling: bool = False  # measure a `Scaled`
+    scaling: bool = False  # measure the scaling over processes (`Scaled`)
     file: str = ""
 
 

@@ -38,7 +38,7 @@ APART = 1.5  # largest trusted ratio of the time of separate sweeps to the time 
 class Workload(NamedTuple):
     title: str
     script: str
-    lead: int = 3  # steps before the measurement
+    lead: int = 3  # steps taken before the measurement
     karamelo: float | None = None  # published speed, million/s on one core of a small AMD EPYC
 
 
@@ -289,7 +289,7 @@ def stages(simulation: Simulation, seconds: float) -> tuple[dict[str, float], di
 
 
 def _per_step(taken: list[float], count: int) -> float:
-    real, way = taken[::2], taken[1::2]  # alternately with and without points
+    real, way = taken[::2], taken[1::2]  # steps with and without points alternate
     return len(real) / count * max(0.0, statistics.median(real) - statistics.median(way))
 
 

@@ -18,7 +18,7 @@ from karamelo_py.output.snapshots import Snapshot, read
 from karamelo_py.script.errors import ScriptError
 
 PAUSE = 0.5  # seconds between polls
-FILES = 8  # files read per poll, so that the first ones appear early
+FILES = 8  # files read per poll, few so that the first ones appear early
 WHOLE = (".h5", ".hdf5", ".pvd")  # files that contain many states
 
 
@@ -86,7 +86,7 @@ class FolderPage:
 
     def _add(self, path: Path, index: int, snapshot: Snapshot) -> None:
         columns = snapshot.columns
-        if not len(columns.get("x", ())):  # no points, or no positions
+        if not len(columns.get("x", ())):  # there are no points or no positions
             return
         self._columns = self._columns or [name for name in columns if name not in "xyz"]
         if not self._states:

@@ -15,7 +15,7 @@ PAGE = Path(__file__).with_name("run.html")
 POINTS = 1_000_000  # approximate number of points in a frame
 BYTES = 1 << 29  # maximum size of all frames
 COUNT = 400
-SEEN = 1.0  # seconds for which a request of a page counts
+SEEN = 1.0  # seconds for which a page's request counts
 
 
 class Frame(NamedTuple):
@@ -23,7 +23,7 @@ class Frame(NamedTuple):
     time: float
     column: str
     numbers: np.ndarray  # (d + 1, n) positions and the column
-    of: int  # number of points before thinning
+    of: int  # number of points before the frame was thinned
 
     @classmethod
     def of_columns(
@@ -49,12 +49,12 @@ def few_of(ids: np.ndarray, solids: np.ndarray) -> np.ndarray:
 
 
 class KeptFrames:
-    """States by number. If there are too many, every second one is dropped."""
+    """States by number. If there are too many states, every second one is dropped."""
 
     def __init__(self) -> None:
         self._kept: dict[int, Frame] = {}
         self._next, self._every = 0, 1
-        self._new: deque[tuple[int, float]] = deque()  # numbers, and times of arrival
+        self._new: deque[tuple[int, float]] = deque()  # numbers of new states, and times of arrival
         self._lock = threading.Lock()
 
     def add(self, frame: Frame) -> None:

@@ -33,7 +33,7 @@ class Row(NamedTuple):
     time: float
     dt: float
     limit: str
-    gain: float | None  # energy gain in %
+    gain: float | None  # energy gain in %, None if it is not tracked
     log: dict[str, float]
 
 
@@ -89,7 +89,7 @@ class RunPage(Rhythmic, Listener):
         if isinstance(error, FAILURES):
             ended, self._failed = "failed", rendered(error)
             self.hub.warned.append((self.hub.update.time, self._failed))
-        self._ended = ended  # set last, since pages show a running run until then
+        self._ended = ended  # set last: until then, pages show a running run
         server.changed()
         server.flush()
         waits = waits and self.hub.console.terminal and not server.opened
@@ -162,7 +162,7 @@ class RunPage(Rhythmic, Listener):
     def _choose(self, words: Mapping[str, str]) -> None:
         if words.get("name") in self.hub.fields.particle_names():
             self._column = words["name"]
-            if self._rows and not self.hub.in_run:  # no further output would follow
+            if self._rows and not self.hub.in_run:  # no further output would wake the pages
                 self._take_again()
 
     def _pause(self, _: Mapping[str, str]) -> None:

@@ -62,7 +62,7 @@ class Server:
         self._changed = threading.Condition()
         self._shown: dict[int, int] = {}
         self.opened = False
-        self.framed = False  # shown in a notebook
+        self.framed = False  # True if the page is shown in a notebook
         self.token = secrets.token_urlsafe(16)
         self._http = _Quiet(("127.0.0.1", 0), _handler(self))
         self.address = f"http://127.0.0.1:{self._http.server_address[1]}/{self.token}/"
@@ -143,7 +143,7 @@ class _Quiet(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def handle_error(self, *_: object) -> None:
-        """Print nothing on the terminal of the run."""
+        """Print nothing: the run uses the terminal."""
 
 
 def _plotly(_: Mapping[str, str]) -> bytes:
@@ -163,7 +163,7 @@ def _handler(server: Server) -> type[BaseHTTPRequestHandler]:
         server_version, sys_version = "karamelo-py", ""
 
         def log_message(self, *_: object) -> None:
-            """Print nothing on the terminal of the study."""
+            """Print nothing: the study uses the terminal."""
 
         def do_GET(self) -> None:
             name, words = self._asked()

@@ -20,7 +20,7 @@ LINES = 12
 
 
 class StudyPage:
-    """The page of a study. `stopped` is set when a viewer ends the study.
+    """The page of a study. `stopped` is set if a viewer ends the study on the page.
 
     `recorded` are names of recorded values, `axes` the initial axes of the chart; folders are
     relative to `base`.

@@ -81,7 +81,7 @@ def forecast(
 ) -> Forecast | None:  # fmt: skip
     """Predict error and cost at `x` from runs at `xs`, coarse ones first.
 
-    The result is None if there are fewer than two errors, or if the last error is larger than the
+    The result is None if fewer than two errors are known, or if the last error is larger than the
     one before. The error is extrapolated with the last order. Its bounds follow from the smallest
     and the largest order; they are at least 33 % above and 50 % below the error. An order that fell
     may fall as much again; an order below 2 may reach 2. Errors that are small by chance are
@@ -135,7 +135,7 @@ class ChoiceRuns:
     values: dict[str, str]
     rows: list[Row] = field(default_factory=list)
     words: frozenset[str] = frozenset()
-    lines: tuple[str, ...] = ()  # of the script, by method(auto)
+    lines: tuple[str, ...] = ()  # lines of the script, written by method(auto)
     warnings: tuple[str, ...] = ()  # warnings of the finest run
 
     @property
@@ -213,7 +213,7 @@ class Adviser:
         elif 0 < len(chances) < len(self.values):
             if self._crosses(choice, len(chances)):
                 chances[-1] = chances[-1] or UNFOLLOWED
-        else:  # no finer run misses the target
+        else:  # no finer run that misses the target
             meets = np.logical_and.accumulate(np.abs(signed[::-1]) <= self.target)[::-1]
             chances[:-1] = ["" if ok else w for w, ok in zip(chances, meets[:-1], strict=False)]
         return [

@@ -54,14 +54,14 @@ PICTURES = (".png", ".svg")
 
 @dataclass
 class Entry:
-    name: str  # folder; the part before a slash is its group
+    name: str  # name of the folder; the part before a slash is the group
     text: str = ""
-    commands: list[str] = field(default_factory=list)  # without the word karamelo-py
+    commands: list[str] = field(default_factory=list)  # commands without the word karamelo-py
     whole: dict[str, str] = field(default_factory=dict)  # values of words in braces
     small: dict[str, str] = field(default_factory=dict)
-    interpreted: bool = False  # its scenes are too small to be worth compiling
+    interpreted: bool = False  # True if its scenes are too small to be worth compiling
     page: bool = True
-    ends_early: bool = False  # shows runs that do not end well
+    ends_early: bool = False  # True if it shows runs that do not end well
 
     @property
     def group(self) -> str:

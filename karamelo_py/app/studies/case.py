@@ -43,10 +43,10 @@ class CaseOutcome:
     """Status: ``done``, ``failed``, ``refused`` (before any step), ``too long`` or ``killed``."""
 
     status: str
-    reason: str = ""  # why it is not done
+    reason: str = ""  # why the run is not done
     facts: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
-    code: str = ""  # cause given by the error that ended it
+    code: str = ""  # code of the error that ended the run
     machine: str = ""
 
     @property
@@ -58,16 +58,16 @@ class CaseOutcome:
 COLUMNS = {
     "seconds": "time of the stepping loop (s)",  # without compilation and output
     "cpu_seconds": "processor time of the stepping loop (s)",  # sum over all threads
-    "seconds_spread": "spread of that time over repetitions (s)",  # largest minus smallest
+    "seconds_spread": "spread of that time over repetitions (s)",  # largest minus smallest time
     "particle_steps_per_s": "particle-steps per second",
     "particle_steps": "steps times points",
     "node_visits": "steps times points times nodes of a point",
     "steps": "steps",  # sum over all runs of the script
-    "points": "points",  # at the beginning
+    "points": "points",  # number at the beginning
     "dt": "first step (time of the script)",
-    "stable_dt": "stable step (time of the script)",  # at the beginning
+    "stable_dt": "stable step (time of the script)",  # step at the beginning
     "own_dt": "the program's own step (time of the script)",
-    "path": "path of the fastest points (cells)",  # upper bound
+    "path": "path of the fastest points (cells)",  # upper bound of the path
     "bytes_per_particle": "bytes per particle",  # all fields, mean over points
     "peak_memory_mib": "peak memory (MiB)",
     "wall_s": "time of the process (s)",
@@ -104,7 +104,7 @@ class Launch:
     script: Path
     threads: int = 1  # threads of each run
     repeat: int = 1  # runs of each case; the time is their median
-    limit: float | None = None  # seconds
+    limit: float | None = None  # seconds after which a case is killed
     texts: tuple[str, ...] = ()  # contents of the script and its includes
     stop: threading.Event = field(default_factory=threading.Event)
     warm: WarmProcesses = field(default_factory=lambda: WarmProcesses(environment()))
@@ -216,7 +216,7 @@ def await_end(pid: int) -> None:
     """Wait until a process ends, but at most 0.1 s."""
     try:
         handle = os.pidfd_open(pid)
-    except (AttributeError, OSError):  # not Linux
+    except (AttributeError, OSError):  # other systems than Linux
         time.sleep(0.02)
         return
     select.select([handle], [], [], 0.1)
@@ -239,7 +239,7 @@ OF_MPI = ("OMPI_", "PMI", "MPI_", "SLURM_NTASKS", "SLURM_PROCID")  # variables i
 
 
 def environment() -> dict[str, str]:
-    """Return environment variables with which runs import this very program."""
+    """Return environment variables for which runs import the same program as the study."""
     paths = [str(Path(karamelo_py.__file__).parent.parent), os.environ.get("PYTHONPATH")]
     path = os.pathsep.join(filter(None, paths))
     inherited = {name: text for name, text in os.environ.items() if not name.startswith(OF_MPI)}

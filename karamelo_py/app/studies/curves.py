@@ -22,7 +22,7 @@ class Order(NamedTuple):
     """Exponent in y = c x^exponent, by a least-squares fit of the logarithms."""
 
     exponent: float  # NaN with fewer than two points
-    lowest: float  # smallest between neighbouring points
+    lowest: float  # smallest exponent between neighbouring points
     highest: float
 
     @property
@@ -62,7 +62,7 @@ CHANCES = {
     "coarser": "a coarser run is better",
     "finer": "a finer run is worse",
 }
-BEYOND = 0.5  # tolerance of an order
+BEYOND = 0.5  # tolerance by which an order may exceed these
 WORSE = 1.1  # ratio of errors above which one counts as worse
 
 
@@ -96,8 +96,8 @@ def by_chance(x: Sequence[float], values: Sequence[float], highest: float) -> li
 def credible(x: Sequence[float], values: Sequence[float], highest: float) -> np.ndarray:
     """Return error magnitudes, raised where they are small by chance.
 
-    Each is at least as large as the error of every finer run, and at least (change from the
-    previous run) / (r^p - 1), with the refinement r and the order p = `highest` + 0.5.
+    Each magnitude is at least as large as the error of every finer run, and at least (change from
+    the previous run) / (r^p - 1), with the refinement r and the order p = `highest` + 0.5.
     """
     values = np.asarray(values, float)
     size = np.abs(values)
@@ -137,7 +137,7 @@ class GroupedRuns:
     error: np.ndarray
     across: np.ndarray
     linear: bool = False
-    chance: Sequence[str] = ()  # why errors are small by chance (`by_chance`)
+    chance: Sequence[str] = ()  # reasons why errors are small by chance (`by_chance`)
 
     @property
     def lucky(self) -> np.ndarray:
@@ -159,7 +159,7 @@ class GroupedRuns:
 
 
 def label(choice: Mapping[str, str]) -> str:
-    """Label a choice; values without meaning alone get the name of their variable."""
+    """Label a choice; a value without meaning alone gets its variable's name."""
     choice = {n: v for n, v in choice.items() if v != NONE} or choice
     words = {v for v in choice.values() if number_of(v) is None} - {"true", "false", NONE}
     return ", ".join(v if v in words else f"{n} = {v}" for n, v in choice.items())
@@ -181,7 +181,7 @@ class Family:
         require("-cost", [cost], rows[0])
         require("-by", by, variables)
         require("-x", [along] if along else [], variables)
-        self.convergence = bool(along)  # errors against `along`, not against cost
+        self.convergence = bool(along)  # True: errors against `along`; False: errors against cost
         values = {name: list(dict.fromkeys(row[name] for row in rows)) for name in variables}
         differing = [name for name in variables if len(values[name]) > 1]
         numbers = [

@@ -58,9 +58,9 @@ class Parcel(NamedTuple):
 
     study: str  # folder of the runs, if the machine has the same disk
     mark: str  # file in this folder that shows whether the disk is the same
-    root: str  # folder of all files
-    script: str  # path of the script below it
-    files: tuple[tuple[str, str], ...]  # paths below it, and hashes of their contents
+    root: str  # folder that contains all files
+    script: str  # path of the script below `root`
+    files: tuple[tuple[str, str], ...]  # paths below `root`, and hashes of contents
     launch: tuple[int, int, float | None]  # threads, repetitions, limit (s)
     texts: tuple[str, ...]
     keep: tuple[str, ...]  # patterns of further files to return
@@ -72,8 +72,8 @@ class Returned(NamedTuple):
     outcome: CaseOutcome
     files: dict[str, bytes]  # contents by path; empty if the machine has put them into their folder
     kernels: dict[str, bytes]
-    refused_by: str | None = None  # worker that has other versions; "" without an address
-    asks: bool = False  # whether the machine asks for contents of files
+    refused_by: str | None = None  # address of a worker with other versions; "" if it is unknown
+    asks: bool = False  # True if the machine asks for contents of files
 
 
 def versions(plugins: Iterable[str]) -> dict[str, str]:
@@ -230,7 +230,7 @@ def _worker() -> Any:
 
 
 def _scratch() -> str | None:
-    """Return a folder that Dask removes after a worker has ended, or None."""
+    """Return a folder that Dask removes when its worker ends, or None."""
     return worker.local_directory if (worker := _worker()) else None
 
 
@@ -285,11 +285,11 @@ class Elsewhere:
         """
         self.parcel, self.send, self.executor, self.size = parcel, send, executor, size
         self.ends, self.workers = ends, workers
-        self.refusing: set[str] = set()  # addresses of workers
+        self.refusing: set[str] = set()  # addresses of refusing workers
         self.kernels: dict[str, bytes] = {}
         self.sent: Any = None
-        self.places: dict[str, str] = {}  # machines by name of the folder
-        self.gone = False  # Dask then accepts cases, but never finishes them
+        self.places: dict[str, str] = {}  # machines by the name of a case's folder
+        self.gone = False  # True if Dask accepts cases, but never finishes them
         self.loop = asyncio.new_event_loop()
         self.loop.set_exception_handler(lambda *_: None)  # ignores cases that are left at the end
         Thread(target=self.loop.run_forever, daemon=True).start()
@@ -310,7 +310,7 @@ class Elsewhere:
         tries, contents = 1, ()
         while not self.gone:
             chosen: dict[str, Any] = {}
-            if self.refusing:  # a preference only, since a worker may have ended
+            if self.refusing:  # a preference only, since such a worker may have ended
                 chosen = {"workers": [*self._willing()] or None, "allow_other_workers": True}
             try:
                 sent = self.executor.submit(
@@ -379,7 +379,7 @@ class Elsewhere:
 
 
 def _closed(ends: ExitStack, close: Callable[..., Any], **how: Any) -> None:
-    """Close, also when `ends` is left by an error, whatever state the machines are in."""
+    """Close, also if an error leaves `ends`, whatever state the machines are in."""
 
     def closing() -> None:
         with suppress(Exception):
@@ -429,7 +429,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
             before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
             import dask_jobqueue
 
-            for one, handler in before.items():  # which the import has replaced
+            for one, handler in before.items():  # the import has replaced these handlers
                 signal.signal(one, handler)
             kind = getattr(dask_jobqueue, QUEUES[options.on])
             command = kind.job_cls.submit_command.split()[0]
@@ -445,7 +445,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
     except ValueError as error:
         ends.close()
         raise ScriptError(f"-on {options.on}: {error}", expected=WHERE) from None
-    except Exception as error:  # any error, if something other than a scheduler answers
+    except Exception as error:  # if something other than a scheduler answers, any error may occur
         ends.close()
         words = (str(error) or type(error).__name__).splitlines()[0]
         raise ScriptError(
@@ -463,7 +463,7 @@ def opened(options: Namespace, parcel: Parcel, jobs: int, *, timed: bool = False
 
     place = Elsewhere(parcel, send, executor, jobs, ends, client.nthreads)
     client.subscribe_topic(parcel.mark, lambda event: place.places.update([event[1]]))
-    if options.on == "local":  # local processes are in the process group of the terminal
+    if options.on == "local":  # local processes get signals of the terminal
         client.run(ignore_interrupts)
     _closed(ends, _in_time, connect=lambda: client.run(end_study, parcel.mark), patience=TO_CLOSE)
     return place

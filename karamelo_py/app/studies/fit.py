@@ -39,7 +39,7 @@ STARTS = (0.5, 0.2, 0.8)  # fractions of each range
 STEP = 0.04
 NEAR = 0.01  # fraction of a range within which values count as equal
 ENOUGH = 1e-3  # relative change of misfit or values that ends a search
-AGAIN = 3  # searches from better points near an end
+AGAIN = 3  # number of new searches from better points near an end
 ALIKE = 0.99  # correlation above which variables cannot be distinguished
 
 
@@ -83,7 +83,7 @@ class NoDerivatives(ScriptError):
 
 @dataclass
 class End:
-    """End of a search: positions in the ranges (0 to 1), differences from measurements, slopes."""
+    """End of a search: positions in the ranges (0 to 1), misfits from measurements, slopes."""
 
     fraction: np.ndarray
     off: np.ndarray
@@ -150,7 +150,7 @@ class Search:
         return np.column_stack(columns)
 
     def down(self, start: np.ndarray, most: int) -> End | None:
-        """Run a least-squares search from a start; return None if runs fail there."""
+        """Run a least-squares search from `start`; return None if runs fail at `start`."""
         from scipy.optimize import least_squares
 
         if not np.isfinite(self.differences(start)[0]).all():
@@ -268,7 +268,7 @@ def tell_apart(search: Search, ends: Sequence[End]) -> None:
 
 
 def certainty(slopes: np.ndarray, off: np.ndarray) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """Return half-widths of the 95 % intervals, and pairs of indistinguishable variables.
+    """Return half-widths of 95 % intervals, and pairs of variables that cannot be distinguished.
 
     A half-width is NaN if the variable has no effect or measurements are too few, and inf if only a
     combination of variables is determined. The covariance is s^2 (J^T J)^-1, with the variance s^2

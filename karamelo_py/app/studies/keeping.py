@@ -27,7 +27,7 @@ class Kept(NamedTuple):
     word: str
     number: float  # mean of the last part / mean of the first part; for ``breaks``, the last x
     said: tuple[str, ...]  # causes or titles of warnings and of the error
-    warned: bool  # True also if its error names a cause
+    warned: bool  # True also if the run's error names a cause
 
     @property
     def silent(self) -> bool:
@@ -40,7 +40,7 @@ def judge(x: np.ndarray, y: np.ndarray, within: float = WITHIN) -> tuple[str, fl
     if first == 0:
         return "gains", np.nan
     fraction, ratio = growth(first, last, first), last / first
-    if not fraction <= within:  # also for NaN
+    if not fraction <= within:  # also if the fraction is NaN
         return "gains", ratio
     return ("damps" if fraction < -within else "keeps"), ratio
 
@@ -77,7 +77,7 @@ def _general(note: Mapping[str, str]) -> str:
 
 
 def verdicts(table: Table, kept: Sequence[Kept], by: Sequence[str]) -> tuple[str, list[str]]:
-    """Return a Markdown table with a row for each value of the variables `by`, and silent failures.
+    """Return a Markdown table, a row per combination of the variables `by`, and silent failures.
 
     Numbered messages follow. Variables that depend only on the row variables get no columns.
     """

@@ -92,7 +92,7 @@ def readable(colour: str) -> str:
 
 
 def contrast(rgb: Sequence[float] | np.ndarray) -> float:
-    """Return the contrast of an sRGB colour with white, from 0 to 1 (WCAG 2.1)."""
+    """Return the contrast of an sRGB colour to white, from 0 to 1 (WCAG 2.1)."""
     rgb = np.asarray(rgb, float)
     linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     return 1.05 / (float(linear @ (0.2126, 0.7152, 0.0722)) + 0.05)
@@ -124,7 +124,7 @@ def _thinned(ticks: Sequence[float], low: float, high: float) -> list[float]:
 
 
 def log_axis(axis: "Axis", low: float, high: float, values: Sequence[float] | None = None) -> None:
-    """Make an axis logarithmic, with ticks at `values` if they are few."""
+    """Make an axis logarithmic; if `values` are few, they get the ticks."""
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     axes = axis.axes
@@ -168,7 +168,7 @@ def slope(axes: "Axes", lines: Sequence[tuple[np.ndarray, np.ndarray]], exponent
 
 
 def apart(wanted: Sequence[float], gap: float, low: float, high: float) -> np.ndarray:
-    """Move values apart: in order, at least `gap` apart, within `low` and `high`."""
+    """Move values so that they are in order, `gap` or more apart, and within `low` and `high`."""
     rank = np.argsort(wanted, kind="stable")
     count = max(len(rank) - 1, 1)
     steps = min(gap, (high - low) / count) * np.arange(len(rank))

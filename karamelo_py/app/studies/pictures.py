@@ -208,7 +208,7 @@ class History(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     label: str
-    stopped: bool = False  # before the end of the run
+    stopped: bool = False  # True if the run stopped early
 
 
 def histories(
@@ -234,7 +234,8 @@ def histories(
 def forward(time: np.ndarray, stopped: bool) -> np.ndarray:
     """Return a mask (n,) of rows with increasing time.
 
-    A stopped run ends with an earlier good state. In a run that went back, some rows are invalid.
+    A stopped run ends with an earlier good state. After a return to an earlier state, some rows are
+    invalid.
     """
     if stopped:
         return np.arange(len(time)) <= np.argmax(time)
@@ -252,7 +253,7 @@ def draw_histories(
     positive = ys[np.isfinite(ys) & (ys > 0)]
     low = -np.inf
     if not (ys < 0).any() and len(positive) and positive.max() > DECADES * positive.min():
-        # Values that are zero up to round-off stay below the axis.
+        # Values that are 0 up to round-off stay below the axis.
         top = float(positive.max())
         low = max(float(positive.min()), 1e-16 * top)
         look.log_axis(axes.yaxis, low, top)

@@ -85,7 +85,7 @@ class Recorded:
             raise ScriptError(f"-record {word}", expected="name=formula, as in off=abs(max:s - 1)")
         self.word = name
         if size := _SIZE.fullmatch(formula):
-            with suppress(ScriptError):  # not a single abs, as in abs(a) + abs(b)
+            with suppress(ScriptError):  # the formula is not a single abs, but e.g. abs(a) + abs(b)
                 self.signed = Recorded(f"{name}{SIGNED}={size[1]}")
 
         def named(match: re.Match) -> str:
@@ -147,7 +147,7 @@ def row(
 ) -> Row:
     """Make a row of the table; unknown cells are None.
 
-    The reason of a finished run says why a value is missing.
+    For a finished run, the reason says why a value is missing.
     """
     words = [word for i in items for word in (i.word, *([i.signed.word] if i.signed else []))]
     numbers: dict[str, float | None] = dict.fromkeys(words)

@@ -48,7 +48,7 @@ GAINED = "spurious energy gain"
 LOST = "spurious energy loss"
 CLASSES = ("stable", "damped", "growing", "left", "short", "failed")
 BORNE = ("stable", "damped")
-SILENT = ("left", "short")  # classes that say nothing about the step
+SILENT = ("left", "short")  # classes without information about the step
 LABELS = {"left": "left the domain", "short": "too short to tell"}
 FEWEST = watch.FEW * watch.LOOK + 1  # steps after which energy has been checked often enough
 SURE = 3 * watch.LOOKS * watch.LOOK  # steps after which slow growth is recognised
@@ -149,7 +149,7 @@ def run(options: Namespace) -> int:
 def growth(energy: np.ndarray) -> float:
     """Return the largest running mean (over 10 % of the rows) / the first one; inf for NaN.
 
-    If the first mean is 0, the median replaces it.
+    If the first mean is 0, it is replaced by the median.
     """
     if not len(energy):
         return 0.0
@@ -237,7 +237,7 @@ class Map:
         codes = {note.get("code") for note in record.get("messages", [])}
         verdict = {"class": "stable", "why": "", "growth": None, "limit": "", "unwatched": ""}
         limit = runs[0].get("limited_by") if runs else None
-        if limit not in (None, "set_dt", "end"):  # the script has set it
+        if limit not in (None, "set_dt", "end"):  # a limit that the script has set
             verdict["limit"] = limit
         done = row["status"] == "done"
         if self.energy:
@@ -307,7 +307,7 @@ class Map:
             return None
         first_is_near = abs(points[0][1] - 1) < abs(points[-1][1] - 1)
         (xa, a), (xb, b) = points[:2] if first_is_near else points[-2:]
-        if isclose(a, b, rel_tol=1e-6):  # both steps are proportional to the variable
+        if isclose(a, b, rel_tol=1e-6):  # both steps are proportional to the variable of the row
             return None
         at = log(xa) - log(xb / xa) * log(a) / log(b / a)
         low, *_, high = edges(self.x)
@@ -496,7 +496,7 @@ def _gaps(line: np.ndarray) -> Iterator[tuple[int, int]]:
 
 
 def _filled(plane: np.ndarray, stride: int, apart: Sequence[bool]) -> np.ndarray:
-    """Fill cells between two cells of one class, unless row and column disagree."""
+    """Fill cells between two cells of one class, unless the row and the column disagree."""
     filled, reach = plane.copy(), 2
     while reach <= stride:
         along_x, along_y = (0 if words else reach for words in apart)
@@ -526,7 +526,7 @@ def _halves(plane: np.ndarray, apart: Sequence[bool]) -> Iterator[tuple[int, Cel
 
 
 def _unproved(runs: np.ndarray, plane: np.ndarray) -> Iterator[tuple[int, Cell]]:
-    """Yield length and middle cell of each stretch of an edge between classes that has no run."""
+    """Yield length and middle cell of each stretch without a run, along an edge between classes."""
     for i, k in np.ndindex(plane.shape[0] - 1, 2):
         for stretch in _stretches(runs[i + k], plane[i], plane[i + 1], k):
             yield len(stretch), (i + k, stretch[len(stretch) // 2])

@@ -79,23 +79,23 @@ class Here:
 @dataclass
 class Study:
     launch: Launch
-    out: Path  # table or picture, next to the folder of the runs
+    out: Path  # file of the table or picture, next to the folder of the runs
     names: list[str]
     items: Sequence[Recorded]
     place: Pool
     again: bool = False
     title: str = ""
     strict: bool = False  # a refused variant ends the study
-    most: int = 0  # most runs of an adaptive study; 0 if `run` gets all cases
+    most: int = 0  # largest number of runs of an adaptive study; 0 if `run` gets all cases
     writes: bool = True  # write the table after each run
     page: StudyPage | None = None  # live page (--live)
     facts: dict[str, Any] = field(default_factory=dict)  # written to the file next to the table
     rows: dict[tuple[str, ...], Row] = field(default_factory=dict)
-    order: dict[tuple[str, ...], None] = field(default_factory=dict)  # order of the table's rows
+    order: dict[tuple[str, ...], None] = field(default_factory=dict)  # rows of the table, in order
     machines: dict[str, Any] = field(default_factory=dict)  # processor and versions of each machine
     claim: Claim | None = None  # lock of the folder
     ran: int = 0
-    next_write: float = 0.0  # when the table is due
+    next_write: float = 0.0  # time when the table must be written next
     begun: float = field(default_factory=time.perf_counter)
 
     def __post_init__(self) -> None:
@@ -168,7 +168,7 @@ class Study:
 
         try:
             while queue or running:
-                # Several places each have a next case ready, and need not wait for this process.
+                # Several machines each have a next case ready, and need not wait for this process.
                 size = self.place.size
                 while len(running) < size + size * (size > 1) and (item := ready()):
                     queue.remove(item)
@@ -366,7 +366,7 @@ def open_study(
 
     `settings` are further fields of `Study`.
     """
-    gc.enable()  # single runs have turned it off
+    gc.enable()  # single runs have disabled it
     names, again = list(plan.values), options.again
     place: Pool = Here(plan.launch, plan.jobs)
     study = Study(plan.launch, out, names, items, place, again=again, **settings)

@@ -33,7 +33,7 @@ def polynomial(x: np.ndarray, y: np.ndarray, degree: int) -> Function:
 def likely(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return the most likely parameters of a Gaussian process, as logarithms.
 
-    They are the correlation length of each variable, and the noise.
+    The parameters are the correlation length of each variable, and the noise.
     """
     from scipy.linalg import LinAlgError, cho_factor, cho_solve
     from scipy.optimize import minimize
@@ -78,7 +78,7 @@ POLYNOMIALS = {"a linear function": 1, "a quadratic polynomial": 2, "a cubic pol
 
 
 def left_out(fit: Fit, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the errors of predicting each value from all other values."""
+    """Return the errors (n,) of each value predicted from all other values."""
     others = ~np.eye(len(x), dtype=bool)
     return np.array([fit(x[one], y[one])(x[[k]])[0] - y[k] for k, one in enumerate(others)])
 

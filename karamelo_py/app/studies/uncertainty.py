@@ -17,7 +17,7 @@ from karamelo_py.output.plots import blank_figure, tidy
 from karamelo_py.script.errors import ScriptError, plural
 
 QUANTILES = (0.05, 0.5, 0.95)
-SURE = 0.95  # probability of the intervals
+SURE = 0.95  # probability that an interval contains the value
 RESAMPLED = 2000
 
 

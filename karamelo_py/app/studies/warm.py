@@ -25,7 +25,7 @@ from karamelo_py.app.leaving import STUDY
 
 MOST = 8
 TRIES = 3
-PATIENCE = 20.0  # seconds; a start takes about 0.01, the import 2
+PATIENCE = 20.0  # seconds; a start takes about 0.01 s, the import 2 s
 SUBREAPER = 36  # prctl: adopt processes whose parents have ended
 LONGEST = 1 << 16  # bytes of a request
 BEGIN = "from karamelo_py.app.studies.warm import begin; begin()"
@@ -33,13 +33,13 @@ NOT_OURS = "karamelo_py.styles.fixes.python"
 
 
 class WarmProcess:
-    """A warm process. Without a pid, it is a run that may leave one."""
+    """A warm process. Without a pid, the process is a run that may leave a warm one."""
 
     def __init__(self, link: socket.socket, pid: int | None = None):
         self.link, self.pid = link, pid
 
     def is_ready(self) -> bool:
-        """Return True if it can be forked; raise ConnectionError if it has ended."""
+        """Return True if the process can be forked; raise ConnectionError if it has ended."""
         if self.pid is None:
             with suppress(BlockingIOError):
                 answer = self.link.recv(32, socket.MSG_DONTWAIT)
@@ -53,7 +53,7 @@ class WarmProcess:
         if self.pid is not None:
             with suppress(OSError):
                 os.kill(self.pid, signal.SIGKILL)
-                for _ in range(100):  # at most a second
+                for _ in range(100):  # waits at most a second
                     if os.waitpid(self.pid, os.WNOHANG)[0]:
                         break
                     time.sleep(0.01)
@@ -110,7 +110,7 @@ class WarmProcesses:
                 [sys.executable, "-c", BEGIN], stdin=theirs.fileno(), stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL, env=self.environment, start_new_session=True,
             )  # fmt: skip
-        process.returncode = 0  # `WarmProcess.end` waits for it
+        process.returncode = 0  # `WarmProcess.end` waits for the process
         self.keepers[()] = WarmProcess(mine, process.pid)
 
     def _awaited(self, key: tuple[str, ...]) -> socket.socket | None:
@@ -149,7 +149,7 @@ def keep(link: socket.socket) -> NoReturn:
     gc.collect()
     gc.freeze()
     gc.disable()
-    os.chdir("/")  # so that the folder of the run can be removed
+    os.chdir("/")  # allows the folder of the run to be removed
     with open(os.devnull, "r+b") as nothing:
         for at in range(3):
             os.dup2(nothing.fileno(), at)
@@ -183,7 +183,7 @@ def _run(request: list[str], out: int, err: int, stays: int | None = None) -> No
         if str(os.getppid()) == study:
             break
         time.sleep(0.002)
-    os.setsid()  # so that Ctrl-C reaches the study only
+    os.setsid()  # Ctrl-C then reaches the study only
     os.chdir(folder)
     for file, at in ((out, 1), (err, 2)):
         os.dup2(file, at)

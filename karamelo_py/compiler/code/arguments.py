@@ -18,13 +18,13 @@ from karamelo_py.compiler.trace.session import session
 
 
 class _Array(NamedTuple):
-    """An array that is in use. NumPy does not resize arrays to which there are references."""
+    """An array that is in use: NumPy does not resize arrays to which there are references."""
 
     alive: weakref.ref  # detects a reused id
     shape: tuple[int, ...]
     writeable: bool
     kind: int  # equal for arrays of the same type
-    words: tuple[int, ...]  # as kernels get them
+    words: tuple[int, ...]  # words of the array as kernels get them
 
 
 def _array(array: np.ndarray) -> _Array:
@@ -69,7 +69,7 @@ class Address(int):
 class Plan(NamedTuple):
     text: struct.Struct
     tuples: tuple[tuple[int, int], ...]  # index of each nested tuple's word, and its start
-    first: int  # start of the arguments themselves
+    first: int  # start of the outermost tuple
     types: tuple[types.Type, ...]  # types of the arguments
 
 
@@ -79,7 +79,7 @@ class ArgumentBuffer:
     __slots__ = ("kinds", "words")
 
     def __init__(self, arguments: tuple):
-        self.kinds: list = []  # these determine the argument types
+        self.kinds: list = []  # kinds of the words, which determine the argument types
         self.words: list = []  # numbers in the tuples; 0 for a nested tuple
         words, _ = self._of(arguments)
         self.words += words
@@ -115,7 +115,7 @@ class ArgumentBuffer:
                 kinds.append(item.dtype)
                 signed = item.view(f"i{item.itemsize}") if item.dtype.kind == "u" else item
                 words.append(signed.item())  # same bits, but signed as words are
-            else:  # nothing to write for None and classes
+            else:  # nothing is written for None and classes
                 kinds.append(item)
                 words.append(0)
         return words, arrays
@@ -163,7 +163,7 @@ def plan_for(arguments: tuple) -> Plan:
     end = 0
 
     def lay(kind: Any) -> int:
-        """Return the offset of a held tuple, after its inner tuples."""
+        """Return the offset of a held tuple, which follows its inner tuples."""
         nonlocal end
         inner = [lay(item) if is_held(item) else None for item in kind]
         model = kind.register_type().pointee

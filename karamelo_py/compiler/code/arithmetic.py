@@ -74,7 +74,7 @@ def _is_whole(kind: types.Type) -> bool:
 
 
 def _unary(kind_of: Callable, write: Callable, result: types.Type | None = None) -> Callable:
-    """Return an operation on a number cast to a type: ``write(builder, kind, value)``."""
+    """Return an operation on a number that is cast to a type: ``write(builder, kind, value)``."""
 
     def operation(a: types.Type) -> Operation | None:
         kind = kind_of(a)
@@ -175,7 +175,7 @@ def _whole_parts(builder: ir.IRBuilder, kind: types.Integer, x: ir.Value, y: ir.
     bad = None
     if not safe:
         bad = builder.icmp_signed("==", y, zero)
-        if kind.signed:  # the smallest number divided by -1 overflows
+        if kind.signed:  # overflow: the smallest number divided by -1
             least = builder.icmp_signed("==", x, x.type(kind.minval))
             bad = builder.or_(bad, builder.and_(least, builder.icmp_signed("==", y, x.type(-1))))
         y = builder.select(bad, one, y)
@@ -499,7 +499,7 @@ IN_LANES = {
 }  # fmt: skip
 
 
-_POWERS = {operator.pow, math.pow, np.power}  # products for known exponents
+_POWERS = {operator.pow, math.pow, np.power}  # for known exponents, powers are products
 
 
 def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | None:
@@ -510,5 +510,5 @@ def operation(function: Callable, kinds: tuple[types.Type, ...]) -> Operation | 
         return None
     try:
         return made(*(kinds if function in _POWERS else plain))
-    except TypeError:  # wrong number of arguments, or inconsistent lanes
+    except TypeError:  # the number of arguments is wrong, or lanes are inconsistent
         return None

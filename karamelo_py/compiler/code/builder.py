@@ -1,6 +1,6 @@
 """A builder that writes frequent instructions as text at once.
 
-An object of llvmlite for each instruction, printed later, takes three times as long.
+Objects of llvmlite, one per instruction and printed later, take three times as long.
 """
 
 from collections.abc import Callable, Sequence
@@ -98,7 +98,7 @@ def _comparison(name: str, sign_word: str) -> Callable:
         truth = ir.IntType(1)
         if isinstance(a.type, ir.VectorType):
             truth = ir.VectorType(truth, a.type.count)
-        order = _ORDER.get(sign, sign)  # "ord" and "uno" as they are
+        order = _ORDER.get(sign, sign)  # "ord" and "uno" are not renamed
         if order is not sign and not (name == "icmp" and order in ("eq", "ne")):
             order = sign_word + order
         operands = f"{a.get_reference()}, {b.get_reference()}"

@@ -67,7 +67,7 @@ def never_raising(function: Callable) -> Callable:
     def call(*arguments: Any) -> Any:
         try:
             return function(*arguments)
-        except BaseException:  # C callbacks cannot raise
+        except BaseException:  # a C callback cannot raise
             return math.nan
 
     return call

@@ -29,7 +29,7 @@ def features() -> str:
 
 @functools.cache
 def describe() -> str:
-    """Describe everything besides its text that determines the code."""
+    """Describe everything that determines the code, except its text."""
     words = llvm.llvm_version_info, llvm.get_process_triple(), llvm.get_host_cpu_name()
     return repr((*words, features(), OPTIONS, LEVEL))
 
@@ -114,5 +114,5 @@ def is_known(name: str) -> bool:
 def publish_python(name: str, kind: type, function: Callable) -> None:
     """Make a Python function, which must not raise, callable by code."""
     callback = kind(function)
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # never freed: code may call it
+    ctypes.pythonapi.Py_IncRef(ctypes.py_object(callback))  # never freed, as code may call it later
     publish(name, ctypes.cast(callback, ctypes.c_void_p).value)

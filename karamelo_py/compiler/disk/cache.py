@@ -41,7 +41,7 @@ ROOM = 400e6  # bytes
 _began = time.time()
 _VERSIONS = platform.python_version(), numba.__version__, llvmlite.__version__, np.__version__
 _INSTALLED = sysconfig.get_path("purelib"), sysconfig.get_path("platlib")
-_NAMED = (python.FunctionType, python.ModuleType, type)  # determined by their sources
+_NAMED = (python.FunctionType, python.ModuleType, type)  # identified by their sources
 _PLAIN = (type(None), bool, int, float, complex, str, bytes, np.number, np.bool_)
 _OURS = re.compile(r"[\w.]+\.[0-9a-f]{32}\.(kernel|code)")
 
@@ -87,7 +87,7 @@ def _stamp(name: str) -> str:
             with contextlib.suppress(Unknown, RecursionError):
                 values += [] if isinstance(value, _NAMED) else [f"{key} = {_words(value)}"]
         words[one] = short_hash(one, _source(Path(file)), *values)
-        if not one.startswith(__package__.partition(".")[0]):  # a plug-in with unknown imports
+        if not one.startswith(__package__.partition(".")[0]):  # a plug-in whose imports are unknown
             named = choices.modules_of(*(v for _, v in plain if isinstance(v, _NAMED)))
             ahead |= {n for n in named - words.keys() if _is_own(n, name.partition(".")[0])}
     return short_hash(*(words[one] for one in sorted(words)))
@@ -117,13 +117,13 @@ def _words(thing: Any) -> str:
     if hasattr(thing, "__module__") and hasattr(thing, "__name__"):
         named = _names_in(thing.__module__).get(thing.__name__)
         if named is thing or (hasattr(named, "function") and named.function is thing):
-            return f"{thing.__module__}:{thing.__name__}"  # its source determines it
+            return f"{thing.__module__}:{thing.__name__}"  # described by its source
     function = thing.definition if hasattr(thing, "definition") else thing  # for an intrinsic
     if not isinstance(function, python.FunctionType):
         raise Unknown(repr(thing))
     parts = [*(function.__defaults__ or ()), *(function.__kwdefaults__ or {}).values()]
     for cell in function.__closure__ or ():
-        with contextlib.suppress(ValueError):  # an empty cell
+        with contextlib.suppress(ValueError):  # skips empty cells
             parts.append(cell.cell_contents)
     code = [
         (c.co_firstlineno, c.co_code, c.co_names, [k for k in c.co_consts if isinstance(k, _PLAIN)])
@@ -149,7 +149,7 @@ def _class(one: type, by_name: bool = False) -> str:
 
 def describe(numba_type: Any) -> str:
     """Describe a type, with the same words in every process."""
-    how = type(numba_type).__name__  # whether it is held, or a value
+    how = type(numba_type).__name__  # the class tells whether the type is held or a value
     if isinstance(numba_type, types.BaseTuple):
         inner = ",".join(map(describe, numba_type))
         one = choices.tag_class(numba_type)

@@ -17,7 +17,7 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-PATIENCE = 120.0  # seconds, after which the holder is probably stopped
+PATIENCE = 120.0  # seconds after which the lock's holder has probably been stopped
 PAUSE = 0.02  # seconds between attempts
 
 waiting = contextlib.nullcontext  # context of a waiting process, which reports compilation
@@ -26,7 +26,7 @@ waiting = contextlib.nullcontext  # context of a waiting process, which reports 
 @contextlib.contextmanager
 def lock(path: Path) -> Iterator[None]:
     with contextlib.ExitStack() as stack:
-        with contextlib.suppress(OSError):  # read-only, or no locks
+        with contextlib.suppress(OSError):  # folders may be read-only or without locks
             _take(path, stack)
         yield
 
@@ -44,13 +44,13 @@ def _take(path: Path, stack: contextlib.ExitStack) -> None:
             session.waits = _locked(file, PATIENCE)
         if not session.waits:
             return
-    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also unlocks if forked meanwhile
-    # Waiting processes have this file open. They find the kernel when they get the lock.
+    stack.callback(fcntl.flock, file, fcntl.LOCK_UN)  # also unlocks if forked since
+    # Waiting processes have this file open, and find the kernel when they get the lock.
     stack.callback(_take_away, path)
 
 
 def _take_away(path: Path) -> None:
-    with contextlib.suppress(OSError):  # the folder may be gone
+    with contextlib.suppress(OSError):  # the folder may have been deleted
         path.unlink()
 
 

@@ -34,7 +34,7 @@ class Edge(NamedTuple):
 
 
 class Range:
-    """A range with bounds known at run time."""
+    """A range whose bounds are known at run time."""
 
     def __init__(self, *bounds: Any):
         self.bounds = bounds
@@ -167,7 +167,7 @@ class Flow:
         kinds = [types.unliteral(self.lowering.kind_of(t)) for t in things]
         real = {k for t, k in zip(things, kinds, strict=True) if is_real(t)}
         if len(real) == 1 and all(is_real(t) or is_literal(t) for t in things):
-            (kind,) = real  # literals take the precision of the others
+            (kind,) = real  # literals take the precision of reals
         else:
             kind = self.lowering.unify(*kinds)
         if kind is None or isinstance(kind, types.Optional | types.UnicodeType):

@@ -58,7 +58,7 @@ def places_of(error: BaseException) -> Iterator[tuple[str, int]]:
         if error.__cause__ is not None:
             yield from places_of(error.__cause__)
         yield error.begins
-    yield from vars(error).get("places", ())  # places in the compiled text
+    yield from vars(error).get("places", ())  # places in the text that is compiled
     for frame, line in reversed([*walk_tb(error.__traceback__)]):
         yield frame.f_code.co_filename, line
 
@@ -213,7 +213,7 @@ def forget() -> None:
     """Drop cached selections after a new implementation."""
     if values.at_work():
         session.functions.clear()
-    else:  # another Python thread may be compiling
+    else:  # another Python thread is changing the table
         session.outdated = True
 
 
@@ -236,7 +236,7 @@ class PointFunction:
 
     def find(self, classes: tuple) -> Callable | None:
         """Return the implementation for classes, or for their nearest bases."""
-        nearest = self._nearest  # another Python thread may add implementations
+        nearest = self._nearest  # a local name, as another Python thread may replace the table
         if classes not in nearest:
             bases = [c.__mro__ if isinstance(c, type) else (c,) for c in classes]
             matches = (self._table[b] for b in itertools.product(*bases) if b in self._table)
@@ -304,14 +304,14 @@ def _call(function: Callable, arguments: tuple) -> Any:
         return NotImplemented
     lowering = values.now()
     kinds = tuple(map(lowering.kind_of, arguments))
-    if function in not_inlined:  # the same function applies to all numbers
+    if function in not_inlined:  # one function applies to all numbers
         return call_own(lowering, function, tuple(map(types.unliteral, kinds)), arguments)
     run = chosen(function, kinds)
     return NotImplemented if run is None else run(*arguments)
 
 
 def call_own(lowering: Lowering, function: Callable, kinds: tuple, arguments: Iterable) -> Any:
-    """Call a separate function of the module."""
+    """Call a function that is compiled separately in the module."""
     run = chosen(function, kinds)
     if run is None:
         return NotImplemented

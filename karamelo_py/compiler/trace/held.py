@@ -2,7 +2,7 @@
 
 A setup has about forty arrays, each described by seven to nine numbers. As three hundred arguments,
 they would be half of the code to compile. Therefore a (nested) tuple with arrays is stored in
-memory, and kernels get a pointer to its items. Its type is still a tuple type.
+memory, and kernels get a pointer to the tuple. Its type is still a tuple type.
 """
 
 import hashlib
@@ -36,7 +36,7 @@ class HeldTuple(types.BaseTuple):
             self.fields, self.instance_class = tuple(instance_class._fields), instance_class
             word = f"{instance_class.__module__}.{instance_class.__qualname__}"
         text = f"{word}({', '.join(map(_words, items))})"
-        # short, as it is part of function names
+        # The hash is short, as it is part of function names.
         super().__init__(f"Held{word}_{hashlib.sha256(text.encode()).hexdigest()[:16]}")
 
     @property
@@ -73,7 +73,7 @@ def held_type(kind: Any) -> Any:
 def hold(value: Any) -> Any:
     """In kernels, make a held tuple of `value` if it has arrays.
 
-    It exists until the calling function returns, so it may be passed on, but not returned.
+    The tuple exists until the calling function returns, so it may be passed on, but not returned.
     """
     return value
 

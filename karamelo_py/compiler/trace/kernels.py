@@ -41,12 +41,12 @@ NAME, ENTRY = "$kernel", ".entry"  # placeholders until a module has a name
 
 
 class Unit(NamedTuple):
-    name: str  # the entry for Python has ENTRY added
+    name: str  # name of the function; the entry for Python has ENTRY added
     result: types.Type
-    code: bytes  # object file; empty if it is to be read from disk
-    needs: tuple  # units that it calls
-    modules: frozenset[str]  # modules outside `ROOMS` that it and its `needs` contain
-    raises: bool  # whether it can raise exceptions
+    code: bytes  # object file; empty if the file is to be read from disk
+    needs: tuple  # units that this one calls
+    modules: frozenset[str]  # modules outside `ROOMS` with sources of this unit and its `needs`
+    raises: bool  # whether the kernel can raise exceptions
 
 
 def load(unit: Unit) -> list[int]:
@@ -197,7 +197,7 @@ class Kernel:
         at = ctypes.addressof(ctypes.c_char.from_buffer(result))
         try:
             entry(address, at, ctypes.addressof(failure))
-        finally:  # also if Ctrl-C arrives at the end of a failed call
+        finally:  # Ctrl-C may arrive at the end of a failed call
             failure.raise_first()
         return read(result)
 
@@ -266,7 +266,7 @@ def address_of_python(function: Callable, signature: types.Type) -> Address:
     made from it, while kernels may call the function.
     """
     if choices.INTERPRETED:
-        callback: Any = functools.partial(function)  # as a bound method would be freed at once
+        callback: Any = functools.partial(function)  # a bound method would be freed at once
         address = Address(next(session.numbers))
         session.interpreted[int(address)] = callback
     else:

@@ -47,7 +47,7 @@ def _tuple_type(kinds: tuple, named: type | None) -> types.BaseTuple:
     return cache[key]
 
 
-_literal = functools.lru_cache(typed=True)(types.literal)  # makes a type for each call
+_literal = functools.lru_cache(typed=True)(types.literal)  # types.literal makes a new type per call
 
 
 class Lowering:
@@ -208,7 +208,7 @@ class Lowering:
         return made
 
     def give_back(self, run: Callable, kinds: tuple, values: Any, result: Any) -> types.Type:
-        """Write a function; return its result type, which follows from the code if not given."""
+        """Write a function; return its result type, which follows from the code if not `result`."""
         passed = iter(values)
         with traced.writing(self):
             value = run(

@@ -121,7 +121,7 @@ def _real(value, template):
 def _truncated(a):
     if not isinstance(a.scalar, types.Float):
         return None
-    whole = Lanes(types.int32, a.width)  # every processor has them; enough for cells
+    whole = Lanes(types.int32, a.width)  # every processor has 32-bit lanes, which suffice for cells
     return whole(a), lambda builder, number: llvm.cast(builder, number, a, whole)
 
 
@@ -144,7 +144,7 @@ def _round_off(template):
 
 
 def index(i: int) -> int:
-    """Return `i` as a non-negative array index. This saves a test per access, 10 % of a sweep."""
+    """Return `i` as a non-negative array index. Omitting the sign test takes 10 % off a sweep."""
     return i
 
 
@@ -181,7 +181,7 @@ def select(condition, a, b):
 
 @shared
 def where(condition: bool, a: float, b: float) -> float:
-    """Return `a` if `condition`, else `b`; both are evaluated."""
+    """Return `a` if `condition` is true, else `b`; both are evaluated."""
     return a if condition else b
 
 
@@ -296,7 +296,7 @@ def lane_by_lane(lowering: Any, function: Callable, unrolled: bool, arguments: t
 
         def to_lane(thing: Any) -> Value:
             scalar = types.unliteral(lowering.kind_of(thing))
-            if single and scalar == types.float64:  # a function of literals only
+            if single and scalar == types.float64:  # a function of literals
                 scalar = types.float32
             lanes = Lanes(scalar, width)
             made = Value(lanes, _room(builder, lanes))

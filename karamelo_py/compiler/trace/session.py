@@ -21,10 +21,10 @@ class Session:
         self.registered: list[Callable] = []  # implementations in all keys (`choices.register`)
         self.seen: dict[Any, Any] = {}  # replacements of globals
         self.walked: dict[Callable, Any] = {}  # texts of functions
-        self.functions: dict[tuple, Any] = {}  # selected by argument types
+        self.functions: dict[tuple, Any] = {}  # functions selected by argument types
         self.operations: dict[tuple, Any] = {}
         self.tuples: dict[tuple, Any] = {}  # tuple types by class and type numbers of items
-        self.outdated = False  # functions have to be selected again
+        self.outdated = False  # whether functions have to be selected again
         self.changes = 0  # number of implementations that have changed and that kernels may contain
         self.loaded: dict[str, list[int]] = {}  # addresses by kernel name
         self.addresses: dict[tuple, int] = {}

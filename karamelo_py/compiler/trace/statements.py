@@ -119,7 +119,7 @@ class AstFunction:
         function, code = self.function, self.__code__
         plain = python.FunctionType(
             code, {}, code.co_name, function.__defaults__, function.__closure__
-        )  # the same signature as the code object
+        )  # the code object has the same signature
         plain.__kwdefaults__ = function.__kwdefaults__
         return inspect.signature(plain)
 
@@ -160,7 +160,7 @@ def _shape(thing: Any, *within: Callable) -> Any:
         thing = tuple(thing.items())
     if isinstance(thing, tuple | list | set):
         return type(thing), *(_shape(item, *within) for item in thing)
-    if isinstance(thing, int | float | np.generic):  # 0, 0.0, -0.0 and False are equal
+    if isinstance(thing, int | float | np.generic):  # repr tells 0, 0.0, -0.0 and False apart
         return type(thing), repr(thing)
     if isinstance(thing, python.FunctionType) and hasattr(thing, "closes_over"):
         return thing not in within and _shape(thing.closes_over(), thing, *within)
@@ -204,7 +204,7 @@ class AstCompiler:
 
     def result(self) -> Any:
         self.block(self.walked.body)
-        if self.walked.generates:  # a generator is evaluated at once
+        if self.walked.generates:  # generators are evaluated at once
             return self.yielded
         if self.goes:
             self.names = {"": None}
@@ -248,7 +248,7 @@ class AstCompiler:
 
     def do(self, node: ast.AST) -> Any:
         kind = type(node)
-        if kind is ast.Name and node.id in self.names:  # half of the nodes
+        if kind is ast.Name and node.id in self.names:  # half of all nodes are names
             return self.names[node.id]
         return _COMPILED.get(kind, AstCompiler.unknown)(self, node)
 
@@ -699,5 +699,5 @@ class AstCompiler:
 
 
 _COMPILED = {getattr(ast, n): f for n, f in vars(AstCompiler).items() if n in vars(ast)}
-LONGEST = 1000  # range in a comprehension
-_COUNT = "for"  # no function can have this name
+LONGEST = 1000  # longest range in a comprehension
+_COUNT = "for"  # no function has this name

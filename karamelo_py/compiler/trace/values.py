@@ -212,7 +212,7 @@ def _operated(operation: Callable, a: Any, b: Any) -> Any:
 
 def _in_place(operation: Callable) -> Callable:
     def apply(a: Value, b: Any) -> Any:
-        if isinstance(a._kind, types.Array):  # the array would change in place
+        if isinstance(a._kind, types.Array):  # the array would be changed in place
             raise Untraceable("an array cannot be changed as a whole: change its items")
         return _operated(operation, a, b)
 
@@ -328,4 +328,4 @@ OF_WHOLE = {min, max, abs, int, bool}
 # Functions whose literals take the type of other operands; more are added by name.
 OF_REALS = {min, max, *(f for n, f in vars(math).items() if callable(f) and n[0] != "_")}
 
-LONG = 8  # number of iterations up to which a known range is unrolled even if it could be a loop
+LONG = 8  # iterations up to which a known range is unrolled, even if the loop could remain a loop

@@ -26,9 +26,9 @@ from karamelo_py.points.transfers import Moment, zero_moment
 
 class NodeColumns(NamedTuple):
     array: Any
-    first: Callable  # functions of the kinematics
+    first: Callable  # first column, a function of the kinematics
     count: Callable
-    end: Callable  # end of a record, with padding to registers
+    end: Callable  # end of the columns with padding to registers, a function of the kinematics
 
 
 def _zero(kin):
@@ -114,7 +114,7 @@ class Report(NamedTuple):
     """Result of a task for a point; NaN or infinite if the point failed."""
 
     moved: Number  # distance in cells
-    rate: Number  # largest so far
+    rate: Number  # largest rate so far, of this and earlier points
 
 
 @point_function()

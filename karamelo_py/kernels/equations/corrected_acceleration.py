@@ -28,9 +28,7 @@ class Acceleration(StepField):
 
 
 class Sides(StepField):
-    """Bits of a node: HELD << k if a fix prescribes velocity k, LOWER << k or UPPER << k at an
-    edge.
-    """
+    """Bits of a node: HELD << k if a fix sets velocity k, LOWER << k or UPPER << k at an edge."""
 
 
 HELD, LOWER, UPPER = 1, 8, 64

@@ -65,7 +65,7 @@ class Move(Task):
         y, v, moment, hits = reflected(w.grid, w.kin, y, v, moment)
         increase(pt.of(Bounces), pt.p, hits)
         store(pt.of(VelocityBefore), pt.p, old)
-        forget(pt.of(VelocityBefore), pt.p, hits)  # beyond the edge
+        forget(pt.of(VelocityBefore), pt.p, hits)  # reflected points have no velocity before
         store(w.points.v, pt.p, v)
         store(pt.of(transfers.Moment), pt.p, moment)
         store(w.locations.y, pt.p, y)

@@ -83,7 +83,7 @@ class RelativeVelocity(Field):
 
 
 class VolumeStrain(Field):
-    """Volume strain, and one step earlier unseen strain and pressure (splines)."""
+    """Volume strain and, with splines, the unseen strain and pressure of the previous step."""
 
     shape = numbers(3, 0)
     needed = RelativeVelocity.needed
@@ -133,11 +133,10 @@ class WaterUpdate(StepField):
 
 
 class Flux(Field):
-    """Mass flux (d,) per unit area, an outflow, four means, another outflow.
+    """Mass flux (d,) per area, outflow per volume, four means, mass outflow through open nodes.
 
-    The first outflow (per unit volume) is computed for closed nodes and does not leave the points;
-    the last (a mass flow rate) leaves through open nodes. The means are of strain, unseen
-    strain, pressure and unseen pressure.
+    The outflow per unit volume is computed for closed nodes and does not leave the points; the mass
+    outflow does. The means are of strain, unseen strain, pressure and unseen pressure.
     """
 
     shape = numbers(6, 1)
@@ -207,7 +206,7 @@ def mixture_mass(pt):
 
 
 class WetPoint(NamedTuple):
-    m: arrays.Number  # mass of the water
+    m: arrays.Number  # mass of the water, () if dry
     w: tuple  # velocity of the water relative to the soil
     drag: arrays.Number  # force per unit relative velocity
     volumes: tuple  # of point and pores; products with pressure and (splines) strain
@@ -588,8 +587,6 @@ class DragWater(NamedTuple):
 
 @node_task
 class MakeFlux(NamedTuple):
-    """Computes the flux of the water."""
-
     rim: float
     velocity: arrays.Tag  # Mapped or OfStep
 
@@ -670,7 +667,7 @@ class MoveWater(eq.Task):
         per_mass = laws.specific_volume(law)
         m = per_mass * water_content(law, pt.kin, state)
         drag = per_mass * laws.jacobian(law, pt.kin, state) * drag_per_volume(law, pt.kin, state)
-        b = pt.w.kick * drag * (1 + m)  # times m
+        b = pt.w.kick * drag * (1 + m)  # times the mass m
         unseen = (b / (m + b)) * (new - at_nodes)
         part = m / (1 + m)
         store(pt.of(RelativeVelocity), pt.p, new - unseen)
@@ -737,7 +734,7 @@ class Seep(eq.Task):
         new = old._replace(content=content, pores=pores)
         store_from(pt.w.points.state, pt.p, count_in(old.skeleton), new)
         v = pt.v
-        ratio = old.content / content  # momentum of the water is conserved
+        ratio = old.content / content  # conserves the momentum of the water
         w = pt.load(RelativeVelocity, v)
         store(pt.of(RelativeVelocity), pt.p, ratio * (v + w) - v)
         good = (content > 0) & (pores > 0)

@@ -39,13 +39,13 @@ class TransferLoss(Field):
 
 
 class LossByUpdate(TransferLoss):
-    """The same in a scheme that does not map velocities again."""
+    """Energy lost in the transfer, in a scheme that does not map velocities again."""
 
     work_with_update = True
 
 
 class LossOfStrain(LossByUpdate):
-    """The same in a scheme that strains by v*."""
+    """Energy lost in the transfer, in a scheme that strains by v*."""
 
     strains_by_update = True
 
@@ -109,7 +109,7 @@ def _velocity(pt, node, v, moment):
 
 
 def _change(pt, v):
-    """Return sum_i N_i dv_i where a series has replaced dv_i."""
+    """Return sum_i N_i dv_i for a dv_i that a series has replaced."""
     dv = v - v
     for node in pt.nodes:
         star, _ = node.v_star(v)
@@ -119,7 +119,7 @@ def _change(pt, v):
 
 
 def _not_taken(kind, node, v, again):
-    """Return the work at a node that no point gets; `again`: N_i times the velocity mapped back."""
+    """Return the work at a node that no point gets; `again`: N_i times the re-mapped velocity."""
     impulse, (star, dv) = node.of(ContactImpulse), node.v_star(v)
     work = v[0] - v[0]
     if impulse is not None:

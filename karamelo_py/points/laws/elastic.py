@@ -99,5 +99,4 @@ def _advance_of_deformation(law, kin, state, dl, dt):
 
 @laws.elastic_strain.on(OfDeformation)
 def _elastic_strain_of_deformation(law, kin, state):
-    """Return the Green-Lagrange strain (F^T F - I) / 2."""
     return 0.5 * state.F.right_cauchy_green() - 0.5 * I

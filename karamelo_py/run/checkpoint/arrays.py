@@ -66,7 +66,7 @@ def touched(simulation: SceneState) -> dict[str, np.ndarray]:
     """Return nodes with recent contact, and their contact memory.
 
     A single process searches all nodes, since liquids may return to nodes that are not in use now.
-    Several processes search the nodes in use.
+    Several processes search only the nodes in use.
     """
     spans = used(simulation.setup.spans)[1:]
     if not remembered_at(simulation, spans[:1]):
@@ -248,7 +248,7 @@ def _take_nodes(simulation: SceneState, state: ArraysByName) -> None:
     used = np.zeros(simulation.hub.fields.node_count, np.bool_)
     used[counted] = True
     nodes = state["node numbers"][()] if "node numbers" in state else counted[:0]
-    kept = {id(array) for _, array in kept_at_nodes(simulation.setup)}  # -0 is restored, too
+    kept = {id(array) for _, array in kept_at_nodes(simulation.setup)}  # restores -0, too
     for name, array in of_nodes(simulation.setup):
         if id(array) in kept:
             continue

@@ -95,7 +95,7 @@ def _all_parts(hub: Hub) -> Iterator[tuple[Key, object]]:
         yield ("curve", curve.id, ""), curve
     for item in hub.output.last:
         yield ("restart", str(item.file), ""), item
-        # The log comes last, because it shows values of the other parts.
+        # The log comes last, because it shows values of the parts before it.
     yield ("log", "", ""), hub.output.log
 
 
@@ -220,7 +220,7 @@ def value_of(kept: object, arrays: list[np.ndarray]) -> Any:
 class RollbackPoint:
     def __init__(self, hub: Hub, halve: bool) -> None:
         self.hub, self.halve = hub, halve
-        self.halvings = self.returns = 0  # halvings so far in the run; returns to this state
+        self.halvings = self.returns = 0  # halvings so far in the run; returns to this state so far
         self.arrays: dict[str, np.ndarray] = {}
         self.step = -1
         self._parts: dict[int, PartStates] = {}

@@ -18,7 +18,7 @@ from karamelo_py.run.implicit.equations import Equations
 
 STIFF = 1e3  # stiffness of the penalty spring / stiffness of a cell of the softer body
 LIGHT = 0.01  # fraction of an inner node's mass below which a node has no contact
-SLIPPERY = 0.05  # fraction below which it has no friction
+SLIPPERY = 0.05  # fraction of an inner node's mass below which a node has no friction
 CLOSE = 1e-4  # gap in cells below which contact is assumed at first
 
 
@@ -52,7 +52,7 @@ class Contact:
         self.mu = np.where((shares[chosen] < SLIPPERY) & np.isfinite(mu), 0.0, mu)
         self.stiffness = self._stiffness(moduli)
         h = float(np.min(s.grids.spacing))
-        self.gap[self.touched()] = 0  # contact is closed, whatever gap was measured
+        self.gap[self.touched()] = 0  # treats the contact as closed, whatever gap was measured
         self.close = (self.gap <= CLOSE * h) | self.touched()
         ones, at = np.ones(count), np.arange(count)
         m = len(nodes)
@@ -63,7 +63,7 @@ class Contact:
         self.respond(np.zeros((m, self.d)), supposed=True)
 
     def meet(self, nodes: np.ndarray) -> None:
-        """Assume that the closest pairs of a body are in contact, if none of its pairs is.
+        """Assume contact at the closest pairs of a body of which no pair is in contact.
 
         `nodes` (m,) are the nodes of the body.
         """
@@ -92,9 +92,9 @@ class Contact:
         return np.maximum(x, 0.25 * h) ** self.s.kin.hoops
 
     def touched(self, sign: int = 0) -> np.ndarray:
-        """Return the mask (c,) of pairs in contact at the end of the last step.
+        """Return the mask (c,) of pairs in contact after the last `respond`.
 
-        With `sign` -1, only the pairs that stuck are included.
+        With `sign` -1, include only pairs that stuck.
         """
         step = int(self.s.control.values[TIMESTEP])
         last = self.tag.touched[self.pairs[:, 0], self.b]
@@ -104,7 +104,7 @@ class Contact:
     def respond(self, u: np.ndarray, *, supposed: bool = False) -> None:
         """Compute forces after nodal displacements (m, d), and derivatives of the forces.
 
-        With `supposed`, `u` is not known yet; contact and sticking are as in the last step.
+        With `supposed`, `u` is a first guess; contact and sticking are as in the last step.
         """
         k, N = self.stiffness, self.normal
         x = self.jump @ u

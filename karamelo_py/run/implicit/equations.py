@@ -69,9 +69,9 @@ def distinct(numbers: list[np.ndarray]) -> np.ndarray:
 
 
 class Moduli(NamedTuple):
-    mean: float  # mean by volume; 0 if nothing deforms
-    of_grids: np.ndarray  # (g,) by grid, 0 where nothing deforms
-    of_laws: list[np.ndarray]  # by block, (2, k): moduli of its laws, and specific volumes
+    mean: float  # mean modulus by volume; 0 if nothing deforms
+    of_grids: np.ndarray  # (g,) modulus of each grid, 0 where nothing deforms
+    of_laws: list[np.ndarray]  # for each block (2, k): moduli of its laws, and specific volumes
 
     def alike(self) -> bool:
         every = (table[0, table[1] > 0] for table in self.of_laws)
@@ -259,7 +259,7 @@ class Equations:
 
     def prescribed(self, fixes: Iterable[Fix], count: int) -> tuple[np.ndarray, np.ndarray]:
         mask, values = np.zeros((len(self.nodes), count), bool), np.zeros((len(self.nodes), count))
-        for fix in fixes:  # the last one applies
+        for fix in fixes:  # the last fix of a node applies
             mask_of_fix, value = fix.prescribed(self.nodes, self.positions)
             mask |= mask_of_fix
             values[mask_of_fix] = value[mask_of_fix]

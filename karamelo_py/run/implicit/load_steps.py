@@ -61,7 +61,7 @@ class LoadSteps:
         self.cached: dict[str, np.ndarray] = {}  # arrays of the last equations
         self.parts = 0
         self.failure = ""  # reason why no equilibrium was found
-        self.unknowns = self.corrections = 0  # of the last equilibrium; in all steps
+        self.unknowns = self.corrections = 0  # in the last equilibrium; in all steps so far
         self.seconds: dict[str, float] = {}  # time by stage
 
     def advance(self, hooks: Tag, count: int) -> int:
@@ -179,7 +179,7 @@ class LoadSteps:
     def _part(self, hooks: Tag, dt: float) -> tuple[int, float]:
         """Take a substep with the loads at its end; return number of corrections and residual.
 
-        Raises `Failed` if there is no equilibrium, in which case points have not moved.
+        If there is no equilibrium, raises `Failed`; points have not moved then.
         """
         simulation = self.simulation
         s, control = simulation.setup, simulation.setup.control
@@ -189,8 +189,8 @@ class LoadSteps:
         cold = simulation.snapshot() if heated else None
         simulation.steps.load_step(dt)
         try:
-            # The sums include the heat capacities, which conduction needs. Conduction changes the
-            # stress.
+            # The sums at nodes include the heat capacities, which conduction needs. Conduction
+            # changes the stress.
             before = self._forces(hooks).copy() if self.dynamic or heated else None
             loaded = simulation.hooks if self.dynamic else None
             loads = loaded.loads.copy() if isinstance(loaded, Hooks) else None
@@ -246,7 +246,7 @@ class LoadSteps:
             torque[:] = 0
         if isinstance(simulation.hooks, Hooks):
             simulation.hooks.loads[:] = 0
-        # Otherwise prescribed velocities would be relative to the last step.
+        # Prescribed velocities would otherwise be relative to the last step.
         with simulation.steps.altered(last_dt=0.0):
             if not take_rows(self.scheme.begin, s, simulation.mode, hooks):
                 raise PointsWrong
@@ -347,8 +347,8 @@ class LoadSteps:
     def _publish(self, result: "Equilibrium", hooks: Tag, dt: float) -> None:
         """Let fixes publish the reactions at their nodes, and set nodal velocities.
 
-        A fix gets the velocity that nodes would have without it. With rigid solids, a fix also gets
-        contact and inertial forces.
+        A fix gets the velocities that its nodes would have without the fix. With rigid solids, a
+        fix also gets contact and inertial forces.
         """
         simulation, s = self.simulation, result.equations.s
         d, nodes, update = result.equations.d, result.equations.nodes, s.nodes.update

@@ -44,7 +44,7 @@ class TooFar(Failed):
 
 
 class Loose(Failed):
-    """The equations are singular: node `at` is not held, or hardly."""
+    """The equations are singular, because node `at` is not or hardly held."""
 
 
 class Wrong(Failed):
@@ -52,7 +52,7 @@ class Wrong(Failed):
 
 
 class Broken(Failed):
-    """The user interrupted the step."""
+    """Ctrl-C or a signal interrupted the step."""
 
 
 class Newton:
@@ -237,7 +237,7 @@ class Newton:
         far = max(far, np.abs(u[equations.led]).max(initial=0.0) / self.spacing)
         if far <= MOST_MOVED or not equations.s.frame.moves:
             return
-        if not self.pushing:  # contact uses the present surfaces only
+        if not self.pushing:  # contact uses the present surfaces, so no motion is too far
             far = min(far, equations.furthest_into(u, self.fixed()))
         if far > MOST_MOVED:
             raise TooFar(f"points would move {far:.3g} cells at once", far / MOST_MOVED)

@@ -107,7 +107,7 @@ class Seepage:
         self.rho, self.suction, self.mobility, M, h = more
         self.drains = self.suction < self.K
         ratio = self.content / self.pores
-        # Use weight and mobility of water that fills the pores.
+        # Water that fills the pores sets weight and mobility.
         self.full = np.where(self.drains & (ratio < 1), self.pores, self.content)
         self.mobility = self.mobility * self.full / self.pores
         self.volume = self.V0 * (self.pores + 1 - self.n)

@@ -107,7 +107,7 @@ class MovingBodies:
         self.left = self.rest(balance)
 
     def solve(self, A: sp.spmatrix, b: np.ndarray, kept: dict) -> np.ndarray:
-        """Solve together with the motions of the bodies; return changes of displacements (m, d)."""
+        """Solve for the motions of the bodies, too; return changes of displacements (m, d)."""
         right, below, own = self.parts
         whole = sp.bmat([[A, right], [below, own]]).tocsr()
         x = solvers.direct(whole, np.concatenate([b, self.left]), kept)

@@ -16,15 +16,15 @@ MANY_ITERATIONS = 25  # iterations above which the hierarchy is built again
 
 
 class Singular(Exception):
-    """There is no solution: a body is not held, or a limit load is reached."""
+    """There is no solution, because a body is not held or a limit load is reached."""
 
 
 class Unconverged(Exception):
-    """Multigrid has reduced the residual by a factor below 100."""
+    """Multigrid has reduced the residual by less than a factor of 100."""
 
 
 def hold(A: sp.bsr_matrix, fixed: np.ndarray, more: np.ndarray) -> None:
-    """Decouple `fixed` components (m, d) of a matrix; add `more` (m,) to its other diagonals."""
+    """Decouple `fixed` components (m, d) of a matrix; add `more` (m,) to the other diagonals."""
     rows = np.repeat(np.arange(len(fixed)), np.diff(A.indptr))
     some = np.any(fixed, axis=1)
     at = np.flatnonzero(some[rows] | some[A.indices])
@@ -50,7 +50,7 @@ def scaled(A: sp.spmatrix, s: np.ndarray | None = None) -> tuple[sp.csr_matrix, 
 def direct(A: sp.spmatrix, b: np.ndarray, kept: dict | None = None) -> np.ndarray:
     B, s = scaled(A)
     kept = {} if kept is None else kept
-    release(kept)  # before the next factorisation, which takes most of the memory
+    release(kept)  # factorisation takes most of the memory
     with warnings.catch_warnings():
         warnings.simplefilter("error", MatrixRankWarning)
         try:
@@ -144,7 +144,7 @@ def solve(
     if name == "auto" and large and (in_space or is_symmetric(A)) and find_spec("pyamg"):
         try:
             return solve("amg", A, b, rigid, accuracy, kept)
-        except (Singular, Unconverged):  # as multigrid fails for some matrices
+        except (Singular, Unconverged):  # multigrid fails for some matrices
             release(kept)
     x = amg(A, b, rigid, accuracy, kept) if name == "amg" else direct(A, b, kept)
     if not np.all(np.isfinite(x)):

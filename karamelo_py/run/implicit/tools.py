@@ -41,7 +41,7 @@ class PushingTool:
         self.gather = sp.csr_matrix((np.concatenate(weights), at), shape)
         self.gather_all = equations.for_all_components(self.gather)
         self.way = np.zeros((shape[0], self.d))
-        self.included = self.force = self.at(self.way)  # at the start; part of nodal forces
+        self.included = self.force = self.at(self.way)  # force in nodal forces; present force
 
     def at(self, way: np.ndarray) -> np.ndarray:
         return self.fix.forces(Displaced(self.view, way))
@@ -62,7 +62,7 @@ class PushingTool:
         return (self.gather_all.T @ blocks @ self.gather_all).tobsr((self.d, self.d))
 
     def publish(self) -> None:
-        """Publish the force; apply its mean over the step to the points, for the right work."""
+        """Publish the force; give points its mean over the step, for the right work."""
         self.force = self.at(self.way)
         self.view.force = self.view.force + (self.force - self.included) / 2
         self.view.write_back()

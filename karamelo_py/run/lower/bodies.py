@@ -169,7 +169,7 @@ def _driven(hub: Hub, moving: list[RigidBody]) -> set:
     for joint in joints(hub):
         if joint.spring and joint.spring[2] is not None:  # initial extension of a spring
             driven.update(joint.linked)
-    driven -= {None}  # the ground
+    driven -= {None}  # None is the ground
     while more := {s for some in links if driven & set(some) for s in some} - driven - {None}:
         driven |= more
     return driven

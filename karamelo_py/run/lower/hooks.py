@@ -111,7 +111,7 @@ class _Builder:
         self.members: list[np.ndarray] = []
         self.formulas = Programs(hub)
         self.holding: list[Fix] = []
-        self.loaded_nodes = 0  # 0 if hooks add no forces to nodes
+        self.loaded_nodes = 0  # number of nodes, or 0 if hooks add no forces to nodes
         method = hub.update.method
         self.rigid_fields = method.rigid_fields(hub) if method is not None else np.zeros(0, bool)
         self.rigid = any(solid.rigid for solid in hub.solids.values())
@@ -330,7 +330,7 @@ def _sets_initial_state(fix: Fix) -> bool:
 
 
 class FixesOfRun(NamedTuple):
-    once: list[Fix]  # fixes that set the initial state
+    once: list[Fix]  # fixes that set the initial state, once
     new: list[Fix]
     first: ActingFixes | None  # fixes of the first step, if some act only in it
     lasting: ActingFixes

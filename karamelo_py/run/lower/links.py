@@ -55,7 +55,7 @@ def lower_links(hub: Hub, moving: Sequence[RigidBody]) -> kernel.NoLinks | kerne
             still = not (free[[one.body, other.body]] >= 0).any()
             twice = _is_ball(one.shape) and _is_ball(other.shape) and a > b
             if still or twice or {fix.parts[a].solid, fix.parts[b].solid} in apart:
-                one = one._replace(balls=one.balls[:0])  # without balls, but with the same kernel
+                one = one._replace(balls=one.balls[:0])  # no balls, but the same kernel
             sign = 1 if a == 0 else -1 if b == 0 else 0
             slots = np.array([slot, int(hub.values.torques[slot]), sign])
             touch = kernel.Meeting(one, other, np.array([fix.mu, fix.restitution]), slots)

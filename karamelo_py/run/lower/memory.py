@@ -27,7 +27,7 @@ THERE = 1  # bytes per point in `present`
 
 class MemoryTaken(NamedTuple):
     touched: int
-    copied: int  # bytes of the copy of the last good state
+    copied: int  # bytes of the copied last good state
     common: int  # bytes that each process holds of the whole scene (solids, regions, groups)
 
 
@@ -120,7 +120,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
         f"the scene has {plural(count, 'point')}, which take at least {in_words(need)} of memory"
         f"{beside}; this machine has "
     )
-    if need <= memory.whole:  # other programs may release memory
+    if need <= memory.whole:  # other programs may release memory before it is needed
         message += f"{in_words(memory.free)} free: it may not fit"
         hub.warn(message, mark=mark, hint=_ways(hub, need, memory.free, copied))
         return
@@ -130,7 +130,7 @@ def check_room(hub: Hub, *, copied: bool) -> None:
 
 
 def _ways(hub: Hub, need: float, free: float, copied: bool) -> str:
-    # Factor for the cell size, two digits, rounded up.
+    # The cell size that fits, as a factor with two digits, rounded up.
     larger = ceil(10 * (need / max(free, 1.0)) ** (1 / hub.domain.dimension)) / 10
     ways = [f"cells {max(larger, 1.1):g} times as large, or fewer points per cell"]
     single = hub.settings.comm.share_here * least_bytes(hub, np.float32, copied)

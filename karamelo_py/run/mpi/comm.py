@@ -165,7 +165,7 @@ def check_same_run(hub: Scene) -> None:
     if (words == words[0]).all():
         return
     comm.parted = True
-    # A process that has failed reports it.
+    # A process that has failed reports its own error.
     if (words == FAILED).any() or comm.rank != int((words > 0).argmax()):
         raise Quit
     raise ScriptError(

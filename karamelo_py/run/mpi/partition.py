@@ -1,6 +1,6 @@
 """Division of tiles among processes, and messages between the processes.
 
-If several processes reach a node, each of them computes its sum, in the same order.
+If several processes reach a node, each of them computes the whole sum there, in the same order.
 """
 
 from collections.abc import Sequence
@@ -68,9 +68,9 @@ FINE = 1000  # the cost of a tile is an integer, in this fraction of a unit
 
 
 class Needs(NamedTuple):
-    tile: np.ndarray  # (k,) ascending
-    lo: np.ndarray  # (k, d)
-    hi: np.ndarray  # (k, d)
+    tile: np.ndarray  # (k,) number of the tile, ascending
+    lo: np.ndarray  # (k, d) first nodes
+    hi: np.ndarray  # (k, d) last nodes
 
     def among(self, tile: np.ndarray, begin: np.ndarray, end: np.ndarray) -> tuple:
         """Return overlaps with boxes (m, d) in tiles (m,): indices, first nodes, last nodes."""
@@ -184,7 +184,7 @@ class SharedTiles(Tiles):
                 self._spare[kind] = self._rooms[k, name]
             self._rooms[k, name] = room
             arrays.append(array)
-            give_up(old)  # frees it, so that only one field has two copies at a time
+            give_up(old)  # frees the array, so that only one field has two copies at a time
             for parts in come:
                 parts[i] = None
         return made_of(points, arrays)

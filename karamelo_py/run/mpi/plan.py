@@ -24,7 +24,7 @@ class ProcessShare(NamedTuple):
     points: int
     tiles: int  # tiles with points
     nodes: int
-    others: int  # processes to which it sends
+    others: int  # number of processes to which a process sends data
     sent: int  # bytes per step
     memory: int  # bytes used in steps, including the copy of the last good state
     common: int  # bytes that each process holds of the whole scene (solids, regions, groups)

@@ -121,7 +121,7 @@ class Whole:
         tiles.lay_out(whole)
         nodes = numbers(whole.spans)
         for _, array in of_nodes(whole):
-            array[nodes] = 0  # including nodes that no box reaches
+            array[nodes] = 0  # also at nodes that no box reaches
         memory = self.subdomain.memory()
         for share in parts:
             for (_, array), rows in zip(of_nodes(whole), share["at nodes"], strict=True):

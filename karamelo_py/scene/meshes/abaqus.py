@@ -238,7 +238,7 @@ class _Deck:
         family, count = kind
         of_mesh = family if count == len(SHAPES[family].corners) else f"{family}{count}"
         table = _rows(keyword, count + 1)
-        if of_mesh == "line3":  # the second node is the middle one
+        if of_mesh == "line3":  # Abaqus lists the middle node second
             table = table[:, [0, 1, 3, 2]]
         self.scope.elements.append(DeckElements(of_mesh, name, table[:, 0], table[:, 1:]))
         into(self.scope.groups, keyword.options.get("ELSET"), table[:, 0])

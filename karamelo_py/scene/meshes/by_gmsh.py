@@ -53,7 +53,7 @@ def begin(gmsh: ModuleType) -> None:
     before = signal.getsignal(signal.SIGPIPE) if hasattr(signal, "SIGPIPE") else None
     gmsh.initialize([], readConfigFiles=False, run=False, interruptible=False)
     if before is not None:
-        with contextlib.suppress(ValueError):  # not in the main thread
+        with contextlib.suppress(ValueError):  # signals cannot be set outside the main thread
             signal.signal(signal.SIGPIPE, before)
 
 
@@ -108,7 +108,7 @@ def mesh_geometry(path: Path, dimension: int, size: float | None = None) -> Mesh
 
 
 def read_by_gmsh(path: Path) -> Mesh:
-    """Read a mesh; errors of Gmsh become ValueError."""
+    """Read a mesh; raises ValueError for errors of Gmsh."""
     with alone(path, "" if path.suffix.lower() in READS else ".msh") as link:
         try:
             with _model(link) as gmsh:
@@ -163,7 +163,7 @@ def _taken(gmsh: ModuleType, only_groups: bool = False, of_file: _Header | None 
             continue
         for kind, elements, nodes in zip(*gmsh.model.mesh.getElements(dim, tag), strict=True):
             name, _, _, count, *_ = gmsh.model.mesh.getElementProperties(kind)
-            if not count:  # pieces of elements that a level set has cut
+            if not count:  # Such lines are pieces of elements cut by a level set.
                 left_out[name] = left_out.get(name, 0) + len(elements)
                 continue
             if not entities and of_file and of_file.groups is not None:

@@ -18,11 +18,11 @@ _MANY = 100  # number of names above which messages list only a few
 
 
 class CellBlock(NamedTuple):
-    type: str  # meshio's, such as tetra10
-    nodes: np.ndarray  # (n, c) from 0, corners first
+    type: str  # meshio's cell type, such as tetra10
+    nodes: np.ndarray  # (n, c) node numbers from 0, corners first
     # (c, d) natural coordinates of the nodes; None: the order of VTK
     reference: np.ndarray | None = None
-    label: str = ""  # name in the file, if it differs
+    label: str = ""  # cell type in the file, if it differs from meshio's
 
     @property
     def family(self) -> str:
@@ -138,6 +138,6 @@ def outer_faces_of(mesh: Mesh, mask: np.ndarray) -> list[CellBlock]:
         outer = nodes[first[count == 1]]
         if len(outer):
             blocks.append(CellBlock(FACE_TYPES[corners], outer))
-    if not blocks:  # only nodes, without a face
+    if not blocks:  # the set has nodes only, without a whole face
         blocks.append(CellBlock("vertex", np.flatnonzero(mask)[:, None]))
     return blocks

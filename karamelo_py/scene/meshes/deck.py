@@ -25,14 +25,14 @@ _FACES = {
     ),
     "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
 }
-SetItems = dict[str, list[np.ndarray | str]]  # numbers, and names of further sets
+SetItems = dict[str, list[np.ndarray | str]]  # numbers of items, and names of further sets
 
 
 class DeckKeyword(NamedTuple):
     name: str
     options: dict[str, str]
     lines: list[str]
-    number: int  # line number
+    number: int  # line number of the keyword
     file: Path
 
 
@@ -88,7 +88,7 @@ def _is_number(text: str) -> bool:
 class DeckElements(NamedTuple):
     type: str  # meshio's type
     label: str  # name of the type in the deck
-    numbers: np.ndarray  # (n,)
+    numbers: np.ndarray  # (n,) element numbers
     nodes: np.ndarray  # (n, c) node numbers of the deck
 
 
@@ -156,11 +156,11 @@ def _resolved(sets: SetItems, name: str, above: tuple[str, ...]) -> Iterator[np.
 
 
 class Numbering(NamedTuple):
-    deck: np.ndarray  # (n,) ascending
-    mesh: np.ndarray  # (n,)
+    deck: np.ndarray  # (n,) numbers in the deck, ascending
+    mesh: np.ndarray  # (n,) numbers in the mesh
 
     def of(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the numbers (m,) in the mesh, -1 if there is none."""
+        """Return the numbers (m,) in the mesh for numbers in the deck, -1 where there is none."""
         if not len(self.deck):
             return np.full(len(numbers), -1)
         at = np.minimum(np.searchsorted(self.deck, numbers), len(self.deck) - 1)
@@ -175,14 +175,14 @@ NO_NUMBERS = Numbering(np.empty(0, np.int64), np.empty(0, np.int64))
 
 
 class Sets:
-    """Sets by name, stored as functions that return numbers in the mesh, as there may be many."""
+    """Sets by name; each is a function that returns numbers in the mesh, as there may be many."""
 
     def __init__(self) -> None:
         self.by_name: dict[str, list[Callable[[], np.ndarray]]] = defaultdict(list)
         self.numbering: dict[str, Numbering] = {}
 
     def add(self, name: str, instance: str, items: SetItems | np.ndarray, key: str = "") -> None:
-        """Add items, or the set `key` of items, with numbers of an instance."""
+        """Add items of an instance, or its set `key` of items, to the set `name`."""
         numbering = self.numbering.get(instance, NO_NUMBERS)
 
         def listed() -> np.ndarray:

@@ -49,7 +49,7 @@ SHAPES = {
     )
 }
 
-# Second-order elements have further nodes between these corners: edges first, then faces.
+# For each second-order node, the corners around it: first of edges, then of faces.
 MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
     "line": ((0, 1),),
     "triangle": ((0, 1), (1, 2), (2, 0)),
@@ -70,9 +70,9 @@ MIDDLES: dict[str, tuple[tuple[int, ...], ...]] = {
 
 class MeshElements(NamedTuple):
     shape: Shape
-    numbers: np.ndarray  # (n, c) of the corners
+    numbers: np.ndarray  # (n, c) numbers of the corner nodes
     corners: np.ndarray
-    nodes: np.ndarray | None = None  # (n, k, d) all nodes, if there are more than corners
+    nodes: np.ndarray | None = None  # (n, k, d) positions of all nodes, if not only corners
     reference: tuple[tuple[float, ...], ...] = ()  # natural coordinates of `nodes`
     bulge: float = 0.0  # distance of `nodes` from the straight element / its size
 
@@ -286,7 +286,7 @@ def _quadrature(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray, np
 def _coefficients(name: str, reference: tuple) -> tuple[np.ndarray, np.ndarray]:
     exponents = np.array(_exponents(name, len(reference)))
     nodes = np.array(reference, float)
-    table = np.prod(nodes[:, None, :] ** exponents[None], axis=2)  # 0^0 is 1
+    table = np.prod(nodes[:, None, :] ** exponents[None], axis=2)  # 0^0 is 1, as needed
     return exponents, np.linalg.inv(table)
 
 

@@ -83,7 +83,7 @@ def read_exodus(path: Path) -> Mesh:
     points[:, : len(coordinates)] = coordinates.T
     cells: list[CellBlock] = []
     connected = each("connect")
-    of_set = names("eb", len(connected))  # for each block of `cells`
+    of_set = names("eb", len(connected))  # one mask per block of `cells`
     firsts = np.cumsum([1, *map(len, connected)])
     for k, nodes in enumerate(connected):
         word = variables[f"connect{k + 1}"][1].upper().rstrip("\0")

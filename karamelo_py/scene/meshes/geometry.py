@@ -24,13 +24,13 @@ _WORDS, _NO_NAMES, _FIELDS = (
     frozenset(_LISTS[name].split()) for name in ("describe", "act", "fields")
 )
 
-# Allowed options: display. Any other option may name a file or a command.
+# Allowed options change only the display.
 _GENERAL = re.compile(
     r"ExpertMode|NumThreads|Terminal|Verbosity|SmallAxes|Color|(?:Axes|Light|Trackball)\w*"
     r"|(?:Min|Max|Rotation|RotationCenter|Scale|Translation)[XYZ]|RotationCenterGravity"
 )
 _OPTION_ACTS = re.compile(r"Command|File(?!Version|s)")
-_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # write to a file if > follows the text
+_SPEAKS = frozenset(("Printf", "Error", "Warning"))  # these write to a file if > follows the text
 _READS = frozenset(("Include", "Merge", "MergeWithBoundingBox"))
 _AFTER_NAMES = frozenset(("In", "Using", "Left", "Right", "Alternate"))
 _NAMES = frozenset(("For", "Macro", "Function"))

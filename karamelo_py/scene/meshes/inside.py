@@ -14,7 +14,7 @@ _SETS = 8  # maximum number of sets of shells that do not overlap
 
 
 class Skin:
-    """The surface of a shape: sets of faces (m, d, d), each closed.
+    """The surface of a shape: sets of faces (m, d, d), each a closed surface.
 
     A position is inside if a set encloses it or a face is within `tolerance`. With `open`, sets
     enclose nothing. `odd`: see `Surface`.
@@ -50,7 +50,7 @@ def _volumes(faces: np.ndarray) -> np.ndarray:
 
 
 def outer_faces(parts: list[MeshElements]) -> np.ndarray:
-    """Return outer faces (m, d, d), oriented outwards; in 1D in pairs, the lower end first.
+    """Return outer faces (m, d, d), oriented outwards; in 1D pairs of ends, the lower end first.
 
     Quadrilaterals are split along the diagonal through their lowest-numbered node, so that
     neighbouring elements split their common face in the same way.
@@ -84,7 +84,7 @@ def flat_faces(parts: list[MeshElements]) -> np.ndarray:
 
 
 def _once(rows: np.ndarray) -> np.ndarray:
-    """Return ascending indices of rows (n, k) that occur an odd number of times."""
+    """Return the indices, ascending, of rows (n, k) that occur an odd number of times."""
     order = np.lexsort(rows.T[::-1])
     ordered = rows[order]
     begin = np.flatnonzero(np.r_[True, (ordered[1:] != ordered[:-1]).any(axis=1)])
@@ -113,7 +113,7 @@ def triangles_of(mesh: Mesh) -> np.ndarray:
 
 
 def skin_of(points: np.ndarray, triangles: np.ndarray, tolerance: float) -> Skin:
-    """Return the closed shells of `points` (n, 3), `triangles` (m, 3).
+    """Return the closed shells of a surface of `points` (n, 3) with `triangles` (m, 3).
 
     A shell inside another is a cavity, whatever its orientation; overlapping shells form one body.
     Raises ScriptError for an edge with an odd number of triangles.

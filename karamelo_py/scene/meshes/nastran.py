@@ -48,7 +48,7 @@ _NO_SOLIDS = re.compile(
 class _Entry(NamedTuple):
     name: str
     fields: list[str]
-    number: int  # line number
+    number: int  # line number of the entry
     file: Path
 
     def whole(self, k: int) -> int:

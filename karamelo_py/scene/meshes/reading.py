@@ -40,7 +40,7 @@ CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 _OF_GMSH = (b"$MeshFormat", b"$NOD", b"$Comments", b"$PhysicalNames")
 _BY_ENDING = (".unv", ".cgns")
 _HDF5 = b"\x89HDF"
-# First bytes of files that are not meshes but may have such an ending, with advice.
+# First bytes of other kinds of files that may have the ending of a mesh, with advice.
 _FOREIGN = (
     (re.compile(rb"version https://git-lfs"), "a pointer of Git LFS", "git lfs pull fetches it"),
     (re.compile(rb"\s*(#[^\n]*\n\s*)*MESH\s", re.I), "a mesh of GiD", "export it as .inp or .msh"),
@@ -71,7 +71,7 @@ def read(path: Path, dimension: int, trusted: bool = False, size: float | None =
 
     Geometries are meshed up to `dimension`, CAD files with edges of `size`.
 
-    A `trusted` geometry may run system commands and write files.
+    If `trusted`, a geometry may run system commands and write files.
     """
     status = path.stat()
     if not status.st_size:
@@ -283,7 +283,7 @@ def _sets_of(mesh: "meshio.Mesh") -> Iterator[tuple[str, list[np.ndarray]]]:
             yield f"{name}:{number}", masks
             if len(tags) == 1 or name == "gmsh:physical":
                 yield str(number), masks
-            for group in vars(mesh).get("cell_tags", {}).get(int(number), ()):  # MED
+            for group in vars(mesh).get("cell_tags", {}).get(int(number), ()):  # for MED files
                 yield group, masks
     for name, (number, dimension) in mesh.field_data.items():
         arrays = tags.get("gmsh:physical", [])
@@ -298,7 +298,7 @@ def _sets_of(mesh: "meshio.Mesh") -> Iterator[tuple[str, list[np.ndarray]]]:
 
 
 def _reason(error: BaseException) -> str:
-    """Return an exception as one line; it is clearer than meshio's if no format fits."""
+    """Return a reader's error as one line, or a clearer line if no format fits."""
     said = str(error).strip()
     foreign = isinstance(error, UnicodeDecodeError) or said.startswith("could not convert")
     if isinstance(error, SystemExit) or foreign or not said:
