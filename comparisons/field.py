@@ -180,7 +180,7 @@ def main() -> None:
         for name in names or SIZES:
             rows = measure(name, Path(folder))
             write(sorted([row for row in read() if row[0] != name] + rows, key=lambda row: row[0]))
-    fig, panels = plt.subplots(3, 4, figsize=(16, 11))
+    fig, panels = plt.subplots(3, 4, figsize=(16, 13), layout="constrained")
     gains = []
     print("| scene | before | now | error before over now | auto over the least |")
     print("|---|---|---|---|---|")
@@ -196,14 +196,12 @@ def main() -> None:
     print(f"mean of log(error before / after) at equal cost: {np.mean(gains):.3f}, a factor of "
           f"{exp(np.mean(gains)):.2f}")  # fmt: skip
     words = "processor time of the steps (s)" if cost == "seconds" else "visited nodes"
-    fig.supxlabel(words)
-    fig.supylabel("relative error; below 0.01 % counts as 0.01 %", x=-0.01)
+    for axes in panels[-1]:
+        axes.set_xlabel(words)
+    fig.supylabel("relative error; below 0.01 % counts as 0.01 %")
     handles, labels = panels.flat[0].get_legend_handles_labels()
-    fig.legend(
-        handles, labels, loc="lower center", ncols=6, fontsize=8, bbox_to_anchor=(0.5, -0.09)
-    )
-    fig.tight_layout()
-    fig.savefig(PICTURE if cost == "cost" else "seconds.png", dpi=70, bbox_inches="tight")
+    fig.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8.5)
+    fig.savefig(PICTURE if cost == "cost" else "seconds.png", dpi=80)
 
 
 if __name__ == "__main__":
