@@ -41,9 +41,9 @@ class BasicFacts:
         self.linear = traits.gradient_jumps and traits.nodes_per_cell == 1
         self.hats = self.linear or bool(traits.shape)  # linear, or a basis with domains
         solids = hub.solids.values()
-        # Solids whose laws store all work and sustain tension.
+        # Solids whose laws store all work of stress and sustain tension.
         self.elastic = [s for s in solids if law_traits(s.material.whole).rebounds]
-        # Solids with about one point per cell and direction.
+        # IDs of solids with about one point per cell and direction.
         self.single = [s.id for s in solids if stable_step.one_a_cell(s)]
         self.sparse = bool(self.single)
 

@@ -16,7 +16,7 @@ from karamelo_py.scene.lattice import Lattice
 from karamelo_py.scene.modify import Fix
 from karamelo_py.script.expressions import POINT_SEEDS
 
-SLOW = 0.01  # fraction of the wave speed; no slower drift was seen to gain energy
+SLOW = 0.01  # fraction of the wave speed below which no drift was seen to gain energy
 TORN = 9.0, 14.0  # tolerable rotation with one point per cell, radians: FLIP, affine transfers
 # Mean squared distance of a point from its nodes, weighted by N, per direction, divided by h^2: for
 # the linear basis with two points per cell, and for second-order bases.
@@ -29,7 +29,7 @@ class Noise(NamedTuple):
     cells: float  # path of the body or its rim, in cells
     angle: float = 0.0
     noisy: bool = True
-    torn: bool = False  # whether the rim separates
+    torn: bool = False  # True if the rim separates
 
 
 class Lag(NamedTuple):
@@ -42,7 +42,7 @@ class Lag(NamedTuple):
 
 
 def rings(law: Any) -> bool:
-    """Return whether bodies of a law vibrate, unlike fluids."""
+    """Return True if bodies of a law vibrate, unlike fluids."""
     if law_traits(law).rebounds:
         return True
     strength = parameter(law, "strength", None)
@@ -135,7 +135,7 @@ def lag_of(facts: BasicFacts) -> Lag:
 
 
 def sides(body: Body) -> np.ndarray:
-    """Return the lengths (d,) of a body, half a point beyond the outer points."""
+    """Return the side lengths (d,) of a body, half a point beyond the outer points."""
     return body.motion.high - body.motion.low + 2 * body.solid.half_size.max(axis=0)
 
 

@@ -61,7 +61,7 @@ class Chosen(NamedTuple):
     choice: Choice
     lines: Sequence[str]
     accuracy: float | None = None
-    alternatives: tuple[str, ...] = ()  # names of set-ups that the scene supports
+    alternatives: tuple[str, ...] = ()  # names of supported set-ups
 
     @property
     def words(self) -> dict[str, str]:
@@ -117,7 +117,7 @@ class Scouted(SceneFacts):
 
     @property
     def dilates(self) -> bool:
-        """Return whether there is soil without friction or with dilation."""
+        """Return True if there is soil without friction, or soil that dilates."""
         return all(
             parameter(part, "dilation", 0.0) > 0 or not parameter(part, "friction", 0.0) > 0
             for part in self.strengths
@@ -144,7 +144,7 @@ class Scouted(SceneFacts):
 
     @property
     def wall_ahead(self) -> bool:
-        """Return whether fixes hold nodes that no body touches yet."""
+        """Return True if fixes hold nodes that no body touches yet."""
         near = {fix for body in self.bodies for fix, x in fixes_at(self, body) if len(x)}
         fixes = self.hub.fixes.values()
         return any(f.prescribes_velocity and len(f.nodes) and f not in near for f in fixes)
@@ -164,16 +164,17 @@ class Scouted(SceneFacts):
 
     @property
     def led(self) -> bool:
-        """Return whether a rigid solid moves as a fix prescribes."""
+        """Return True if a rigid solid moves as a fix prescribes."""
         fixes = self.hub.fixes.values()
         led = any(fix.leads_points and not all(map(is_zero, fix.formulas)) for fix in fixes)
         return led and len(self.soft) < len(self.hub.solids)
 
     @property
     def blocks(self) -> bool:
-        """Return whether points fill the bounding boxes of all bodies.
+        """Return True if points fill the bounding boxes of all bodies.
 
-        Held nodes act up to a cell inside curved or inclined faces, with splines further.
+        At curved or inclined faces, held nodes act up to a cell inside the body, with splines
+        further.
         """
         pairs = ((solid.x0, 2 * solid.half_size) for solid in self.soft)
         boxes = ((size, np.ptp(x, axis=0) + size.max(axis=0)) for x, size in pairs)
@@ -181,7 +182,7 @@ class Scouted(SceneFacts):
 
     @property
     def loaded_slowly(self) -> bool:
-        """Return whether bodies start at rest, are held, and loads change little in a transit.
+        """Return True if bodies start at rest and are held, and loads change little in a transit.
 
         A transit is the time that waves take along the longest side.
         """
@@ -233,7 +234,7 @@ class Scouted(SceneFacts):
 
 
 def is_round(solid: Solid) -> bool:
-    """Return whether all points are within 1.1 radii of a ball of equal volume."""
+    """Return True if all points are within 1.1 radii of a ball of the solid's volume."""
     d, unit = solid.x0.shape[1], pi if solid.x0.shape[1] == 2 else 4 / 3 * pi
     radius = (solid.volume0.sum() / unit) ** (1 / d)
     away = np.linalg.norm(solid.x0 - solid.x0.mean(axis=0), axis=1)
@@ -273,7 +274,7 @@ def choose(hub: Hub, name: str, accuracy: float | None) -> Chosen:
     the alternatives that the scene supports.
     """
     if hub.restart is not None and (lines := hub.restart.content["chosen"]):
-        return Chosen(RESUMED, lines, accuracy)  # a longer run may have another row
+        return Chosen(RESUMED, lines, accuracy)  # a longer run could choose another row
     if hub.rehearsing:
         return Chosen(PLAIN, PLAIN.lines)
     facts = _facts(hub)
@@ -304,7 +305,7 @@ def _runs(hub: Hub, lines: Sequence[str]) -> bool:
 def _written(lines: Sequence[str], facts: Scouted) -> tuple[str, ...]:
     first, *others = (line.format(grid=facts.grid) for line in lines)
     heat = ", thermo-mechanical" * facts.hot
-    if facts.hub.update.scheme_mark is not None:  # the script chooses a scheme
+    if facts.hub.update.scheme_mark is not None:  # the script sets a scheme
         others = [line for line in others if not line.startswith("scheme(")]
     return f"{first[:-1]}{heat})", *others
 

@@ -38,7 +38,7 @@ class Crossing(NamedTuple):
 
 
 def loses(facts: BasicFacts) -> bool:
-    """Return True if stress is lost; gases and liquids have separate rules."""
+    """Return True if the scene loses stress; gases and liquids have separate rules."""
     laws = [solid.material.law for solid in facts.hub.solids.values()]
     flows = (any(law_traits(kind).any_speed for kind in law_kind(law)) for law in laws)
     explicit = not facts.scheme.traits.implicit

@@ -40,7 +40,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
         pressed = "points pressed against an edge of the domain with boundary(reflect)"
         return pressed, "fix velocity_nodes along walls instead of boundary(reflect)"
     courant, _ = stable_step.own_step_of_waves(hub, still=False)
-    # Use the wave speed of undeformed bodies; they may have softened since.
+    # The wave speed is of undeformed bodies, which may have softened since.
     fastest = stable_step.fastest_wave(simulation)
     across = float(simulation.control.step[0].spacing) / fastest if fastest > 0 else np.inf
     stable = courant * across
@@ -65,7 +65,7 @@ def cause_of_gain(hub: Hub, simulation: Simulation) -> tuple[str, str]:
             f"{fraction:.2g} x the stability limit",
             f"{_step_of(hub, simulation, conserving)}, scheme(usavg), or {smooth}",
         )
-    if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbours are apart
+    if moves and simulation.points.largest(swelling)[0] > 1.5:  # neighbouring points are apart
         return "points more than a cell apart (numerical fracture)", WHOLE
     causes = SceneFacts(hub, simulation, simulation.time).advice("gain")
     largest = max(causes, key=lambda advice: advice.share, default=None)
@@ -207,7 +207,7 @@ def words_of_error(hub: Hub, fraction: float, counted: bool) -> str:
         by = f"; {' and '.join(takers)} {'dissipates' if len(takers) == 1 else 'dissipate'} energy"
         if of_transfer in takers and hub.counts_transfer:
             by += " (compute transfer_loss measures it)"
-    # The sum of losses may exceed the largest energy.
-    fraction = round(fraction, 2) + 0.0  # prints no -0.00
+    # The sum of losses may exceed the largest energy of the run.
+    fraction = round(fraction, 2) + 0.0  # the sum with 0.0 avoids -0.00
     much = f"{fraction:+.2f} % of" if fraction > -100 else f"{fraction / 100:+.2f} times"
     return f"{much} {words}{by}"

@@ -18,7 +18,7 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.scene.modify import moved
 from karamelo_py.scene.solid import named, solid_with
 
-DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # codes of warnings about units
+DOUBTED_UNITS = ("units-of-velocities", "units-of-material")  # warnings about units
 ABSURD = 10.0  # path in one step, in cells, above which a smaller step would not help
 LOOSE = 1.5  # largest point spacing of an unstrained solid, in cells
 LEFT = 0.02  # tolerated stress across a thin body / largest stress
@@ -259,7 +259,7 @@ def _smaller_step(hub: Hub, simulation: Simulation, instead: str = "") -> str:
 
 
 def warn_of_stress_left(hub: Hub, simulation: Simulation) -> None:
-    """Warn once of a stress across a thin body that is not small, with law, step and state."""
+    """Warn once of a stress across a thin body that is not small, with its law, step and state."""
     left = hub.fields.particle("stress_left")
     if left.max(initial=0) <= LEFT or not hub.update.first_time("stress across"):
         return

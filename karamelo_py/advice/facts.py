@@ -32,7 +32,7 @@ class Vibration(NamedTuple):
 
 class SceneFacts(BasicFacts):
     def parts(self) -> Iterator[tuple[Any, Any]]:
-        """Yield each part (law, basis, ...) once, with its material."""
+        """Yield each part of the scene (law, basis, ...) once, with the material of the part."""
         materials = dict.fromkeys(solid.material for solid in self.hub.solids.values())
         parts = [(fix, None) for fix in self.hub.fixes.values()]
         parts += [
@@ -69,7 +69,7 @@ class SceneFacts(BasicFacts):
     # Largest velocity / wave speed; strain due to impacts and weight.
     speed = property(lambda self: self.fastest / self.waves if self.waves > 0 else 0.0)
     strain = property(lambda self: max(self.impact if len(self.hub.solids) > 1 else 0.0, self.sag))
-    # All bodies deform evenly, so that no single cell is constrained.
+    # True if all bodies deform evenly, so that no single cell is constrained.
     even = cached_property(lambda self: all(pressed_evenly(self, body) for body in self.bodies))
     shear_stress = cached_property(lambda self: self.simulation.points.largest(SEQ)[0])
 
@@ -147,7 +147,7 @@ class SceneFacts(BasicFacts):
 
     @cached_property
     def bending(self) -> float:
-        """Bending strain of the slenderest solid: 3 g L^2/(H c^2) or, at impact, sqrt(3) v/c."""
+        """Bending strain of the slenderest solid: 3 g L^2/(H c^2), or sqrt(3) v/c at impact."""
         most = 3**0.5 * 2 * self.impact
         for g in self.weights:
             for motion in self.motions:
@@ -167,7 +167,7 @@ class SceneFacts(BasicFacts):
 
     @property
     def passes(self) -> float:
-        """Relative displacement of points / twice the longest side."""
+        """Relative displacement of points / twice the longest side of a body."""
         rates = [(m.fast - m.slow).max() / (4 * m.size) for m in self.motions if m.size]
         return self.duration * float(max(rates, default=0.0))
 

@@ -56,7 +56,7 @@ def warn_about_rest(hub: Hub, simulation: Simulation, duration: float) -> None:
 
 
 def _rests(hub: Hub, simulation: Simulation) -> bool:
-    """Return whether nothing can move; plug-ins count as motion."""
+    """Return True if nothing can move; plug-ins count as motion."""
     laws = [solid.material.law for solid in hub.solids.values()]
     update = hub.update
     parts = [type(p) for p in (update.method, update.method.basis, update.transfer, update.scheme)]
@@ -160,7 +160,7 @@ def later_steps(hub: Hub) -> list[Step]:
 def warn_about_steps(
     hub: Hub, simulation: Simulation, halves: bool, *, again: bool = False
 ) -> None:
-    """Warn of a step above the limit, in this and in later runs; once, unless `again`."""
+    """Warn of a step above the limit, in this run or a later one; once, unless `again`."""
     present, limit = step_of(hub, halves), simulation.steps.limit_moving
     of_heat = float(simulation.control.heat[0].heat_limit)
     stable = step_size.stable_step(simulation, limit)
@@ -231,7 +231,7 @@ def _odd_in(units: Units | None, law: NamedTuple, speed: float) -> tuple[str, st
     odd, least = [], min(law_traits(kind).least_density for kind in law_kind(law))
     if not least <= density <= DENSITIES[1]:
         odd.append(f"density is {density:.3g} kg/m^3")
-    if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # 0 for rigid solids
+    if speed != 0 and not SPEEDS[0] <= speed <= SPEEDS[1]:  # speed 0 means a rigid solid
         odd.append(f"speed of waves is {speed:.3g} m/s")
     if not odd:
         return None
@@ -357,10 +357,11 @@ def _gone(hub: Hub, simulation: Simulation) -> float:
 
 
 def _warn_about_precision(s: SceneFacts) -> None:
-    """Warn if single precision cannot resolve the motion in a step.
+    """Warn if single precision cannot resolve how far points move in a step.
 
     At 50 000 cells from the origin, the path of a falling block has an error of 3.5 %. At 200 000
-    cells, it does not move. Raises ScriptError if positions are spaced by 1/500 cell or more.
+    cells, the block does not move at all. Raises ScriptError if positions are spaced by 1/500 cell
+    or more.
     """
     if s.hub.settings.precision != "single":
         return

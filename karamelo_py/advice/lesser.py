@@ -1,4 +1,4 @@
-"""Suggestions of `check`: fewer dimensions, or half of the body, suffice."""
+"""Suggestions of `check`: fewer dimensions, or half of the body, would suffice."""
 
 from collections.abc import Callable, Iterator
 from math import prod
@@ -67,7 +67,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
     for k in range(free_from(domain.kin), d):
         rest = [axis for axis in range(d) if axis != k]
         layers, faces = _layers(hub, k, rest) if _moves_nothing(hub, [k]) else NO_LAYERS
-        # A point of a radial scene costs as much, so one or two layers waste nothing.
+        # Points of a radial scene cost as much, so one or two layers waste nothing.
         if layers > (2 if round_ else 0) and _faces_held(hub, k, *faces):
             several = [axis for axis in rest if axis not in counts]
             if several and acts_alike(hub, several):
@@ -89,7 +89,7 @@ def _flat(hub: Hub, held: dict[int, Roller]) -> Words:
 
 
 def _domain_of(hub: Hub, rest: list[int], more: str = "") -> str:
-    """Return the line that defines a domain with only the directions `rest`."""
+    """Return the line of a domain that has only the directions `rest`."""
     domain = hub.domain
     ends = [f"{domain.lo[axis]:g}, {domain.hi[axis]:g}" for axis in rest]
     line = f"dimension({len(rest)}, {', '.join(ends)}, {domain.h:g}){more}"
@@ -100,7 +100,7 @@ def _domain_of(hub: Hub, rest: list[int], more: str = "") -> str:
 
 
 def _bar(hub: Hub, held: dict[int, Roller]) -> Words:
-    """Suggest a line for prisms along an axis, with free sides or symmetry planes there."""
+    """Suggest 1D for prisms along an axis whose sides are free or symmetry planes."""
     if hub.domain.dimension < 3 or _flows(hub):
         return
     solids = [solid for solid in hub.solids.values() if solid.count]
@@ -170,7 +170,7 @@ class Fewer(NamedTuple):
 
 
 def _leans(hub: Hub, rest: list[int]) -> bool:
-    """Return whether a law has directions that do not fit a scene with only the axes `rest`."""
+    """Return True if a law has directions that do not fit a scene with only the axes `rest`."""
     d = len(rest)
     for solid in hub.solids.values():
         law = solid.material.whole
@@ -207,7 +207,7 @@ def _is_led(hub: Hub, across: list[int], held: dict[int, Roller]) -> bool:
 
 
 def _moves_nothing(hub: Hub, across: list[int]) -> bool:
-    """Return whether no fix acts in the directions `across`, or depends on positions in them."""
+    """Return True if no fix acts in the directions `across`, or depends on positions in them."""
     named = "".join(AXES[k] for k in across)
     for fix in acting(hub):
         formulas = given(fix)
@@ -220,7 +220,7 @@ def _moves_nothing(hub: Hub, across: list[int]) -> bool:
 
 
 def _is_prism(solid: Solid, k: int, rest: list[int]) -> bool:
-    """Return whether a solid has the same section everywhere along k."""
+    """Return True if a solid has the same section everywhere along axis `k`."""
     if solid.region is None:
         places = cells(solid.x0, solid.h)
         across, counts = np.unique(places[:, k], return_counts=True)
@@ -234,7 +234,7 @@ def _is_prism(solid: Solid, k: int, rest: list[int]) -> bool:
 
 
 def _layers(hub: Hub, k: int, rest: list[int]) -> tuple[int, tuple[float, float]]:
-    """Return the number of equal layers across k and their ends in cells, or `NO_LAYERS`."""
+    """Return the number of equal layers along `k` and their ends in cells, or `NO_LAYERS`."""
     most, ends = 0, set()
     for solid in hub.solids.values():
         if not solid.count:
@@ -268,9 +268,9 @@ def _mirrored(hub: Hub) -> Words:
     if len(hub.lattices) > 1 or not acting(hub):
         return
     if not all(solid.region for solid in solids):
-        return  # such solids may have velocities
+        return  # these solids may have initial velocities
     if any(can(solid.material.whole, is_round) for solid in solids):
-        return  # directions of a law may differ from their mirror image
+        return  # directions of a law may change in the mirror
     for k in range(free_from(domain.kin), domain.dimension):
         ends = [(solid.x0[:, k].min(), solid.x0[:, k].max()) for solid in solids]
         middle = (min(low for low, _ in ends) + max(high for _, high in ends)) / 2

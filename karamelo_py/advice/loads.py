@@ -20,7 +20,7 @@ AXES = "xyz"
 
 
 class Roller(NamedTuple):
-    """A symmetry plane at an end of all bodies, where a fix holds nodes only along the normal."""
+    """A symmetry plane at an end of all bodies, where a fix holds only the normal velocity."""
 
     at: float
     side: int  # 1: bodies lie above the plane, -1: below it
@@ -35,12 +35,12 @@ def positions(hub: Hub, nodes: np.ndarray) -> np.ndarray:
 
 
 def extent(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lowest and the highest corner (3,) of all solids."""
+    """Return the lowest and the highest corner (3,) of the box around all solids."""
     return np.min([one.lo for one in solids], axis=0), np.max([one.hi for one in solids], axis=0)
 
 
 def rollers(hub: Hub) -> dict[int, Roller]:
-    """Return symmetry planes by direction, except directions with planes at both ends."""
+    """Return the symmetry planes by direction, without directions that have planes at both ends."""
     found: dict[int, Roller] = {}
     solids = [solid for solid in hub.solids.values() if solid.count]
     if not solids:
@@ -69,7 +69,7 @@ def acting(hub: Hub) -> list[Fix]:
 
 
 def given(fix: Fix) -> tuple:
-    """Return the formulas of a fix; NaN if it has none, as its effect is then unknown."""
+    """Return the formulas of a fix; NaN if the fix has none, as its effect is then unknown."""
     return tuple(fix.formulas) or fix.components or (np.nan,) * 3
 
 
@@ -82,7 +82,7 @@ def depends(formula: Any, axes: str) -> bool:
 
 
 def alike(hub: Hub, fix: Fix, key: Callable[[np.ndarray], np.ndarray]) -> bool:
-    """Return True if the group of a fix has all or none of the points (or nodes) of equal `key`."""
+    """Return True if a fix's group has all or none of the points (nodes) with equal `key`."""
     group, within = fix.group, fix.points_within()
     if group is None or (group.all and within is None):
         return group is not None

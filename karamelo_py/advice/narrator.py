@@ -197,7 +197,7 @@ class Narrator(Listener):
 
 def _counted(simulation: Simulation) -> dict[str, int]:
     hub, deleted = simulation.hub, int((~simulation.present).sum())
-    if len(hub.waiting) or len(hub.inactive):  # some points enter later, or may be activated
+    if len(hub.waiting) or len(hub.inactive):  # some points enter later, or may be activated later
         return {"points present": simulation.count - deleted}
     if deleted or hub.update.boundary == "delete":
         return {"deleted points": deleted}

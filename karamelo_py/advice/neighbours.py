@@ -13,7 +13,7 @@ from karamelo_py.run.body_motion import BodyMotion
 from karamelo_py.scene.solid import Solid
 
 SLENDER = 4.0  # length / thickness above which a body bends
-# Limits of c dt/h of the heavy body times sqrt(rho_heavy / rho_light). Two vibrating blocks (usl,
+# Limits of sqrt(rho_heavy / rho_light) c dt/h, with c of the heavy body. Two vibrating blocks (usl,
 # linear basis, 1 to 3 points per cell) fail within 3000 steps at 3.2 and 5.9, but not at 1.9.
 BREAKS, HOLDS = 2.5, 1.9
 STEPS = 500  # runs with fewer steps give no warning; the earliest failure was after 800 steps
@@ -23,7 +23,7 @@ class Uneven(NamedTuple):
     heavy: str = ""
     light: str = ""
     ratio: float = 1.0  # ratio of densities
-    courant: float = 0.0  # Courant number at the nodes of mostly light mass
+    courant: float = 0.0  # Courant number at nodes whose mass is mostly light
 
     @property
     def of_step(self) -> float:
@@ -109,9 +109,9 @@ def uneven(facts: BasicFacts) -> Uneven:
 
 
 def _touch(motion: BodyMotion, boxes: BodyBoxes, h: float, duration: float) -> np.ndarray:
-    """Return the mask (n,) of bodies that touch a given one within `duration`."""
+    """Return the mask (n,) of the bodies that a body touches within `duration`."""
     touching = (np.maximum(motion.low - boxes.high, boxes.low - motion.high) < h).all(axis=1)
-    # In the mirrored scene, bodies at the back are ahead.
+    # In the mirrored scene, bodies behind a body lie ahead of it.
     mirrored = motion._replace(
         centre=-motion.centre, velocity=-motion.velocity, low=-motion.high, high=-motion.low
     )

@@ -38,7 +38,7 @@ class Middle(NamedTuple):
     """A centre, or an axis `along` through it; `across` are the other directions."""
 
     across: list[int]
-    centre: np.ndarray  # (3,)
+    centre: np.ndarray  # (3,) position
     sides: np.ndarray  # (3,): 1 or -1 in directions with a symmetry plane, otherwise 0
     lo: np.ndarray
     hi: np.ndarray
@@ -48,7 +48,7 @@ class Middle(NamedTuple):
         return [axis for axis in range(3) if axis not in self.across]
 
     def apart(self, solid: Solid) -> np.ndarray:
-        """Return distances (2, k) of the ends of a solid from the centre, normal to the axis."""
+        """Return the distances (2, k) of a solid's ends from the centre, normal to the axis."""
         return np.abs(np.stack([solid.lo, solid.hi]) - self.centre)[:, self.across]
 
     def radius(self, x: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def round_bodies(hub: Hub, held: dict[int, Roller]) -> Words:
     if domain.dimension != 3 or not solids:
         return
     if any(can(solid.material.whole, is_round) for solid in solids):
-        return  # a law has directions
+        return  # a law with directions is not symmetric
     lo, hi = extent(solids)
     centre, sides = (lo + hi) / 2, np.zeros(3)
     for k, roller in held.items():
@@ -112,7 +112,7 @@ def _squares(domain: Domain, solids: list[Solid], middle: Middle) -> list[str] |
 
 
 def _is_round(region: Region | None, here: Callable, middle: Middle, reach: float) -> bool:
-    """Return whether positions of equal radius are all within a region, or all outside."""
+    """Return True if positions of equal radius are all in a region, or all outside it."""
     if region is None:
         return False
     rng = np.random.default_rng(1)
@@ -146,7 +146,7 @@ def _values(hub: Hub, fix: Fix, axes: list[int], x: np.ndarray) -> np.ndarray:
 
 
 def _radial(hub: Hub, fix: Fix, middle: Middle) -> bool:
-    """Return whether the values of a fix are radial, and depend on `key` only."""
+    """Return True if the values of a fix are radial, and depend on `key` only."""
     formulas = [given(fix)[axis] for axis in middle.across]
     if all(formula is None for formula in formulas):
         return True
@@ -163,7 +163,7 @@ def _radial(hub: Hub, fix: Fix, middle: Middle) -> bool:
 
 
 def _is_even(hub: Hub, middle: Middle, x: np.ndarray, values: np.ndarray, small: float) -> bool:
-    """Return whether `values` (n,) are equal at all positions of the same radius and height."""
+    """Return True if `values` (n,) are equal at all positions with the same radius and height."""
     _, same = np.unique(cells(middle.key(x), hub.domain.h), axis=0, return_inverse=True)
     most = np.full(same.max(initial=-1) + 1, -np.inf)
     np.maximum.at(most, same, values)
@@ -171,7 +171,7 @@ def _is_even(hub: Hub, middle: Middle, x: np.ndarray, values: np.ndarray, small:
 
 
 def _acts_from_centre(hub: Hub, fix: Fix, middle: Middle) -> bool:
-    """Return whether a fix acts symmetrically around the middle, by a pressure or radially."""
+    """Return True if a fix acts symmetrically around the middle, by a pressure or radially."""
     if fix.pressure is not None:
         return not depends(fix.pressure, AXES)
     return len(given(fix)) > 2 and _radial(hub, fix, middle) and alike(hub, fix, middle.key)
@@ -257,7 +257,7 @@ def _line_of_rotation(fix: Fix, omega: str) -> str:
 
 
 def _angular_velocity(hub: Hub, fix: Fix, middle: Middle) -> str | None:
-    """Return the angular velocity of a fix; None if its velocities are not a rotation."""
+    """Return the angular velocity of a fix; None if the velocities are no rotation."""
     formulas = [given(fix)[axis] for axis in middle.across]
     if fix.style not in ROTATING or any(one is None for one in formulas):
         return None

@@ -1,4 +1,4 @@
-"""The default step, the stable step, and the step that the script sets."""
+"""The default step, the stable step, and the step set in the script."""
 
 from math import inf
 
@@ -23,7 +23,7 @@ EXPLAINED = {"light_nodes": " (nodes with little mass)", "lone_points": " (point
 
 
 def own_step(simulation: Simulation, *, still: bool = False) -> float:
-    """Return the present default step: at rest (`still`), or once points have moved."""
+    """Return the present default step; if `still`, the default step at rest."""
     control, steps = simulation.control, simulation.steps
     motion, spacing = control.motion[0], control.step[0].spacing
     courant, fraction = own_step_of_waves(simulation.hub, still=still)

@@ -53,9 +53,9 @@ def _unused(hub: Hub, simulation: Simulation) -> Words:
     used = set()
     for scene in (hub, hub.at_end or hub):
         if any(name.endswith("_exx") for name in scene.values.names()):
-            return  # element tests may use materials
+            return  # only tests of elements may use the material
         materials = [*scene.materials.values()]
-        # By identity: fixes have arrays, which cannot be compared with a material.
+        # Compare by identity: fixes have arrays, which cannot be compared with a material.
         of_fixes = {id(value) for fix in scene.fixes.values() for value in vars(fix).values()}
         used |= {(part.kind, part.id) for m in materials for part in m.parts() if part is not m}
         used |= {("material", m.id) for m in materials if id(m) in of_fixes}

@@ -51,7 +51,7 @@ class Argument:
     def word(self) -> str | None:
         """The argument as a word: bare, quoted, or the text of a variable.
 
-        It is None if the argument is arithmetic.
+        The word is None if the argument is arithmetic.
 
         ``neo-hookean`` or ``dump.*.gz`` are words if no part of them is the name of a value.
         """
@@ -146,7 +146,7 @@ class Argument:
         for k, letter in enumerate(code):
             depth += (letter == "(") - (letter == ")")
             if depth == 0 and k < len(code) - 1:
-                return [self]  # (a + b)*(c + d)
+                return [self]  # e.g. (a + b)*(c + d) is no list
             if depth == (letter != ")") and letter in ",)":
                 parts.append(self._from(self._raw.start + begin, self._raw.start + k))
                 begin = k + 1

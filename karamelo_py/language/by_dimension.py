@@ -15,7 +15,7 @@ _HUGE = 1e20  # Karamelo's value of INF
 
 
 class Forms:
-    """The forms of an argument list, by dimension.
+    """The forms of an argument list, one for each dimension.
 
     `pattern` is a call that contains ``{names}`` and perhaps ``{dimension}``. `names` maps a
     dimension to names of arguments. Some arguments may be `words`. INF and EDGE mean the

@@ -23,7 +23,7 @@ def wrong_count(
     first = arguments[0].word() if arguments else None
     known = any(registry.knows(family, first or "") for family in registry.families())
     if first and expected and expected[0].kind.family and not known:
-        registry.find(expected[0].kind.family, first)  # raises an error with similar names
+        registry.find(expected[0].kind.family, first)  # raises an error that suggests similar names
     slots = [p for p in expected if not p.keyword]
     needed = [p for p in slots if not (p.optional or p.variadic)]
     surplus = arguments[len(slots) :] if not any(p.variadic for p in slots) else ()
@@ -156,7 +156,7 @@ def comma_in_number(arguments: Sequence[Argument], surplus: int) -> str | None:
         re.fullmatch(r"\d{3}", two.text) and int(one.text) for one, two in adjacent
     ):
         return "commas separate arguments: a million is 1e6 or 1000000"
-    if len(adjacent) != 1 and not exact:  # 0,1, 0,1
+    if len(adjacent) != 1 and not exact:  # e.g. 0,1, 0,1 can be read in several ways
         return None
     return "with a decimal point: " + ", ".join(f"{one.text}.{two.text}" for one, two in adjacent)
 

@@ -85,7 +85,7 @@ def place_of(function: Callable) -> str:
 
 
 def place_in(code: Any, error: BaseException) -> str:
-    """Return the last line of `code` in the traceback: `` (spring.py:28)``."""
+    """Return the place in `code` of the last line of the traceback:"""
     try:
         source = inspect.getsourcefile(inspect.unwrap(code))
     except TypeError:

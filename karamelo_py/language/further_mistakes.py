@@ -22,16 +22,16 @@ _BASIS = frozenset({"method", "dimension", "create_domain", "include", "quit"} |
 _SCENE = frozenset(
     {"region", "solid", "group", "eos", "strength", "damage", "temperature", "material"}
 )
-# These add columns to points.
+# Statements that add columns to points.
 _COLUMNS = _SCENE | {"plane_strain", "plane_stress", "uniaxial_stress", "scheme", "fix"}
-# These exist only if a solid has pore water.
+# Words that exist only if a solid has pore water.
 _OF_WATER = {
     *("pore_pressure", "initial_pore_pressure", "seepage_face", "flux", "saturation", "porosity"),
     *("water_content", "wx", "wy", "wz", "t11", "t22", "t33", "t12", "t13", "t23"),
 }
 _NAMED = frozenset({"fix", "compute", "dump", "plot", "load_path", "element"})
 _PLAIN = {"group", "plot", "load_path", "element"}
-# Index of the style among the arguments.
+# Index of the style among the arguments of a command.
 _STYLED = {name: 2 if name == "dump" else 1 for name in (_SCENE | _NAMED) - _PLAIN}
 _RUNS = frozenset({"run", "run_time", "run_until", "run_while", "element"})
 
@@ -132,7 +132,7 @@ def further_errors(interpreter: Any, first: ScriptError) -> list[ScriptError]:
                 wrong = statement
             except Quit:
                 break
-            except Exception:  # of any kind, as the scene is incomplete
+            except Exception:  # errors of any kind, as the scene is incomplete
                 passed_over += _rest_of(interpreter)
     for statement in passed_over:
         dependents.note(statement)

@@ -47,7 +47,7 @@ class Interpreter:
         hub.interpreter = self
         self.files: list[Path] = []
         self.frames: list[_Frame] = []
-        self.by_statement = False  # whether `next_statement` enters included scripts
+        self.by_statement = False  # True if `next_statement` enters included scripts
         self.statement: syntax.Statement | None = None
         self.record = Record()  # executed statements, for restart files
         self.replay: Replay | None = None
@@ -152,7 +152,7 @@ class Interpreter:
             self.frames.clear()
             self.hub.answered = True
         except ScriptError as error:
-            # At a run, the rest of the script has been rehearsed already.
+            # At a run, the rest of the script has already been rehearsed.
             if not self.hub.rehearsed:
                 error.others = further_errors(self._copy(self.hub.rehearsal()), error)
             self.frames.clear()
@@ -180,7 +180,7 @@ class Interpreter:
                 raise
 
     def next_statement(self) -> syntax.Statement | None:
-        """Return the next statement, from any file."""
+        """Return the next statement, of the script or an included file."""
         while self.frames:
             frame = self.frames[-1]
             if frame.next < len(frame.statements):
@@ -290,7 +290,7 @@ class Interpreter:
             self.evaluate(parse_expression(raw), raw)
 
     def evaluate(self, node: syntax.Node, raw: syntax.Raw) -> Value:
-        if isinstance(node, syntax.NumberLiteral):  # most arguments are numbers
+        if isinstance(node, syntax.NumberLiteral):  # a shortcut, as most arguments are numbers
             return node.value
         return evaluation.evaluate(node, raw, self)
 

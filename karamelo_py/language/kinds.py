@@ -29,7 +29,7 @@ def _rounding(value: float) -> float:
 
 @dataclass(frozen=True)
 class Keyword:
-    """Marks a field that is given as ``name=value``; by default the field's name is used."""
+    """Marks a field given as ``name=value``, by default with the name of the field."""
 
     name: str = ""
 
@@ -115,7 +115,7 @@ class OutputFile:
             message = f"{name} cannot be the name of a file here, where these are in {encoding}"
             hint = "the environment variable PYTHONUTF8=1, or another name"
             raise ScriptError(message, mark=argument.mark, hint=hint) from None
-        # A run makes the folder of -out, so it may be missing in `check`.
+        # A run makes the folder given by -out, so it may be missing in `check`.
         made = hub.checking and path.parent == hub.folder
         if not (path.parent.is_dir() or made):
             folder, expected = Path(name).parent, "a file in a folder that exists"
@@ -145,7 +145,7 @@ class Unfit(Exception):
 
 @dataclass(frozen=True)
 class Kind:
-    """Description of an argument, and its conversion.
+    """The description of an argument, and its conversion from text.
 
     If there are `words`, only these are accepted. `family` is set if the argument names a style of
     this family. If `with_numbers`, arguments ``name=value`` of the call are numbers in it.
@@ -204,7 +204,7 @@ def _suggest_numbers(argument: Argument, error: ScriptError) -> None:
 def _to_integer(hub: Scene, argument: Argument) -> int:
     value = _to_number(hub, argument)
     if math.isnan(value):
-        return 1  # unknown in a rehearsal; 1 passes all checks
+        return 1  # in a rehearsal the value is unknown; 1 passes all checks
     if math.isinf(value) or abs(value - round(value)) > _rounding(value):
         raise Unfit(number_text(value))
     if abs(value) > _LARGEST_INTEGER:
@@ -339,7 +339,7 @@ def _constrained(kind: Kind, constraints: list[Constraint]) -> Kind:
 def _union(kinds: list[Kind]) -> Kind:
     nullable = any(kind.nullable for kind in kinds)
     words = tuple(word for kind in kinds for word in kind.words)
-    # Words come first, as they take precedence over variables.
+    # Words are tried first, as they take precedence over variables.
     tried = sorted((kind for kind in kinds if kind.text != NULL), key=lambda kind: not kind.words)
 
     def convert(hub: Scene, argument: Argument) -> Any:

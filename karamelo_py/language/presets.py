@@ -36,7 +36,7 @@ def names_in(statements: Iterable[Statement]) -> tuple[set[str], dict[str, None]
         codes = [re.sub(r'("[^"\n]*")|#[^\n]*', r"\1", raw.code).strip() for raw in raws]
         named = [m.groups() if (m := _NAMED.match(code)) else ("", code) for code in codes]
         expected = []
-        with suppress(StopIteration, TypeError):  # no style, or a broken one
+        with suppress(StopIteration, TypeError):  # there is no style, or a broken one
             style = next(code for code in codes[:2] if registry.knows(name, code))
             expected = signature.parameters(registry.find(name, style))
         formula = any(p.kind.with_numbers for p in expected)
@@ -60,7 +60,7 @@ class Presets(dict[str, str]):
         self.blamed: set[str] = set()
         # The presets on which each variable depends.
         self._made_of: dict[str, dict[str, None]] = {name: {name: None} for name in texts}
-        if isinstance(texts, Presets):  # presets of a script that is copied
+        if isinstance(texts, Presets):  # the presets of the copied script
             vars(self).update(vars(texts), _script=script, _made_of=dict(texts._made_of))
             return
         expected = "letters, digits and _, as in -var h 0.05"
@@ -90,11 +90,11 @@ class Presets(dict[str, str]):
 
     def stand_for(self, statement: Assignment) -> None:
         name, variables = statement.name, self._script.variables
-        # A text may now be an expression of variables that are known.
+        # The text may now be an expression of variables that have values.
         if isinstance(variables.get(name), str):
             variables[name] = self._value(name)
         if isinstance(variables[name], str):
-            # If the text should have been a number, the command that uses it reports the mistake.
+            # If the text had to be a number, the command that uses it reports the mistake.
             in_script = None
             with suppress(ScriptError):
                 in_script = self._script.evaluate(statement.node, statement.right)

@@ -34,7 +34,7 @@ _differences: dict[Any, bool | tuple[str, ...]] = {}
 
 @cache
 def _families() -> dict[str, dict[str, list[EntryPoint]]]:
-    """Entry points by family and name; several if packages clash."""
+    """Entry points by family and name; several entries if packages clash."""
     table = {
         family: {name: [EntryPoint(name, PREFIX + at, PREFIX + family)] for name, at in one.items()}
         for family, one in tomllib.loads(BUILT_IN.read_text(encoding="utf-8")).items()

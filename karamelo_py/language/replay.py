@@ -37,7 +37,7 @@ class Replay:
         self.record = record
         self.within = within
         self.file = file
-        self.number = -1  # number of the present statement
+        self.number = -1  # number of the present statement in the record
         self._values: list[float] = []
 
     @property
@@ -49,7 +49,7 @@ class Replay:
         self.number += 1
         self._values = list(self.record.values.get(self.number, ()))
         before = self.record.statements[self.number]
-        # The length of an unfinished run may change.
+        # An unfinished run may have another length.
         if text != before and not (self.at_end and self.within):
             if text.partition("(")[0] == before.partition("(")[0] in _RUNS:
                 raise self._was_over(before, mark)

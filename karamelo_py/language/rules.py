@@ -34,12 +34,12 @@ HATS_AND_SPLINES = "linear", "quadratic-spline", "cubic-spline"
 
 
 class Feature(NamedTuple):
-    """A feature of a scene, such as its basis, by `name`; for an option, `name` is empty."""
+    """A feature of a scene, such as its basis, by `name`; the `name` of an option is empty."""
 
     kind: str
     name: str
-    words: str  # text in messages
-    instead: str = ""  # what to use instead of the option
+    words: str  # text for messages
+    instead: str = ""  # replacement of the option
     mark: Mark | None = None
 
 

@@ -34,11 +34,11 @@ class Scene(Protocol):
 
     @property
     def simulation(self) -> Any:
-        """The arrays of the present scene."""
+        """The arrays of the present scene, with its steps."""
 
     @property
     def lattices(self) -> list:
-        """The grids of the scene."""
+        """The grids of the domain or the method."""
 
     def require_domain(self) -> Any:
         """Return the domain; raise ScriptError without one."""
@@ -49,7 +49,7 @@ class Scene(Protocol):
     def warn(
         self, message: str, mark: Any = None, hint: str | None = None, expected: str | None = None
     ) -> None:
-        """Warn the user."""
+        """Print a warning about the place `mark`, with a hint and the correct form."""
 
     def rehearse(self) -> None:
-        """Try the rest of the script once."""
+        """Execute the rest of the script once without effects, to find mistakes."""

@@ -64,7 +64,7 @@ def unknown_call(script: Any, name: str, mark: Any, statement: bool) -> ScriptEr
 
 
 def as_style(script: Any, name: str) -> str | None:
-    """Write the line of a style that is used as a command."""
+    """Write the line that a style used as a command should have been."""
     for family in ("compute", *registry.families()):
         line = instead(family, name) or ""
         if line.startswith(f"{family}("):
@@ -123,12 +123,12 @@ def unknown_name(script: Any, name: str, mark: Any) -> ScriptError:
 def _meant_by(script: Any, name: str, names: list[str]) -> tuple[str, str | None]:
     statement, energies = script.statement, table()["energies"]
     if isinstance(statement, CommandCall) and statement.name == "material":
-        energies = {}  # E is a modulus
+        energies = {}  # not energies, as E is a modulus
     if name.lower() in ("true", "false"):
         alone = isinstance(statement, Assignment) and statement.right.code.strip() == name
         said = f'"{name.lower()}", in quotes' if alone else str(int(name[0] in "tT"))
         return f"write {said}", None
-    if re.match("[vcf]_", name):  # as in LAMMPS
+    if re.match("[vcf]_", name):  # names as in LAMMPS
         same = [n for n in names if n == name[2:]]
         same = same or [n for n in names if re.fullmatch(f"{re.escape(name[2:])}_[^_]+", n)]
         if same or name[2:] in energies:
@@ -174,7 +174,7 @@ def _not_published(script: Any, name: str, mark: Any) -> ScriptError | None:
 def _ahead(script: Any, back: int = 0) -> Iterator[tuple[Statement, str, str, int]]:
     """Yield (statement, command or "" for an assignment, ID or name, line) for later statements.
 
-    The innermost script comes first, beginning `back` statements before its next statement.
+    The innermost script comes first, from `back` statements before its next one.
     """
     for frame in reversed(script.frames):
         for statement in frame.statements[max(frame.next - back, 0) :]:

@@ -109,7 +109,7 @@ class Console:
         if self.terminal and not self.quiet:
             from rich.progress import BarColumn, Progress, TextColumn
 
-            # No refresh thread, which would have to wait for compiled loops.
+            # Rich would refresh the bar in a thread, which would have to wait for compiled loops.
             self._progress = Progress(
                 BarColumn(bar_width=30), TextColumn("{task.description}"),
                 console=self._rich, auto_refresh=False, transient=True,
@@ -120,7 +120,7 @@ class Console:
     def progress(
         self, step: int, time_: float, fraction: float | None = None, within: str = ""
     ) -> None:
-        """Show progress, and the activity `within` a step. May be called in every step.
+        """Show progress, and the activity `within` a step. The console allows a call in every step.
 
         `fraction` is None if the end is unknown (run_until, run_while).
         """
@@ -175,7 +175,7 @@ class Console:
         try:
             _print(self.out, text)
         except BrokenPipeError:
-            # The reader of a pipe (head, less) has ended; the run continues.
+            # The reader of the pipe (head, less) has ended; the run continues.
             self._broken = True
             with contextlib.suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_WRONLY), self.out.fileno())

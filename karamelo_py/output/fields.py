@@ -166,7 +166,7 @@ class Fields(PointTable):
         return [one for of_rank in self.comm.allgather(local) for one in of_rank]
 
     def near(self, x: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Return numbers of points within `half` (n, d) of any of `x` (n, d) along all axes."""
+        """Return the numbers of the points within `half` (n, d) of a position in `x` (n, d)."""
         size, numbers = half.min(axis=0), []
         x = x / size
         lo, hi = x.min(axis=0, initial=inf) - 1, x.max(axis=0, initial=-inf) + 1
@@ -182,7 +182,7 @@ class Fields(PointTable):
         return self.comm.allgather(say(self.simulation, *arguments))
 
     def largest(self, of: Callable[[PointTable], np.ndarray]) -> tuple[float, int]:
-        """Return the largest value, and the first point that has it."""
+        """Return the largest value, and the first point with it."""
 
         def of_rank() -> tuple[float, int]:
             best = -inf, 0
@@ -296,7 +296,7 @@ def _of_field(kind: type) -> Callable:
 
 
 def _born_with(_: Setup, block: Block) -> np.ndarray | None:
-    """Return the initial energy of a gas, which is subtracted from the stored one for precision."""
+    """Return the initial energy of a gas; stored energies are relative to it, for precision."""
     if not can(elastic_law(block.laws), taken_heat):
         return None
     eos = next(filter(None, (parameter(part, "eos", ()) for part in law_parts(block.laws))))
@@ -365,7 +365,7 @@ class ColumnFormula:
 
 
 class ShownColumn(ColumnFormula):
-    """Script argument: a column of dump particle, or a formula of them."""
+    """Script argument: a column of dump particle, or a formula of columns."""
 
     script_kind = "a column of dump particle, or a formula of columns, such as sqrt(vx^2 + vy^2)"
 

@@ -162,7 +162,7 @@ class Frames:
         from PIL import Image
 
         first, *others = (Image.open(BytesIO(frame)) for frame in self._frames)
-        hundredths = max(2, round(100 / self.fps))  # viewers slow frames below 2/100 s down
+        hundredths = max(2, round(100 / self.fps))  # viewers slow down frames shorter than 0.02 s
         first.save(
             file,
             format="GIF",

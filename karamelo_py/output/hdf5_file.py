@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-_HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags, addresses: 44 bytes
+_HEAD = struct.Struct("<8sBBBB4Q")  # signature, version, sizes, flags and addresses: 44 bytes
 _NEW = (2, 3)  # versions that have such a header
 _MASK = 0xFFFFFFFF
 

@@ -21,9 +21,9 @@ NUMBER_WIDTH = 16  # characters of -1.234567891e-05
 class Log(Rhythmic):
     r"""The log: a header, then rows.
 
-    It can be read by ``numpy.loadtxt("log.mpm", skiprows=1)`` or ``pandas.read_csv("log.mpm",
-    sep=r"\\s+")``. Later runs append rows. If the columns change, a comment line (``#``) lists the
-    new ones. In log.csv, commas separate the columns.
+    ``numpy.loadtxt("log.mpm", skiprows=1)`` and ``pandas.read_csv("log.mpm", sep=r"\\s+")`` read
+    the log. Later runs append rows. If the columns change, a comment line (``#``) lists the new
+    ones. In log.csv, commas separate the columns.
     """
 
     remembers = ("_header", "_end")
@@ -33,7 +33,7 @@ class Log(Rhythmic):
         self.every: int | ByTime = 1
         self.file = Path(FILE)
         self.is_asked_for = False
-        self.columns: list[Quantity] = []  # empty for step, dt, time
+        self.columns: list[Quantity] = []  # empty for the default: step, dt, time
         self.last_step: int | None = None
         self._file: TextIO | None = None
         self._claims: list[Claim] = []
@@ -72,7 +72,7 @@ class Log(Rhythmic):
         numbers = [column.read() for column in self.columns]
         if self.rows is not None:
             self.rows.append(([column.heading for column in self.columns], numbers))
-        # The blank is for a minus sign. The first column has none: pandas would read it as a
+        # A blank leaves room for a minus sign, except in the first column: pandas would add a
         # column.
         cells = [str(x) if isinstance(x, int | str) else f"{x: .10g}" for x in numbers]
         cells[0] = cells[0].lstrip()
@@ -86,7 +86,7 @@ class Log(Rhythmic):
     def close(self) -> None:
         if self._file is not None:
             file, self._file, self._claims = self._file, None, []
-            with reported(self.path, "the log file "):  # writes a line that has failed again
+            with reported(self.path, "the log file "):  # reports a line that has failed before
                 file.close()
 
     def _go_on(self) -> None:
@@ -117,7 +117,7 @@ class Log(Rhythmic):
             # Line buffered: rows reach the file even if the run is killed.
             self._file = path.open("a", buffering=1, encoding="utf-8", newline="\n")
             weakref.finalize(self, self._file.close)
-            self._is_kept = path.is_file()  # False for /dev/null
+            self._is_kept = path.is_file()  # False for special files such as /dev/null
             for claimed in [self.hub.folder.resolve(), *[path] * self._is_kept]:
                 if (lock := claim(claimed)) is None:
                     raise ScriptError(
@@ -152,7 +152,7 @@ def _is_log(path: Path) -> bool:
     except UnicodeDecodeError:
         return False
     except OSError:
-        return True  # opening the log reports the error
+        return True  # when the log is opened, the error is reported
     head, *rows = [re.split(r"[\s,]+", line.strip()) for line in lines if line.strip()] or [[]]
     if not rows:
         return not head or bool({"Step", "dt", "Time"} & set(head))

@@ -24,7 +24,7 @@ class NodeTable(NamedTuple):
     ids: np.ndarray
     kin: Any
     arrays: dict[str, np.ndarray]  # arrays by name, as in restart files
-    brought: dict[str, np.ndarray]  # sums over points, by their name in `BROUGHT`
+    brought: dict[str, np.ndarray]  # sums over points, by the names in `BROUGHT`
     loaded: dict[str, int]  # number of nodes with mass, by ID of the fixes with a total force
 
     def node(self, name: str) -> np.ndarray:
@@ -128,7 +128,7 @@ def vector(name: str, array: str, first: Callable = lambda kin: 0) -> dict[str, 
     }
 
 
-# None: the column exists in certain scenes; in other scenes it is 0.
+# None: the column exists in some scenes only; in the others it is 0.
 COLUMNS: dict[str, Callable[[NodeTable], np.ndarray] | None] = {
     "id": lambda nodes: nodes.ids,
     "type": lambda nodes: np.searchsorted(
@@ -174,7 +174,7 @@ BROUGHT: dict[str, Callable[[Any, Block], np.ndarray | None]] = {
 def brought(simulation: Any, name: str) -> np.ndarray:
     """Return sums (nodes, 2) of N times a value over the points of this process.
 
-    The columns, a multiple of a unit and a remainder, have more digits together than a double.
+    A column of multiples of a unit and one of remainders have more digits than one double.
     """
     s = simulation.setup
     out = np.zeros((len(s.nodes.sums), 2))

@@ -13,7 +13,7 @@ FINE = 300  # steps along the longest side of a tool's outline
 # ends of the tool, and number of sections between the ends.
 COARSE, SECTION, HALVINGS, BETWEEN = 24, 80, 8, 3
 SHARP, FLAT = 0.87, 1 - 1e-6  # cosines of angles between face normals
-# Smallest and largest number of points from which the spacing is measured; distances per batch.
+# Smallest and largest number of points used to measure the spacing; distances per batch.
 FEW, SAMPLE, DISTANCES = 25, 400, 4_000_000
 
 Depth = Callable[[np.ndarray], np.ndarray]  # depth (n,) in a tool at positions (n, d)
@@ -69,7 +69,7 @@ def corners(at: np.ndarray, shape: tuple[int, ...]) -> Iterator[tuple[np.ndarray
 
 
 def scattered(at: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Return nodal sums of the linear weights of points at `at` (in cells)."""
+    """Return nodal sums of linear weights of points at `at`, in cells."""
     sums = np.zeros(int(np.prod(shape)))
     for node, weight in corners(at, shape):
         sums += np.bincount(node, weight, len(sums))
@@ -194,7 +194,7 @@ def edges(faces: np.ndarray) -> np.ndarray:
     normal = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     sides = np.sort(corner[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    order = np.lexsort(sides.T)  # equal sides become neighbours
+    order = np.lexsort(sides.T)  # makes equal sides adjacent
     shared = (sides[order[:-1]] == sides[order[1:]]).all(axis=1)
     first, second = order[:-1][shared], order[1:][shared]
     cosine = np.abs((normal[first // 3] * normal[second // 3]).sum(axis=1))

@@ -59,17 +59,17 @@ class Options(NamedTuple):
     column: str
     label: str
     solids: tuple[str, ...] = ()
-    limits: tuple[float | None, float | None] = (None, None)  # None: widened to include the values
+    limits: tuple[float | None, float | None] = (None, None)  # None: widened to include all values
     symmetric: bool = False  # limits symmetric about 0
     cmap: str = "viridis"
     azimuth: float = -60.0
     elevation: float = 30.0
     axes: bool = True
-    lengths: str = ""  # unit
+    lengths: str = ""  # unit of lengths
     mirror: bool = False
-    window: Window = ()  # limits of x, y, z; None: the domain
+    window: Window = ()  # limits of x, y, z; None: limits of the domain
     log: bool = False  # logarithmic colours; values <= 0 get the lowest colour
-    quantile: float = 0.0  # fraction of values at each end beyond the limits
+    quantile: float = 0.0  # fraction of the values that may lie beyond each limit
     fontsize: float = 9.0
     pointsize: float = 1.0  # diameter / size of a material point
     outlines: bool = False
@@ -93,7 +93,7 @@ class DrawnPoints(Artist):
             return
         artist, many = self.picture.artist, self.rows.shape[1] > MARKS
         artist.set_visible(True)
-        if many:  # .pdf and .svg get an image, as viewers cannot show so numerous circles
+        if many:  # a .pdf or .svg gets an image, as viewers are slow with so numerous circles
             renderer.start_rasterizing()
         for first in range(0, self.rows.shape[1], MARKS):
             self.picture.draw(self.rows[:, first : first + MARKS])
@@ -135,7 +135,7 @@ class Picture:
         self._add_legend()
 
     cuts = False
-    _prepare: Callable[[], Any]  # returns the artist that draws the points
+    _prepare: Callable[[], Any]  # returns a new artist that draws the points
     # Function that returns the rows of the visible points among x (n, 3), in drawing order.
     _rows: Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
     draw: Callable[[np.ndarray], None]
@@ -218,7 +218,7 @@ class Picture:
         wide = self.title.get_window_extent(self.canvas.get_renderer()).width
         if wide > whole:
             self.title.set_fontsize(float(self.title.get_fontsize()) * whole / wide)
-        self._widest = max(self._widest, min(wide, whole))  # so that titles do not jump
+        self._widest = max(self._widest, min(wide, whole))  # titles must not jump when labels grow
         box = self.axes.get_window_extent()
         half = self._widest / 2 + MARGIN
         at = np.clip(box.x0 + box.width / 2, half, max(half, self.figure.bbox.width - half))
@@ -262,14 +262,14 @@ class Picture:
         if self.scale is not None:
             self._apply_limits(*((-5.2, -4.8) if self.options.log else (-2.5e-4, 2.5e-4)))
         if engine := self.figure.get_layout_engine():
-            for _ in range(2):  # twice, since the aspect ratio moves the axes
+            for _ in range(2):  # the first layout changes the aspect ratio, which moves the axes
                 engine.execute(self.figure)
             self.figure.set_layout_engine("none")
         self.figure.draw_without_rendering()
         self._make_room_at_left()
         if self.scale is not None:
             axes = self.scale.axes
-            if axes is not self.axes:  # the axes of a colour bar, which must not be taller
+            if axes is not self.axes:  # the axes of the colour bar must not be taller
                 bar, box = axes.get_position(), self.axes.get_position()
                 high = min(bar.height, box.height)
                 low = box.y0 + (box.height - high) / 2
@@ -348,7 +348,7 @@ def _number(value: float, _: object = None) -> str:
     if value == 0 or 1e-4 <= abs(value) < 1e6:
         return f"{value:.8g}"
     short = np.format_float_scientific(value, precision=7, trim="-", exp_digits=1)
-    return short.replace("+", "")  # 2.5e6 instead of 2.5e+6
+    return short.replace("+", "")  # writes 2.5e6, not 2.5e+6
 
 
 def _power(value: float, _: object = None) -> str:
@@ -399,7 +399,7 @@ class PlanePicture(Picture):
             arrow.set_visible(shows)
 
     def _rows(self, ids: np.ndarray, x: np.ndarray, values: np.ndarray, side: float) -> np.ndarray:
-        # Use a minimum size, which is larger if there are few points.
+        # Points have a minimum size, larger for few points.
         least = 0.8 + 4 / np.sqrt(max(len(x), 1))
         size = max(ROUND * side * self._points_per_unit(), least) * self.options.pointsize
         self.artist.set_sizes([size**2])

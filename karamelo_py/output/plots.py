@@ -95,7 +95,7 @@ def _over_one_axis(
 
 
 def blank_figure(width: float, height: float) -> Any:
-    # the import takes 0.3 s
+    # Importing Matplotlib takes 0.3 s.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -39,7 +39,7 @@ VECTORS = {
 
 class Part(NamedTuple):
     block: Block
-    rows: np.ndarray | None  # ascending; None: all points of the block
+    rows: np.ndarray | None  # ascending rows of the points; None: all points of the block
     places: np.ndarray | slice
 
     def taken(self, array: np.ndarray) -> np.ndarray:
@@ -82,7 +82,7 @@ class Rows(NamedTuple):
     def declared(self, kind: type) -> np.ndarray | None:
         """Return a declared field (n, components), or None if no block stores it.
 
-        Points whose law lacks the field get its initial values.
+        Where a law lacks the field, points get its initial values.
         """
         arrays = [(piece, fields.field(piece.block.points.fields, kind)) for piece in self.parts]
         if all(array is None for _, array in arrays):
@@ -113,19 +113,19 @@ class PointTable:
         self._cache: dict[str, np.ndarray] = {}
 
     def _cached(self, name: str, make: Callable[[Rows], np.ndarray]) -> np.ndarray:
-        rows = self._rows  # clears the cache if a step has been taken
+        rows = self._rows  # clears the cache after a step
         if name not in self._cache:
             self._cache[name] = make(rows)
         return self._cache[name]
 
     @property
     def numbers(self) -> np.ndarray:
-        """Numbers (n,) of points, from 0."""
+        """Numbers (n,) of the points, from 0."""
         return self._rows.ids
 
     @property
     def ids(self) -> np.ndarray:
-        """Ids (n,) of points, from 1, as in dumps."""
+        """Ids (n,) of the points, from 1, as in dumps."""
         return self.numbers + 1
 
     @property
@@ -139,12 +139,12 @@ class PointTable:
 
     @property
     def position(self) -> np.ndarray:
-        """Positions (n, d)."""
+        """Positions (n, d) of the points."""
         return self._cached("x", lambda rows: rows.take(partial(_place, rows.s)))
 
     @property
     def velocity(self) -> np.ndarray:
-        """Velocities (n, d)."""
+        """Velocities (n, d) of the points."""
         return self._cached("v", lambda rows: rows.take(partial(shown_velocity, rows.s)))
 
     @property
@@ -153,17 +153,17 @@ class PointTable:
 
     @property
     def reference_position(self) -> np.ndarray:
-        """Positions (n, d) before the first step."""
+        """Positions (n, d) of the points before the first step."""
         return self._cached("x0", lambda rows: places_before(self.hub, rows.ids))
 
     @property
     def reference_volume(self) -> np.ndarray:
-        """Volumes (n,) before the first step."""
+        """Volumes (n,) of the points before the first step."""
         return self._cached("V0", lambda rows: volumes_before(self.hub, rows.ids))
 
     @property
     def solid(self) -> np.ndarray:
-        """Numbers (n,) of solids, from 0."""
+        """Numbers (n,) of the points' solids, from 0."""
         firsts = [solid.first_id for solid in self.hub.solids.values()]
         return (np.searchsorted(firsts, self.numbers, side="right") - 1).astype(np.int32)
 
@@ -212,7 +212,7 @@ class PointTable:
 
     @property
     def _exported(self) -> np.ndarray:
-        # In 2D, component 12 is also the fourth.
+        # Component 12 of 2D is also the fourth component.
         return self._cached(
             "exported",
             lambda rows: rows.computed(lambda laws: export.export_state, export.EXPORTED),
@@ -267,11 +267,11 @@ def _place(s: Setup, points: Points) -> np.ndarray:
 
 
 def shown_velocity(s: Setup, points: Points) -> np.ndarray:
-    """Return velocities (d, n).
+    """Return the velocities (d, n) of points for output.
 
-    If points store accelerations, the velocities are at the time of the positions.
+    If points store accelerations, velocities and positions have the same time.
 
-    Otherwise they are half a step earlier.
+    Otherwise velocities are half a step earlier than positions.
     """
     before = fields.field(points.fields, VelocityBefore)
     if before is None:

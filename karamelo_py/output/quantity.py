@@ -19,7 +19,7 @@ class Quantity:
 
     script_kind = "a quantity"
 
-    words = False  # True if ``limit``, which is text, is allowed
+    words = False  # True if the text ``limit`` is allowed
 
     def __init__(self, hub: Scene, name: str, formula: Value | None = None):
         self.hub = hub
@@ -89,7 +89,7 @@ class Quantity:
         return number
 
     def _source(self) -> float | Expression:
-        """Look up the name again, since a script can redefine a variable between runs."""
+        """Look up the name again, as a script may redefine a variable between runs."""
         variables = _variables(self.hub)
         if self.formula is not None:
             source = self.formula
@@ -107,7 +107,7 @@ class Quantity:
 class Caption:
     """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
-    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathematics is between dollar signs
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathematics stands between dollar signs
 
     def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}

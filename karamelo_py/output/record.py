@@ -64,7 +64,7 @@ class RunRecord:
     def of_script(self, file: str | Path, variables: Mapping[str, str]) -> None:
         of_content = None
         with suppress(OSError):
-            if Path(file).is_file():  # except a pipe, which can be read only once
+            if Path(file).is_file():  # a pipe could be read only once
                 of_content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         self.content["script"] = {
             "file": str(file),
@@ -98,7 +98,7 @@ class RunRecord:
             self._note("error", error.sentence, error.mark, hint=error.hint, **fields)
         elif error is not None:
             self._note("error", f"{type(error).__name__}: {error}", None, code="internal")
-        # A Python program calls this after every command; few commands change the record.
+        # Python programs call this method after every command; few commands change the record.
         if (self.runs or self.is_asked_for) and self._written != (status, len(self.messages)):
             self._write()
 
@@ -119,7 +119,7 @@ class RunRecord:
             "messages": self.messages,
             **surroundings(),
         }
-        with suppress(ScriptError):  # other output reports errors such as a full disk
+        with suppress(ScriptError):  # other output reports such errors, e.g. a full disk
             write_whole(self.path, json.dumps(_finite(whole), indent=1, ensure_ascii=False) + "\n")
 
 

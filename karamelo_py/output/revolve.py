@@ -17,7 +17,7 @@ VECTORS = {
 def revolved(
     names: tuple[str, ...], column: Callable[[str], np.ndarray], angle: float
 ) -> list[np.ndarray]:
-    """Return columns (n,) of a copy at an angle from x to z, in 3D.
+    """Return columns (n,) in 3D of a copy at an angle from x to z.
 
     `column` returns a column of the half plane. Positions and tensors, but not reference positions,
     are also rotated by the angle of twist.

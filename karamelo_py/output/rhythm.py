@@ -15,7 +15,7 @@ _SPAN = kind_of(Annotated[float, Positive])
 
 
 class ByTime:
-    """Output at the first step at or after each multiple of `span`; `passed` multiples are done."""
+    """Output at the first step at or after each multiple of `span`, of which `passed` are done."""
 
     def __init__(self, span: float):
         self.span = span
@@ -37,7 +37,7 @@ class Rhythmic:
         raise NotImplementedError
 
     def take_part(self) -> None:
-        """Called instead of `write` on ranks other than 0."""
+        """Take part in the output, instead of `write`, on ranks other than 0."""
         self.write()
 
     def finish(self) -> None:
@@ -80,8 +80,8 @@ def is_due(every: int | ByTime, step: int, time: float) -> bool:
 def next_step(every: int | ByTime, step: int, time: float, dt: float, fixed: bool) -> int:
     """Return the first step at which output may be due.
 
-    For an interval in time and a variable dt, this is only half as far as dt predicts, since steps
-    may become longer.
+    If output is due by time and dt varies, this step is only half as far as dt predicts, since
+    steps may become longer.
     """
     if not isinstance(every, ByTime):
         return (step // every + 1) * every

@@ -85,7 +85,7 @@ class Output:
         )
 
     def write(self, last: bool = False) -> None:
-        """Write what is due; at the `last` state of a run, everything not written yet."""
+        """Write what is due; at the `last` state of a run, write what has not been written yet."""
         if self.hub.rehearsing:
             return
         step, time = self.hub.update.step, self.hub.update.time

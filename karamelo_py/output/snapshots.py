@@ -19,9 +19,9 @@ TEXTS = ("element", "typelabel")  # columns of LAMMPS that are texts
 
 class Snapshot(NamedTuple):
     step: int
-    time: float  # NaN if unknown
-    columns: dict[str, np.ndarray]  # (n,) by name, with x, y, z
-    lo: np.ndarray  # (3,) corners of the domain, or bounds of the points
+    time: float  # time of the state, NaN if unknown
+    columns: dict[str, np.ndarray]  # columns (n,) by name, with x, y, z
+    lo: np.ndarray  # (3,) lower corner of the domain, or of the points
     hi: np.ndarray
     units: Mapping[str, str] = {}
 
@@ -81,13 +81,13 @@ def _lammps(path: Path, first: int) -> Iterator[Snapshot]:
                 yield Snapshot(step, time, columns, *box.T, named)
             elif item[0] == "UNITS":
                 words = file.readline().split()
-                units = Units(*words) if words[0] in LENGTHS else None  # other units are LAMMPS's
+                units = Units(*words) if words[0] in LENGTHS else None  # others are LAMMPS's
             else:
                 file.readline()
 
 
 def _place(path: Path, columns: dict[str, np.ndarray], box: np.ndarray, tilted: bool) -> None:
-    """Add id, type, and x, y, z; these may follow from unwrapped (xu) or scaled (xs) positions."""
+    """Add id, type, x, y, z to the columns; positions may be unwrapped (xu) or scaled (xs)."""
     count = len(next(iter(columns.values()), ()))
     columns.setdefault("id", np.arange(1.0, count + 1))
     columns.setdefault("type", np.ones(count))
@@ -127,7 +127,7 @@ def _pvd(path: Path, first: int) -> Iterator[Snapshot]:
 def _vtu(path: Path, _: int, time: float = np.nan) -> Iterator[Snapshot]:
     import meshio
 
-    mesh = meshio.vtu.read(path)  # meshio.read would end the program
+    mesh = meshio.vtu.read(path)  # meshio.read would end the program after an error
     number = re.search(r"(\d+)\D*$", path.stem)
     columns = dict(zip("xyz", mesh.points.T, strict=True)) | mesh.point_data
     lo, hi = mesh.points.min(axis=0), mesh.points.max(axis=0)

@@ -18,7 +18,7 @@ from numba import config, types
 from karamelo_py.compiler import fma, index, intrinsic, kernel, llvm
 
 ROWS = 1024
-# Enough for -1.23456789e-308 or -4611686018427387903, a blank, and the surplus digits.
+# Enough for -1.23456789e-308 or -4611686018427387903, a blank, and surplus digits.
 NUMBER_BYTES = 32
 
 DIGITS = 9
@@ -43,7 +43,7 @@ BYTEWISE = config.DISABLE_JIT or sys.byteorder != "little"  # type: ignore[attr-
 
 
 def rows(columns: Sequence[np.ndarray]) -> Iterator[bytes]:
-    """Yield rows as text in blocks: integers, and other numbers with nine significant digits."""
+    """Yield rows as text, block by block: integers, and numbers with nine significant digits."""
     is_integer = np.array([np.issubdtype(column.dtype, np.integer) for column in columns])
     width = len(columns)
     numbers = np.empty((ROWS, width))

@@ -15,7 +15,7 @@ CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
 def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
-    """Write a .vtkhdf file next to the dump `path`, for its points.
+    """Write a .vtkhdf file next to the dump at `path`, for the points in the dump.
 
     The file has no data, only views of positions, columns and vectors in the dump. VTK does not
     draw deleted points, as their positions are NaN.
@@ -32,7 +32,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
 
         def virtual(group: h5py.Group, name: str, parts: Sequence[str]) -> None:
             layout = h5py.VirtualLayout((steps * count, *[len(parts)] * (len(parts) > 1)), float)
-            layout.dcpl.set_obj_track_times(False)  # so that equal runs write equal files
+            layout.dcpl.set_obj_track_times(False)  # makes files of equal runs equal
             for k, component in enumerate(parts):
                 if component in columns:
                     source = h5py.VirtualSource(path.name, component, (steps, count), float)
@@ -59,7 +59,7 @@ def describe(path: Path, columns: Sequence[str], dimension: int) -> None:
             cells = top.create_group(kind)
             n = count if kind == CELLS[0] else 0
             cells["NumberOfCells"] = cells["NumberOfConnectivityIds"] = [n]
-            if n:  # 0, 1, ... n, since ids of points begin with 1
+            if n:  # 0, 1, ... n; ids of points begin with 1
                 numbers(cells, "Offsets", "id", 1)
                 numbers(cells, "Connectivity", "id", 1)
             else:

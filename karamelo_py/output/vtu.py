@@ -17,7 +17,7 @@ import numpy as np
 KINDS = {"vertex": 1, "line": 3, "triangle": 5, "quad": 9, "hexahedron": 12}
 TYPES = {np.dtype(np.float64): "Float64", np.dtype(np.int64): "Int64"}
 BLOCK = 1 << 15  # bytes that are compressed together
-COMPRESSION = 4  # takes 33 % of the time of level 6, for slightly larger files
+COMPRESSION = 4  # 33 % of the time of level 6, for slightly larger files
 IN_MEMORY = 1 << 16  # bytes of an array that stay in memory
 PIECE = 3 << 16  # bytes that are encoded together, a multiple of 3, so that padding is not needed
 
@@ -84,7 +84,7 @@ class Column:
 class Vtu:
     """Points with columns `names`, and cells.
 
-    Temporary files in `folder` take as much space as the file.
+    The temporary files in `folder` are as large as the file together.
     """
 
     def __init__(self, names: Iterable[str], folder: Path):

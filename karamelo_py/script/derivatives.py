@@ -28,7 +28,7 @@ def to_power(base: Expression, exponent: float) -> Expression:
     return applied("^", base, Expression(exponent))
 
 
-# Derivatives of functions of one number, from x and the value f.
+# Derivatives of functions of one number x, from x and the value f.
 OF_ONE = {
     "neg": lambda x, f: Expression(-1),
     "sqrt": lambda x, f: applied("/", Expression(0.5), f),

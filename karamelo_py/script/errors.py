@@ -77,11 +77,11 @@ class ScriptError(Exception):
     name: str | None = None
     kind: str = ""
     alike: str | None = None
-    surplus: int = 0  # number of surplus arguments
-    # Likely cause and the command that resumes, for failed runs.
+    surplus: int = 0  # number of surplus arguments of a call
+    # Likely cause of a failed run, and the command that resumes it.
     cause: str = ""
     resume: str = ""
-    # callers do not add to the message
+    # callers of a failing function must not add to the message
     complete: bool = False
 
     def __str__(self) -> str:
@@ -103,7 +103,7 @@ class ScriptError(Exception):
 
 @contextmanager
 def blaming(mark: Mark | None = None, argument: str | None = None) -> Iterator[None]:
-    """Add a mark and an argument to errors that have none."""
+    """Add a mark and an argument to script errors that have none."""
     try:
         yield
     except ScriptError as error:
@@ -152,7 +152,7 @@ def _marked(mark: Mark) -> list[str]:
     carets = "^" * max(sum(_width(c) for c in text[start : start + length]), 1)
     number = str(mark.line)
     margin = " " * max(len(number), 5)
-    # Control characters could garble the terminal.
+    # Control characters in a line could garble the terminal.
     shown = re.sub(r"[^\t]", lambda c: c[0] if c[0].isprintable() else "\ufffd", text)
     return [f"{number:>5} | {shown}", f"{margin} | {before}{carets}"]
 

@@ -107,7 +107,7 @@ def _binary(node: syntax.BinaryOperation, raw: syntax.Raw, scope: NameScope) -> 
     left = evaluate(node.left, raw, scope)
     logical = node.operator in ("&&", "||") and isinstance(left, float) and not math.isnan(left)
     if logical and (left != 0) == (node.operator == "||"):
-        # Use short-circuit evaluation, so that a != 0 && 1/a > 2 is not an error.
+        # Logical operators are evaluated lazily, so that a != 0 && 1/a > 2 is not an error.
         return 1.0 if left != 0 else 0.0
     right = evaluate(node.right, raw, scope)
     if isinstance(left, str) or isinstance(right, str):

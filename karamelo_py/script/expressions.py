@@ -22,7 +22,7 @@ GLOBAL_SEEDS = ("time", "timestep", "dt")
 SEEDS = frozenset({*POINT_SEEDS, *GLOBAL_SEEDS})
 
 _MAX_SIZE = 20000
-CHUNK = 1 << 18  # points that are evaluated at a time
+CHUNK = 1 << 18  # points evaluated at a time
 
 
 class Expression:
@@ -43,7 +43,7 @@ class Expression:
         self.value: Any = float(value) if operation == "number" else value
         seeds = {value} if operation == "name" else ()
         self.names: frozenset[str] = frozenset(seeds).union(*(one.names for one in operands))
-        # Operands that occur several times are counted each time.
+        # An operand that occurs several times counts each time.
         self.size: int = 1 + sum(one.size for one in operands)
         if self.size > _MAX_SIZE:
             self.size = len(terms.in_order(self))
@@ -115,7 +115,7 @@ class Expression:
         out = np.empty(len(x))
         scratch = np.empty((6 + ROWS, BLOCK))
         program = self.program(values)
-        # Evaluate in chunks, since three-column copies of millions of points take much memory.
+        # Use chunks, since three-column copies of millions of points take much memory.
         for first in range(0, len(x), CHUNK):
             some = slice(first, first + CHUNK)
             here = _three_columns(x[some])

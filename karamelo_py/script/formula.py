@@ -1,7 +1,7 @@
 """Formulas as stack programs over blocks of points.
 
 The evaluator loops over a block of points for each operation. Instructions flagged `UNIFORM`
-compute one value for a block, and `SPREAD` expands it. Rows past the stack are common
+compute one value for a block, and `SPREAD` expands it. Rows after the stack store common
 subexpressions.
 """
 
@@ -16,11 +16,11 @@ from karamelo_py.script.operations import FIRST_BINARY, SELECT, numbered, of_one
 # Flag of an instruction that is carried out once for the whole block.
 UNIFORM = 1 << 16
 
-# Push a constant, a published value, or a row of `points` (x y z x0 y0 z0).
+# Instructions that push a constant, a published value, or a row of `points` (x y z x0 y0 z0).
 CONSTANT, GLOBAL, POINT = 0, 1, 2
-# Expand the number that lies `operand` places below the top of the stack to a row.
+# Instruction that expands the number `operand` places below the top of the stack to a row.
 SPREAD = 3
-# Pop the top of the stack into the stored row `operand`; push the stored row `operand`.
+# Instructions that pop the top of the stack into the stored row `operand`, and push this row.
 KEEP, KEPT = 150, 151
 
 
@@ -44,7 +44,7 @@ def _select(n, a, b, c):
         a[i] = b[i] if a[i] != 0.0 else c[i]
 
 
-# Functions with a separate loop; one loop for all others selects the function per number.
+# Functions with a loop each; for all others, one loop selects the function per number.
 _UNARY_LOOPS = numbered("neg", "sqrt", "sin", "cos", "exp", "log", "abs")
 _BINARY_LOOPS = numbered("+", "-", "*", "/", "min", "max")
 ((_POWER, _power),) = numbered("^")
@@ -76,7 +76,7 @@ def _binary(op, n, a, b):
 
 
 def _powers(n, a, b):
-    """Raise `n` numbers of `a` as `_power` does, without branches if exponents are equal."""
+    """Raise `n` numbers of `a` to `b` as `_power` does, without branches if exponents are equal."""
     power = b[0]
     same = True
     for i in range(n):
@@ -94,7 +94,7 @@ def _powers(n, a, b):
 
 @kernel
 def evaluate(program, globals_, points, count, out, stack):
-    """Evaluate at `count` points: rows x, y, z, x0, y0, z0 of `points` (6, BLOCK).
+    """Evaluate a program at `count` points; rows of `points` (6, BLOCK) are x, y, z, x0, y0, z0.
 
     `out` (BLOCK,) gets the results; `stack` (ROWS, BLOCK) is scratch.
     """
@@ -141,7 +141,7 @@ def evaluate(program, globals_, points, count, out, stack):
 
 
 def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, last, count, result):
-    """Evaluate code[begin:end] with constants[first:last].
+    """Evaluate the instructions code[begin:end] with constants[first:last].
 
     The first rows of `scratch` are points, the last rows the stack; row `result` gets results.
     """
@@ -151,7 +151,7 @@ def evaluate_in_table(code, constants, globals_, scratch, begin, end, first, las
 
 @kernel
 def evaluate_all(program, globals_, x, x0, out, scratch):
-    """Evaluate at present and initial positions (n, 3).
+    """Evaluate a program at present and initial positions (n, 3).
 
     `out` (n,) gets the results; `scratch` is (6 + ROWS, BLOCK).
     """

@@ -15,9 +15,9 @@ CLOSES_NOTHING = (
 _PUNCTUATION = re.compile(
     r'"[^"\n]*"|#[^\n]*|(?<!&)&(?=[ \t]*(?:#.*)?(?:\n|\Z))|["()“”„‟«»‘’`\x00-\x08\x0e-\x1f\x7f]'
 )
-# A C++ comment at the end of the text.
+# Finds a C++ comment at the end of the text.
 _SLASHES = re.compile(r"(?:^|[ \t)])//[^\n]*\Z", re.MULTILINE)
-# Beginning of an Abaqus file: empty lines, comments, a keyword.
+# Matches the beginning of an Abaqus file: empty lines, comments, a keyword.
 _KEYWORD = re.compile(r"(?:\s|\*\*.*\n)*(\*[A-Za-z]+)")
 _DYNA = re.compile(r"(?:\s|\$.*\n)*(\*KEYWORD)", re.IGNORECASE)
 
@@ -302,7 +302,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
     if name in table()["blocks"]:
         return NO_BLOCKS
     if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):
-        words[0] = f"n{words[0]}"  # the ID is missing
+        words[0] = f"n{words[0]}"  # a name in place of the missing ID
     if other := table()["otherwise"].get(name) or instead("command", name):
         form = re.match(r"(\w+)\(\w+\)", other)
         return f"{form[1]}({words[0]})" if form and len(words) == 1 else other
@@ -311,7 +311,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
         style = other.removeprefix("the style ")
         if other and (style == other or " " in style):
             return other
-        if words[1] == "all" or other:  # LAMMPS writes the group before the style
+        if words[1] == "all" or other:  # as LAMMPS writes the group before the style
             words[1:3] = style or words[2], words[1]
     if name == "dump" and len(words) > 2:
         words[2] = (instead(name, words[2]) or words[2]).removeprefix("the style ")

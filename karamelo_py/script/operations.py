@@ -10,9 +10,9 @@ from karamelo_py.compiler import INTERPRETED, implements, noinline
 
 @noinline
 def _whole(a, down, up):
-    """Round by additions, as not every processor has an instruction for it."""
+    """Round by additions: not every processor has an instruction that rounds."""
     if not abs(a) < 2.0**52:
-        return a  # already an integer, or NaN
+        return a  # NaN, or an integer already
     far = math.copysign(2.0**52, a)
     near = (a + far) - far
     if near > a and down:
@@ -88,7 +88,7 @@ BINARY = {
     "*": operator.mul,
     "/": operator.truediv,
     "^": _power,
-    "%": operator.mod,  # has the sign of the divisor, as in Python
+    "%": operator.mod,  # the remainder has the sign of the divisor, as in Python
     **{sign: _truth(compare) for sign, compare in {
         "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge,
         "==": operator.eq, "!=": operator.ne,
@@ -108,7 +108,7 @@ OPERATIONS = (
     | {"if": SELECT}
 )
 
-# Poles of functions, where Python raises an exception.
+# Arguments of functions at poles, where Python raises an exception.
 _POLES = {
     "log": (0, -math.inf), "log2": (0, -math.inf), "log10": (0, -math.inf),
     "log1p": (-1, -math.inf), "^": (0, math.inf), "gamma": (0, math.inf),

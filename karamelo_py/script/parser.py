@@ -69,7 +69,7 @@ def parse_text(text: str, file: str = "<text>") -> tuple[syntax.Raw, syntax.Node
 @lru_cache(maxsize=4096)
 def _tree(code: str) -> syntax.Node:
     word = code.strip()
-    # Fast path, as most arguments are a single name or number.
+    # A shortcut, as most arguments are a single name or number.
     start = code.index(word)
     if word.isascii() and word.isidentifier() and word not in SPELLINGS:
         return syntax.Name(start, start + len(word), 1, word)

@@ -13,9 +13,9 @@ _CODES = (
     (b"\xff\xfe\0\0", "utf-32"), (b"\0\0\xfe\xff", "utf-32"), (b"\xff\xfe", "utf-16"),
     (b"\xfe\xff", "utf-16"),
 )  # fmt: skip
-# Paths of pipes, and of substitutions <(command) in a shell.
+# Paths of pipes, and of process substitutions <(command) in a shell.
 _PIPED = re.compile(r"/dev/(?:stdin|fd/\d+)|/proc/self/fd/\d+")
-# Endings of files that runs write next to scripts.
+# Endings of files that runs write next to their scripts.
 _WRITTEN = (
     *(".png", ".pdf", ".svg", ".gif", ".mp4", ".gz", ".bin", ".h5", ".vtu", ".pvd", ".csv", ".txt"),
     *(".LAMMPS", ".log", ".part"),

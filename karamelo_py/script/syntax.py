@@ -8,7 +8,7 @@ from functools import cached_property
 
 from karamelo_py.script.errors import Mark, ScriptError
 
-# Quoted text comes first, as a # in it does not begin a comment.
+# Quoted text is matched first, as a # in quotes does not begin a comment.
 _BLANKS = re.compile(r'"[^"\n]*"|\s+')
 _COMMENT_OR_BREAK = re.compile(r'"[^"\n]*"|#[^\n]*|\n')
 

@@ -183,7 +183,7 @@ class _Writer:
         rows, levels = [1] * len(self.terms), [1] * len(self.terms)
         for k, (_, operands, _) in enumerate(self.terms):
             while True:
-                # Operands remain on the stack while the next one is computed.
+                # An operand remains on the stack while the next one is computed.
                 asked = [i + (1 if o in kept else rows[o]) for i, o in enumerate(operands)]
                 deep = [0 if o in kept else levels[o] for o in operands]
                 rows[k], levels[k] = max(asked, default=1), 1 + max(deep, default=0)

@@ -27,7 +27,7 @@ class Values:
         self.array = np.zeros(CAPACITY)
         self._slots: dict[str, int] = {}
         self._of: dict[str, dict[str, int]] = {}  # slots by name, for each ID
-        self._first: dict[str, int] = {}  # slot of ID_x, also if this name is not published
+        self._first: dict[str, int] = {}  # slot of ID_x, even if this name is not published
         self._used = 0
         # Slot of the torque that belongs to a force, by the force's slot x; 0 if there is none.
         self.torques = np.zeros(CAPACITY, np.int64)
