@@ -173,8 +173,7 @@ class Scouted(SceneFacts):
     def blocks(self) -> bool:
         """Return True if points fill the bounding boxes of all bodies.
 
-        At curved or inclined faces, held nodes act up to a cell inside the body, with splines
-        further.
+        At curved or inclined faces, held nodes act up to a cell inside, with splines further.
         """
         pairs = ((solid.x0, 2 * solid.half_size) for solid in self.soft)
         boxes = ((size, np.ptp(x, axis=0) + size.max(axis=0)) for x, size in pairs)

@@ -107,7 +107,7 @@ class Quantity:
 class Caption:
     """Text in which ``{name}`` or ``{formula}`` becomes a number, and ``{{`` a brace."""
 
-    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathematics stands between dollar signs
+    PIECE = re.compile(r"\$[^$]*\$|{{|}}|{([^{}]+)}")  # mathematics is between dollar signs
 
     def __init__(self, hub: Scene, text: str, option: str = "title"):
         self.text, self.quantities = text, {}

@@ -23,7 +23,7 @@ class MinimizePenetration(NamedTuple):
 
 
 def face(kin, volume, x):
-    """Return the face area of a cubic point, per unit thickness in 2D, per angle in axisymmetry."""
+    """Return the face area of a cubic point: per unit thickness in 2D, per angle in axisymmetry."""
     if kin.hoops and kin.dimension == 1:
         return product([x[0]] * kin.hoops)
     if kin.hoops:
@@ -45,7 +45,7 @@ def radius(kin, volume, x):
 
 class TouchingPair(NamedTuple):
     dx: Any
-    r: Any  # |dx|, below the sum of the radii
+    r: Any  # |dx|, which is below the sum of the radii
     radii: tuple
     masses: tuple
     dt: Any
@@ -76,8 +76,8 @@ def _force_between_minimize_penetration(law, kin, pair):
 
 class FrictionMemory(NamedTuple):
     hold: Any  # force of the friction spring along the surface
-    mean: Any  # mean load
-    unused: Any  # friction left from earlier steps
+    mean: Any  # mean load of the steps
+    unused: Any  # friction that earlier steps did not use
 
 
 def rub(mu, load, memory, stop):

@@ -41,7 +41,7 @@ def spatial_increment(frame, kin, dl, f):
 
 def of_places_before(frame, kin, dl):
     """Convert `dl`, computed with the gradient after a move, to positions before the move."""
-    # The gradient at old positions is dl (I - dl)^-1, so F is multiplied by (I - dl)^-1.
+    # The gradient at old positions is dl (I - dl)^-1; F is then multiplied by (I - dl)^-1.
     return dl @ inv(I - dl) if frame.moves else dl
 
 
@@ -59,11 +59,11 @@ def pulled_back(frame, kin, g, f):
 
 
 def scaled_increment(frame, kin, dl, f, ratio):
-    # updated: (I + dl) s - I; total: (F + dl) s - F
+    # updated frame: (I + dl) s - I; total frame: (F + dl) s - F
     s = power(ratio, 1 / len(dl.axes))
     return s * dl + (s - 1) * (I if frame.moves else f)
 
 
 def inverse_stretch_squared(frame, kin, f, template):
-    """Return an upper bound of (h / size of the deformed cell)^2."""
+    """Return an upper bound of (h / size of a deformed cell)^2."""
     return 1 if frame.moves else inv(f).left_cauchy_green().largest_row_sum()

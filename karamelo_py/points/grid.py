@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 from karamelo_py.compiler import point_function, real, where
 from karamelo_py.compiler.fields import Field, vector
 
-Length = Any  # a number for one grid, or an array over all grids
+Length = Any  # a number for one grid, an array over all grids
 Count = Any
 
 
 class Grid(NamedTuple):
-    """One grid of a scene, lengths in scene units."""
+    """One grid of a scene; lengths are in scene units."""
 
     x0: Length  # lower corner
     y0: Length
@@ -18,16 +18,16 @@ class Grid(NamedTuple):
     h: Length
     inv_h: Length
     spacing: Length
-    nx: Count  # cells
+    nx: Count  # number of cells along x
     ny: Count
     nz: Count
     lx: Length  # length in cells, may be fractional
     ly: Length
     lz: Length
-    slack: Length  # distance in cells up to which points outside count as inside
+    slack: Length  # tolerance in cells within which points outside count as inside
     step_x: Count  # stride of node numbers
     step_y: Count
-    first: Count  # node number
+    first: Count  # number of the first node
     first_cell: Count
 
 
@@ -52,7 +52,7 @@ def inside(grid, kin, x):
     for k in range(kin.dimension):
         a = in_cells(grid, k, x[k])
         end = pick(k, grid.lx, grid.ly, grid.lz)
-        # False for NaN
+        # The result is False for NaN.
         within = (a >= -grid.slack) & (a <= end + grid.slack) & within
     return within
 

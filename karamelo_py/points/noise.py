@@ -1,7 +1,7 @@
 """Limits of drift and rotation through the grid, which amplify null-space noise.
 
-They were measured with disks of rubber and metal, with 4 to 16 cells in the radius, that vibrate
-with strains of 0.01 to 2 % (docs/energy-measurements.md).
+The limits were measured with disks of rubber and metal, with 4 to 16 cells in the radius, that
+vibrate with strains of 0.01 to 2 % (docs/energy-measurements.md).
 """
 
 from math import inf
@@ -13,13 +13,13 @@ from karamelo_py.language.rules import known_failure
 class DriftLimits(NamedTuple):
     """Largest (cells crossed) x c dt/h that conserves energy, for 2 and 1 points per cell."""
 
-    drift: tuple[float, float]  # centre of mass, 2D and 3D, musl and usf
-    line: float  # 1D
-    averaged: tuple[float, float]  # `drift` with usavg
-    rim: tuple[float, float]  # rotating body, musl and usf
-    rim_averaged: tuple[float, float]  # usavg
+    drift: tuple[float, float]  # limits of the centre of mass in 2D and 3D, musl and usf
+    line: float  # limit in 1D
+    averaged: tuple[float, float]  # `drift` of usavg
+    rim: tuple[float, float]  # limits of the rim of a rotating body, musl and usf
+    rim_averaged: tuple[float, float]  # `rim` of usavg
     fastest: float = inf  # drift / wave speed above which no noise is added
-    damps: bool = False  # in 3D, a faster drift damps vibrations
+    damps: bool = False  # True if, in 3D, a faster drift damps vibrations
 
 
 JUMPS = DriftLimits((4, 2), 3, (35, 35), (15, 1.5), (inf, 7))  # for bases with gradient jumps

@@ -302,7 +302,7 @@ def _block_or_call(name: str, words: list[str]) -> str:
     if name in table()["blocks"]:
         return NO_BLOCKS
     if name in _NAMED and words and re.fullmatch(r"\d\w*", words[0]):
-        words[0] = f"n{words[0]}"  # a name in place of the missing ID
+        words[0] = f"n{words[0]}"  # the ID is missing
     if other := table()["otherwise"].get(name) or instead("command", name):
         form = re.match(r"(\w+)\(\w+\)", other)
         return f"{form[1]}({words[0]})" if form and len(words) == 1 else other

@@ -16,11 +16,11 @@ from karamelo_py.points.noise import DriftLimits
 
 class BasisTraits(NamedTuple):
     cells: int  # number of cells between the outermost nodes of points in one cell
-    least_nodes: int  # per direction
+    least_nodes: int  # least number of nodes per direction of a grid
     steady_moment: bool  # D of affine transfers never vanishes
     # |grad N|^2 / N exceeds 2 / h^2 as the weight vanishes: usl limits the strain of light nodes.
     steep_edge: bool
-    nodes_per_cell: int = 1  # 2 with mid-nodes
+    nodes_per_cell: int = 1  # 2 for a basis with mid-nodes
     # gradients jump at cell faces; points that cross add energy, less with smaller steps
     gradient_jumps: bool = False
     # Stable c dt / h at low speed: updated frame, updated frame with usf, total frame.
@@ -32,10 +32,10 @@ class BasisTraits(NamedTuple):
     lone: tuple[float, float, float] | None = None
     # D / h^2, or None if it varies. Mapping to the nodes and back damps waves in proportion to it.
     spread: float | None = None
-    # Fraction of the stable step with corrected accelerations (updated frame)
+    # Fraction of the stable step with corrected accelerations (updated frame).
     corrected_share: float = 0.8
     allows_drift: bool = False  # drifting bodies conserve energy at the full stable step
-    drift_limits: DriftLimits | None = None  # None: as for similar bases
+    drift_limits: DriftLimits | None = None  # None: the limits of similar bases
     # Stored domain data, in order: ``half_size`` (d numbers), ``half_edges`` (d vectors),
     # ``deformation`` (F in 2D or 3D), ``corners`` (of the `element`)
     shape: tuple[str, ...] = ()
@@ -83,9 +83,9 @@ def mapped_again(basis, grid, moment):
 
 
 def without_moment(basis, grid, moment):
-    """Return no moment for MUSL's second mapping, as B D^-1 is unbounded where D vanishes.
+    """For MUSL's second mapping, return no moment, as B D^-1 is unbounded where D vanishes.
 
-    Points retain B, but their deformation does not include it.
+    Points retain B, but their deformation does not include B.
     """
     return (grid.h - grid.h) * moment
 
@@ -115,7 +115,7 @@ def deformed(basis, kin, location, dl):
 
 @point_function(otherwise=True)
 def extent(basis, kin, grid, location):
-    """Return how many cells away the domain's corners, or their nodes, may be."""
+    """Return the distance in cells from a point to its domain's corners, or to their nodes."""
     return grid.h - grid.h
 
 

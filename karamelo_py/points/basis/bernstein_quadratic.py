@@ -11,8 +11,8 @@ from karamelo_py.points.grid import cells_along, in_cells
 class BernsteinQuadratic(NamedTuple):
     """Quadratic Bernstein polynomials (de Vaucorbeil, Nguyen & Hutchinson 2020).
 
-    There are nodes every h/2, four times as many in 2D. Weights are not negative, but gradients
-    jump at cell faces, as in a linear basis: use it with tlmpm, where no point crosses a face.
+    Nodes are h/2 apart, four times as many in 2D. Weights are not negative, but gradients jump at
+    cell faces, as in a linear basis: use it with tlmpm, where no point crosses a face.
 
     Example
     -------

@@ -112,7 +112,7 @@ class CPGIMPCorners(_Following):
 
 
 class CPGIMP(_Box):
-    """Contiguous-particle GIMP: ugimp boxes that deform (Bardenhagen & Kober 2004).
+    """Contiguous-particle GIMP: ugimp with boxes that deform (Bardenhagen & Kober 2004).
 
     The size of the box follows ``det`` (the volume), ``diagonal`` (F_ii, which vanishes after a
     rotation by 90 degrees), ``stretch`` (U_ii of the right stretch, the default) or ``corners``
@@ -144,7 +144,7 @@ class CPGIMP(_Box):
 
 
 def box(grid, kin, location, direction, halves):
-    """Return centre and ends in cells of an uncut box along one direction, limited by `halves`."""
+    """Return centre and ends of an uncut box along one direction, in cells, limited by `halves`."""
     a = in_cells(grid, direction, location[direction])
     half = location[kin.dimension + direction] * grid.inv_h
     half = min(max(half, halves[0]), halves[1])
@@ -211,7 +211,7 @@ def _end(at, first, top):
 bases.mapped_again.on(CPGIMPDiagonal)(bases.without_moment)
 
 
-# For axisymmetric points, F in 2D is enough.
+# Axisymmetric points need only the F of 2D.
 
 
 @bases.deformed.on(CPGIMPDet)
@@ -231,7 +231,7 @@ def _deformed_cpgimp_stretch(basis, kin, location, dl):
     return (*location[:d], *half, *start, *F)
 
 
-# Bit k of a corner's number is its side along axis k; of a node's number, its side of the cell.
+# Bit k of a corner's number is its side of the box along axis k; of a node's, its side of the cell.
 
 
 @bases.carried.on(CPGIMPCorners)

@@ -11,8 +11,8 @@ from karamelo_py.points.kinematics import gradient, product, vector
 
 
 class Along(NamedTuple):
-    first: int  # node number
-    r: float  # distance from that node, in cells
+    first: int  # number of the first node
+    r: float  # distance from the first node, in cells
     weights: tuple[float, ...]
     gradients: tuple[float, ...]
     affine: tuple[float, ...]  # N D^-1 (X_I - x), D = sum N (X_I - x)^2
@@ -43,7 +43,7 @@ def along(basis, kin, grid, location, direction):
 
 @point_function(otherwise=True)
 def affine_along(basis, grid, line, direction):
-    """Return N D^-1 (X_I - x) of the nodes of a line, for bases whose `along` does not."""
+    """Return N D^-1 (X_I - x) of the nodes of a line, if `along` of the basis does not give it."""
     return line.affine
 
 
@@ -82,7 +82,7 @@ def inverse_radius(r):
 
 
 def radius(basis, grid, line):
-    """Return sum N r: the radius of the point, unless a wall cuts its domain."""
+    """Return sum N r, the radius of a point unless a wall cuts its domain."""
     r = line.r - line.r
     for k in range(len(line.weights)):
         node = real(line.first + k, r) * spacing(basis)

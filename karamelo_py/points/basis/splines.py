@@ -12,7 +12,7 @@ from karamelo_py.points.basis import BasisTraits, first_node, product, walled
 from karamelo_py.points.grid import cells_along, in_cells
 from karamelo_py.points.noise import CUBIC
 
-NARROW = 5 / 36  # D / h^2 of the first of three rows of points per cell at a wall
+NARROW = 5 / 36  # D / h^2 of the first of three rows of points per cell next to a wall
 BELOW, ABOVE, BETWEEN = 1, 2, 3  # walls at faces of a cell
 
 
@@ -53,8 +53,8 @@ class QuadraticSpline(NamedTuple):
     """
 
     in_lanes = True
-    # courant_still, from the highest frequency of a free block: 1.8 to 2.6 h/c in 1D, 1.58 to 2.5
-    # in 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
+    # courant_still, from the highest frequency of a free block: 1.8 to 2.6 in 1D, 1.58 to 2.5 in
+    # 2D, 1.4 to 2.4 in 3D, over positions, spacings, walls and Poisson's ratios up to 0.49.
     traits = BasisTraits(
         cells=3,
         least_nodes=3,
@@ -218,7 +218,7 @@ def _along_cubic_spline(basis, kin, grid, location, direction):
     )
     h, k, twice = 0.5 * grid.inv_h, 1.5 * grid.inv_h, grid.inv_h + grid.inv_h
     gradients = (-h * ss, t * (k * t - twice), -s * (k * s - twice), h * tt)
-    # D = h^2 / 3
+    # D = h^2 / 3 of cubic splines
     three = 3 * grid.inv_h
     r = 1 + t
     affine = (
@@ -245,7 +245,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     """Return the line of a cell at a wall; without walls `inside`, a single cell has two."""
     last, (below, above) = cells_along(grid, direction), walls
     first = max(min(cell - 1, last - 3), 0)
-    between = hats(grid, a, cell, first, 4)  # between two walls
+    between = hats(grid, a, cell, first, 4)  # line between two walls
     between = between._replace(affine=between.gradients)
     if last == 1:
         return between
@@ -254,7 +254,7 @@ def at_wall(grid, direction, a, cell, walls, *, inside):
     n = where(below, n, (n[2], n[1], n[0]))
     g = where(below, g, (-g[2], -g[1], -g[0]))
     c = where(below, c, (-c[2], -c[1], -c[0]))
-    behind = where(below, cell, cell - 1) > first  # the last three of the four nodes
+    behind = where(below, cell, cell - 1) > first  # where the last three of the four nodes are used
     n, g, c = [
         tuple([where(behind, *pair) for pair in zip((0, *of), (*of, 0), strict=True)])
         for of in (n, g, c)

@@ -14,7 +14,7 @@ ENTRIES = 256  # table entries per cell
 
 
 def profile(basis: NamedTuple, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions in cells from a node, and the weights there averaged over point domains."""
+    """Return positions in cells from a node, and weights at these, averaged over point domains."""
     x = np.arange(-3 * ENTRIES, 3 * ENTRIES + 1) / ENTRIES
     if basis.traits.shape:
         hats = np.maximum(1 - np.abs(x), 0)
@@ -42,7 +42,7 @@ def surface_table(basis: NamedTuple, half: float) -> np.ndarray:
     """
     means = np.arange(-3 * ENTRIES, ENTRIES + 1) / ENTRIES
     if basis.traits.nodes_per_cell > 1:
-        # Functions differ from node to node, so the gap is unknown: contact at a common node.
+        # Functions differ from node to node, so the gap is unknown: contact is at a common node.
         return np.full(len(means), 3.0)
     x, weights = profile(basis, half)
     surfaces = np.arange(-2.5, 2.5, 0.5 / ENTRIES)

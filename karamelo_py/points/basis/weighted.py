@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Weighted(NamedTuple):
-    """Rows of an array used as one: reads are weighted sums, writes distribute by weight."""
+    """Rows of an array used as one row: reads are weighted sums, writes distribute by weight."""
 
     rows: tuple[int, ...]
     weights: tuple[float, ...]

@@ -25,7 +25,7 @@ from numba import config
 
 from karamelo_py.compiler import algebra, fma, real
 
-COMPILED = not config.DISABLE_JIT  # interpreted code rounds `fma` twice
+COMPILED = not config.DISABLE_JIT  # interpreted code rounds a `fma` twice
 
 
 class Line(NamedTuple):
@@ -222,7 +222,7 @@ class Matrix(Elements):
     __slots__ = ()
 
     def dot(self, gradient):
-        """Return s_ij g_j, rounded once per term; hoop components act radially."""
+        """Return s_ij g_j, rounded once per term; hoop components act in the radial direction."""
         made = []
         for (k, j), *rest in self.rows:
             made.append(add_row(self, rest, gradient, self[k] * gradient[j]))
@@ -281,7 +281,7 @@ class Tensor(Matrix):
             ]
         )
 
-    # An absent F_ii is 1.
+    # In 2D, the absent F_ii is 1.
 
     def left_cauchy_green(self):
         a = self.at()
@@ -297,7 +297,7 @@ def further_terms(squared):
     return squared * squared * (2 / 15 + squared * (17 / 315))
 
 
-# Iterations to round-off for any ratio of principal stretches
+# Iterations that reach round-off for any ratio of principal stretches.
 ROOT_STEPS = 6
 
 
@@ -320,7 +320,7 @@ def squares(a, axes, i, j):
 
 
 class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
-    """dl of a large rotation, with strain and rotation ln(I + dl)."""
+    """Increment dl of a large rotation, with strain and rotation from ln(I + dl)."""
 
     __slots__ = ()
 
@@ -334,7 +334,7 @@ class LargeIncrement(namedtuple("LargeIncrement", "dl logarithm")):
         return self.logarithm
 
     def strain_at_end(self):
-        """Return the strain in the axes at the end; its stress is rotated by half the angle."""
+        """Return the strain in the axes at the end; its stress is rotated by half of the angle."""
         return sym(self).turned(self._replace(logarithm=0.5 * self.logarithm))
 
 

@@ -11,7 +11,7 @@ from karamelo_py.points.kinematics import Space, dot
 
 @shared
 def principal(s):
-    """Return the unordered principal values (3,) of a symmetric tensor, and its directions."""
+    """Return the principal values (3,) of a symmetric tensor, in any order, and its directions."""
     if s.kin.dimension == 1:
         return (s.xx, s.yy, s.zz), ()
     return principal_in_plane(s) if s.kin.dimension == 2 else principal_in_space(s)
@@ -19,7 +19,7 @@ def principal(s):
 
 @shared
 def from_principal(s, values, directions, slopes=None):
-    """Build a tensor of the class of `s` from principal values and directions.
+    """Build a tensor of the class of `s` from principal values and principal directions.
 
     `slopes` (3,), for equal values: derivatives with respect to another tensor's principal values.
     """

@@ -63,7 +63,7 @@ def gradient_around(v, omega, slopes):
 
 
 def times_radius(gradient, r, F):
-    """Make an increment of a sum of `gradient_around`; F is () in the updated frame.
+    """Make an increment from a sum of `gradient_around`; F is () in the updated frame.
 
     With the radius r at the end of the step, F is a function of the positions.
     """

@@ -23,16 +23,16 @@ from karamelo_py.compiler import point_function, real
 
 
 class LawTraits(NamedTuple):
-    rebounds: bool = False  # sustains tension and returns all work done on it
-    flows: bool = False  # has no permanent shape: liquids, soils
-    rings: bool = True  # bodies vibrate if it has a shear modulus
-    any_speed: bool = False  # speeds may be far above its wave speed: gases
-    hypoelastic: bool = False  # never yields, but returns not all work
-    of_solids: bool = False  # eos that sustains tension
-    burns: bool = False  # products of an explosive
-    fluid: bool = False  # eos of a liquid or gas
-    by_temperature: bool = False  # needs a temperature from its solid
-    least_density: float = 10.0  # kg/m^3; less suggests wrong units
+    rebounds: bool = False  # True if it sustains tension and returns all work done on it
+    flows: bool = False  # True if it has no permanent shape: liquids, soils
+    rings: bool = True  # True if bodies with a shear modulus vibrate
+    any_speed: bool = False  # True if speeds may be far above its wave speed: gases
+    hypoelastic: bool = False  # True if it never yields, but does not return all work
+    of_solids: bool = False  # True for an eos that sustains tension
+    burns: bool = False  # True for products of an explosive
+    fluid: bool = False  # True for an eos of a liquid or gas
+    by_temperature: bool = False  # True if it needs a temperature from its solid
+    least_density: float = 10.0  # kg/m^3; a lower density suggests wrong units
 
 
 def law_traits(component: Any) -> LawTraits:
@@ -61,7 +61,7 @@ def law_parts(law: tuple) -> Iterator[tuple]:
 
 
 def can(law: NamedTuple, function: Callable) -> bool:
-    """Return True if the law or a part defines the point function itself, not by a wrapped law."""
+    """Return True if the law or a part itself, not a wrapped law, defines the point function."""
     kinds = (kind for kind in law_kind(law) if function.defined(kind))
     return any(function.find((kind,)) not in _delegating for kind in kinds)
 
@@ -281,7 +281,7 @@ def deformation(law, kin, state):
 
 @point_function(otherwise=True)
 def by_rates(law):
-    """Return True, constant when compiled, if load steps need the logarithm of the strain."""
+    """Return True, known when compiled, if load steps need the logarithm of the strain."""
     return True
 
 
@@ -367,7 +367,7 @@ def with_temperature(law, kin, state, T):
 
 @point_function(otherwise=True)
 def heat_capacity(law, template):
-    """Return the heat capacity per mass and kelvin; 0 for laws without temperature."""
+    """Return the heat capacity per mass and kelvin, 0 for laws without a temperature."""
     return real(0, template)
 
 

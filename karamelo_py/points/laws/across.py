@@ -11,7 +11,7 @@ from karamelo_py.points.laws.thin import WHOLE, Thin, with_strain_across
 
 
 class Across(Thin):
-    """The 3D `law` with a prescribed stretch across."""
+    """The 3D `law` with a prescribed stretch across the plane."""
 
     __slots__ = ()
 
@@ -20,7 +20,7 @@ class State(NamedTuple):
     whole: Any  # state of the inner law
     across: Any  # present F_zz
     target: Any  # F_zz at the end of the step
-    work: Any  # work across per reference volume, since it was last summed
+    work: Any  # work of the stress across the plane, per reference volume, since it was last summed
 
 
 @laws.initial_state.on(Across)
@@ -45,7 +45,7 @@ def _strained(law, kin, state, dl):
 
 
 def _after(law, state, new):
-    """Add the work of the mean nominal stress across, tau_zz / F_zz."""
+    """Add the work of the mean nominal stress across the plane, tau_zz / F_zz."""
     before = laws.kirchhoff_stress(law.law, WHOLE, state.whole)[2] / state.across
     now = laws.kirchhoff_stress(law.law, WHOLE, new)[2] / state.target
     work = 0.5 * (before + now) * (state.target - state.across)

@@ -72,7 +72,7 @@ IN_STRETCHES = {
     "I1": plus(plus(_A, _B), _C),
     "I2": plus(plus(times(_A, _B), times(_B, _C)), times(_C, _A)),
     "J": times(times(_L[0], _L[1]), _L[2]),
-    **dict.fromkeys(FIBRES, Expression(1.0)),  # for the matrix without fibres
+    **dict.fromkeys(FIBRES, Expression(1.0)),  # a matrix without fibres
 }
 
 
@@ -158,7 +158,7 @@ def value_at(root: Term, stretches: Sequence[float]) -> float:
 
 
 def _judged(energy: Term, slopes: list[Term], curves: list[Term]) -> tuple[float, float, float]:
-    """Return Lame's parameters and the energy at rest; refuse anisotropic and unstable energies."""
+    """Return Lame's parameters and the energy at rest; refuse an anisotropic or unstable energy."""
     rest = (1.0, 1.0, 1.0)
     at_rest, stress = value_at(energy, rest), value_at(slopes[0], rest)
     stiffness, lam = (value_at(curve, rest) for curve in curves)
@@ -246,7 +246,7 @@ def stiffness_along_fibre(
 ) -> float:
     """Return l^2 d2W/dl^2 of a stretch l = x along a family of fibres, times NEAR^2.
 
-    `cosine2` replaces the squared cosine between the families. At constant volume it is the
+    `cosine2` replaces the squared cosine between the families. At constant volume the result is the
     curvature in ln l. The result is NaN where the energy has no value.
     """
     along = aligned(law) if cosine2 is None else cosine2
@@ -367,7 +367,7 @@ def stiffness_of_matrix(law, b, at):
         along += 4 * high * high * max(W11, 0) + 4 * low * low * min(W11, 0)
         along += 4 * J * (high * max(W1J, 0) + low * min(W1J, 0))
     if len(second):
-        most = min(0.25 * I1 * I1, high * (I1 - low))  # max of x (I1 - x)
+        most = min(0.25 * I1 * I1, high * (I1 - low))  # largest value of x (I1 - x)
         least = max(min(low * (I1 - low), high * (I1 - high)), 0)
         along += 2 * most * max(W2, 0) + 2 * least * min(W2, 0)
         along += 8 * high * most * max(W12, 0) + 4 * most * most * max(W22, 0)

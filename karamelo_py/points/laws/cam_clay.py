@@ -38,7 +38,7 @@ class CamClayConstants(NamedTuple):
     lam
         Slope of -ln(volume) against ln(p) in virgin consolidation: about lambda/(1 + e).
     kappa
-        Slope in swelling and reloading; it must be below lam.
+        Slope in swelling and reloading, below lam.
     p0
         Initial effective pressure.
     pc
@@ -164,7 +164,7 @@ def after_flow(law, trial, y, w):
 
 
 def residuals(law, trial, y, w):
-    """Return residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
+    """Return the residuals of the yield function and of the flow rule y = w M^2/6G (2 p - pc)."""
     q, p, pc = after_flow(law, trial, y, w)
     return q * q / law.M**2 + p * (p - pc), y - w * law.M**2 / (6 * law.G) * (2 * p - pc)
 
@@ -182,19 +182,19 @@ def newton_step(law, trial, y, w, errors):
     return k * (fw * g - gw * f), k * (gy * f - fy * g)
 
 
-_BISECTIONS = 14  # after these, Newton's method squares the error in each iteration
+_BISECTIONS = 14  # number of bisections; Newton's method then squares the error in each iteration
 _NEWTON = 4
 
 
 @shared
 def plastic_flow(law, q, p, pc):
-    """Return the y and w that return a trial with q and p to the surface; 0 inside it.
+    """Return the y and w by which a trial with q and p returns to the surface; 0 inside it.
 
     With (1 + w) = q / q_s, where q_s is on the surface, one equation for y remains. Its solution
     lies between y = 0 (or p = pc, if larger) and the critical state 2 p = pc.
     """
     yields = q * q / law.M**2 + p * (p - pc) > 0
-    q = where(yields, q, law.M * pc)  # a value outside the surface, for unused lanes
+    q = where(yields, q, law.M * pc)  # unused lanes get a value outside the surface
     trial = ClayStress(q, p, pc)
     c, a = law.M**2 / (6 * law.G), law.kappa * (law.lam - law.kappa) / law.lam
     isotropic = a * log(p / pc)
@@ -259,7 +259,7 @@ laws.column(CamClay, "pc")
 
 @laws.wave_speed_squared.on(CamClay)
 def _wave_speed_squared_cam_clay(law, kin, state):
-    # (K + 4/3 G - tau) / rho_0 along a principal direction; plastic waves are slower
+    # Squared speed of elastic waves along a principal direction; plastic waves are slower.
     modulus = pressure(law, state.e) / law.kappa + 4 / 3 * law.G
     tau = laws.kirchhoff_stress(law, kin, state)
     return (modulus + tau.largest_row_sum()) * law.specific_volume

@@ -24,7 +24,7 @@ class FlowStep(NamedTuple):
     triaxiality: Any  # mean stress / von Mises stress
     heat: Any  # `Warm` or ()
     dt: Any
-    stress: Any  # Cauchy, of intact material
+    stress: Any  # Cauchy stress of intact material
     expansion: Any  # relative change of volume
 
 
@@ -40,10 +40,10 @@ def integrity(damage, memory):
 
 @point_function()
 def initiation(damage, memory):
-    """Return the damage initiation, growing from 0; damage begins at 1."""
+    """Return the damage initiation, which grows from 0; at 1 damage begins."""
 
 
-# triaxiality below which most metals do not fail
+# Triaxiality below which most metals do not fail.
 _CLOSED = -3.0
 _SMALLEST_FAILURE_STRAIN = 1e-6
 # Damage is this number times (sum of strain increments / failure strain, minus 1), at most 1.

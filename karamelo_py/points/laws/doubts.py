@@ -28,7 +28,7 @@ TOUGH = 50.0  # failure strain in shear; larger ones are likely in percent
 APART = 100.0  # K, largest difference of reference temperatures in the same unit
 MELTS = 0.1  # plastic strain whose heat melts no real metal
 COEFFICIENT = 2.0  # friction between grains; real values are far smaller
-STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; likewise
+STEEP, THICK = 10.0, 20.0  # Hugoniot slope and viscosity coefficient; real values are far smaller
 
 
 def doubts(law: Any) -> Iterator[tuple[str, str]]:
@@ -36,7 +36,7 @@ def doubts(law: Any) -> Iterator[tuple[str, str]]:
     if can(law, constrained_velocity):
         return
     if parameter(parameter(law, "strength"), "cell_size", None) is not None:
-        # The cell size, by which viscosity damps waves, is not known yet.
+        # The cell size, with which viscosity damps waves, is not known yet.
         law = law._replace(strength=law.strength._replace(cell_size=inf))
     state = initial_state(law, Space(), 1.0)
     squared, density = wave_speed_squared(law, Space(), state), 1 / specific_volume(law)

@@ -281,13 +281,13 @@ FAST = 0.02  # fraction of the wave speed above which impacts make metals yield
 
 
 def _locks(law, scene):
-    """Return whether isochoric flow in load steps locks cells of a linear basis."""
+    """Return True if isochoric flow in load steps locks cells of a linear basis."""
     slow = not scene.scheme.traits.inertia and not scene.hub.domain.kin.hoops
     return scene.locks and slow and _flows_by_shear(law) and {"mark": scene.method.mark}
 
 
 def _locks_at_impact(law, scene):
-    """Return whether cells lock at impact in the total frame, where points stay in them."""
+    """Return True if cells lock at impact in the total frame, where points stay in their cells."""
     fast = scene.scheme.traits.inertia and not scene.moves and scene.speed > FAST
     return scene.locks and fast and _flows_by_shear(law) and {"mark": scene.method.mark}
 
@@ -435,7 +435,7 @@ def energy_to_unload(law, elastic, m):
     """Return the energy per elastic volume that is released with the pressure."""
     energy = energy_of_elastic_volume(law, elastic, m)
     if len(m.heat):
-        # without pressure, a warm point is larger than at rest
+        # Without pressure, a warm point is larger than at rest.
         warm = warm_pressure(law, elastic, m)
         K = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)
         energy += 0.5 * warm * warm * elastic / K
@@ -444,7 +444,7 @@ def energy_to_unload(law, elastic, m):
 
 def warm_pressure(law, elastic, m):
     warm = sum(thermal_pressure(law.temperature, m.heat))
-    if len(m.heat):  # thermal pressure of the eos
+    if len(m.heat):  # the eos has a thermal pressure
         warm += eos.pressure(law.eos, elastic, m.energy, m.heat)
         warm -= eos.pressure(law.eos, elastic, m.energy, ())
     return warm
@@ -458,7 +458,7 @@ def energy_of_elastic_volume(law, elastic, m):
 
 
 def full_pressure(law, j, m):
-    """Return the pressure of the stress; damage reduces tension only."""
+    """Return the pressure in the stress; damage reduces only tension."""
     p = intact_pressure(law, j, m)
     return where(p < 0, p * integrity_of(law, m.damage), p) + sum(m.viscous)
 
@@ -547,7 +547,7 @@ def _dissipated_energy_eos_strength(law, kin, state):
 
 @laws.temperature.on(EosStrength)
 def _temperature_eos_strength(law, kin, state):
-    """Return the temperature, or internal energy per mass if artificial heat flows."""
+    """Return the temperature or, if artificial heat flows, the internal energy per mass."""
     if isinstance(law.viscosity, ViscosityWithFlux):
         return state.m.energy[0] * laws.specific_volume(law.eos)
     return sum(state.m.heat)
@@ -576,7 +576,7 @@ def _conductivity_now_eos_strength(law, kin, state, most):
 
 @laws.wave_speed_squared.on(EosStrength)
 def _wave_speed_squared_eos_strength(law, kin, state):
-    # (K + 4/3 G) / rho, elastic; plastic waves are slower
+    # Squared speed of elastic waves, (K + 4/3 G) / rho; plastic waves are slower.
     J, _, m = state
     elastic = strengths.elastic_ratio(law.strength, m.strength, J)
     modulus = eos.bulk_modulus(law.eos, elastic, m.energy, m.heat)

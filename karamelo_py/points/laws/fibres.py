@@ -22,7 +22,7 @@ LEANS = 1e-9
 
 
 class Fibres(NamedTuple):
-    """Unit vectors a0 and b0 of two families at rest."""
+    """Unit vectors a0 and b0 of two families of fibres at rest."""
 
     in_lanes = True
 
@@ -89,7 +89,7 @@ def stiffness_of_fibres(law, b, at):
     at = (*at[:3], max(at[3], 1), max(at[4], 1))
     _, _, J, *squares = at
     high = b.largest_row_sum()
-    most = min(0.25 * at[0] * at[0], high * at[0])  # max of x (I1 - x)
+    most = min(0.25 * at[0] * at[0], high * at[0])  # largest value of x (I1 - x)
     both = 8 * squares[0] * squares[1] * max(evaluated(law.twice_along[2], law, at), 0)
     for family in (0, 1):
         x = squares[family]
@@ -117,13 +117,13 @@ def _shear_part_of_fibres(law, kin, state):
 
 
 class PlacedFibre(Placed):
-    """One family given by formulas of position."""
+    """One family of fibres, given by formulas of position."""
 
     __slots__ = ()
 
 
 class PlacedFibres(PlacedFibre):
-    """Two families, at least one given by formulas of position."""
+    """Two families of fibres, at least one of them given by formulas of position."""
 
     __slots__ = ()
 

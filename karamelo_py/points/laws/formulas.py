@@ -1,4 +1,4 @@
-"""Formulas in laws, which are read from a script, differentiated, and made code of a class.
+"""Formulas in laws: read from a script, differentiated, and turned into code of a class.
 
 The structure of a formula is in the class of the law, so kernels contain it as code; its numbers
 are parameters. Laws that differ only in numbers have the same kernels, unless numbers are equal, or
@@ -26,7 +26,7 @@ from karamelo_py.script.expressions import applied as of_operands
 from karamelo_py.script.parser import parse_text
 from karamelo_py.script.terms import Term
 
-WHOLE = {*range(-8, 9)} - {0}  # exponents that are part of the code, not parameters
+WHOLE = {*range(-8, 9)} - {0}  # exponents that become part of the code, not parameters
 ONE_BY_ONE = {"sin", "cos", "tan", "tanh", "sinh", "cosh"}  # not computed in lanes
 COMPARED = ("<", "<=", ">", ">=")
 OF_TWO = ("+", "-", "*", "/", "^", "max", "min")
@@ -122,7 +122,7 @@ def plain(formula: Expression, argument: str, by: dict[str, Callable] = PLAIN) -
 
 
 class ProgramWriter:
-    """Writes formulas in `names`. They have common `numbers`, which include all other names."""
+    """Writes formulas in `names`, with common `numbers` that include all other names."""
 
     def __init__(self, names: Sequence[str]):
         self.names = names

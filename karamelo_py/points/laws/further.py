@@ -39,7 +39,7 @@ def part_after(component, memory, law, step, memories):
 
 @point_function(otherwise=True)
 def part_pressure(component, memory):
-    """Return (p,), the added pressure, or ()."""
+    """Return (p,), the pressure that a part adds, or ()."""
     return ()
 
 
@@ -114,7 +114,7 @@ def has_rate(law: NamedTuple) -> bool:
 
 
 def with_rate(law: NamedTuple, kin: NamedTuple, h: float) -> NamedTuple:
-    """Return a law that also stores its plastic strain rate (last), for cells of size `h`."""
+    """Return a law that also stores its plastic strain rate, for cells of size `h`."""
     if not has_rate(law):
         return law
     speed = sqrt(laws.wave_speed_squared(law, kin, laws.initial_state(law, kin, 1.0)))

@@ -134,12 +134,12 @@ class BreakingApart(Ply, _Strengths):
 
 class State(NamedTuple):
     F: Any
-    # largest values of the criteria so far
+    # Largest values of the criteria so far.
     fibre_t: Any
     fibre_c: Any
     matrix_t: Any
     matrix_c: Any
-    fibres: Any  # remaining fraction of the stress
+    fibres: Any  # fraction of the stress that remains
     matrix: Any  # 1 if whole, else 0
     loss: Any  # dissipated energy per reference volume
 

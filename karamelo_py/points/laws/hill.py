@@ -100,7 +100,7 @@ def of_lankford(R: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def of_ratios(ratios: tuple[float, ...]) -> tuple[float, ...]:
-    """Return F, G, H, L, M, N for yield ratios, all 1 if isotropic."""
+    """Return F, G, H, L, M, N for yield ratios, which are all 1 for an isotropic body."""
     r11, r22, r33, r12, r13, r23 = ratios
     a, b, c = 1 / r11**2, 1 / r22**2, 1 / r33**2
     shears = 1.5 / r23**2, 1.5 / r13**2, 1.5 / r12**2
@@ -118,7 +118,7 @@ def surface(constants: tuple[float, ...]) -> np.ndarray:
 
 
 def turned(matrix: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """Return a matrix (6, 6), in Mandel's notation, of axes that R rotates to the body's."""
+    """Return a matrix (6, 6), in Mandel's notation, rotated by R to the body's axes."""
     full = rotated(matrix / np.outer(FACTORS, FACTORS), R)
     return np.array([[full[a + b] for b in VOIGT] for a in VOIGT]) * np.outer(FACTORS, FACTORS)
 
@@ -150,7 +150,7 @@ _Fields = namedtuple(
         *(f"from{a + 1}{b + 1}" for a, b in _MATRIX),
     ),
 )
-RATES = 3  # index of the first field
+RATES = 3  # index of the first of the fields with rates
 TO, FROM = RATES + 6, RATES + 42
 
 
@@ -186,9 +186,9 @@ class Hill(NamedTuple):
         90 degrees to axis 1, the rolling direction; axis 3 is through the sheet.
     yields
         Instead of R: yield stresses (r11, r22, r33) / reference stress and shear yield stresses
-        (r12, r13, r23) / (reference stress / sqrt(3)). All are 1 for an isotropic body.
+        (r12, r13, r23) / (reference stress / sqrt(3)). All ratios are 1 for an isotropic body.
     axes
-        As for orthotropic. They also apply to the elastic material.
+        As for orthotropic; the axes also apply to the elastic material.
 
     Example
     -------
@@ -361,7 +361,7 @@ laws.answers(YieldingByHill, {laws.elastic_strain: "e", laws.dissipated_energy: 
 def stretching(kin, state, dl, U):
     """Return the strain increment U_m^-1 (C_new - C_old)/2 U_m^-1, U_m being the mean stretch.
 
-    Its trace is corrected to the logarithm of the volume ratio, so volumes do not drift.
+    The trace is corrected to the logarithm of the volume ratio, so that volumes do not drift.
     """
     middle = state.F @ inv(as_tensor(kin, 0.5 * (state.U + U)))
     strain = sym(dl + 0.5 * (dl.transposed() @ dl)).carried(middle.transposed() - I)
@@ -387,9 +387,9 @@ def _advance_hill(law, kin, state, dl, dt):
 
 class Residual(NamedTuple):
     excess: Any  # q_trial - Y q_trial/q(x/Y)
-    slope: Any  # derivative with respect to x
-    by_limit: Any  # derivative with respect to Y
-    by_squares: tuple  # derivatives with respect to rate z^2, where q = Y
+    slope: Any  # derivative of the excess with respect to x
+    by_limit: Any  # derivative of the excess with respect to Y
+    by_squares: tuple  # derivatives of the excess with respect to rate z^2, where q = Y
 
 
 def residual(law, squares, before, x, dt):
@@ -407,7 +407,7 @@ def residual(law, squares, before, x, dt):
     squared = total(left)
     falls = total([w * part * r for w, part, r in zip(left, parts, rates, strict=True)])
     ratio = trial / sqrt(squared)
-    rise = ratio * falls / squared  # derivative of the ratio by g
+    rise = ratio * falls / squared  # derivative of the ratio with respect to g
     by_limit = g * rise - ratio
     by_squares = tuple([0.5 * trial * part * part / squared for part in parts])
     return Residual(trial - limit * ratio, hardening * by_limit - rise, by_limit, by_squares)
@@ -420,7 +420,7 @@ _MOST = 60
 def plastic_strain_of(law, squares, memory, dt):
     """Return the increment of plastic strain at which q is the flow stress; 0 for smaller q.
 
-    Newton's method, safeguarded by bisection for flow stresses that are not concave.
+    Solved by Newton's method, with bisection for flow stresses that are not concave.
     """
     before = before_flow(law.strength, memory, ())
     whole = total(list(squares))

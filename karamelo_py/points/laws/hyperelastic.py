@@ -328,8 +328,8 @@ class SaintVenantKirchhoff(NamedTuple):
 
     Notes
     -----
-    W = lam/2 (tr E)^2 + G E:E. For large rotations but small strains: compressed to 0.58 of its
-    length, a body loses its stiffness.
+    W = lam/2 (tr E)^2 + G E:E. Use it for large rotations with small strains: compressed to 0.58 of
+    its length, a body loses its stiffness.
 
     See Also
     --------

@@ -61,7 +61,7 @@ class JointedConstants(NamedTuple):
         Tension that the joints sustain, at most cohesion/tan(phi).
     matrix_cohesion, matrix_phi, matrix_psi
         Cohesion, friction and dilatancy of the rock between the joints (strength mohr-coulomb);
-        without a cohesion or friction angle it is elastic.
+        without a cohesion or friction angle, the rock is elastic.
     axes
         As for orthotropic: `angle` and `tilt` rotate the normal from axis 3 within them.
 
@@ -158,14 +158,14 @@ class Jointed(NamedTuple):
     friction: float  # tan(phi)
     dilation: float  # tan(psi)
     tension: float
-    nx: float  # the normal before deformation
+    nx: float  # normal of the joints before deformation
     ny: float
     nz: float
     matrix: Any
 
 
 class YieldingBetween(Jointed):
-    """Jointed rock that yields between its joints."""
+    """Jointed rock that yields between its joints, too."""
 
     __slots__ = ()
     scalarised = ("advance",)
@@ -173,10 +173,10 @@ class YieldingBetween(Jointed):
 
 class State(NamedTuple):
     F: Any
-    sigma: Any  # Cauchy
+    sigma: Any  # Cauchy stress
     slip: Any
     opening: Any
-    ep: tuple  # equivalent plastic strain of a matrix with a strength
+    ep: tuple  # equivalent plastic strain of the rock, if the rock has a strength
     loss: Any  # dissipated energy per reference volume
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from karamelo_py.language.rules import known_failure
 from karamelo_py.points.laws import law_parts
 
-LEANING: dict[type, Callable[[Any, Any], bool]] = {}  # by kind of law
+LEANING: dict[type, Callable[[Any, Any], bool]] = {}  # rules by kind of law
 
 
 def warn_of_leaning(

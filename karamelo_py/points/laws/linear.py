@@ -41,8 +41,8 @@ class LinearConstants(NamedTuple):
     alpha
         Coefficient of linear expansion.
     rate
-        ``jaumann``: the stress rotates with the point. ``none``: it does not (to reproduce
-        Karamelo).
+        ``jaumann``: the stress rotates with the point. ``none``: the stress does not rotate, as in
+        Karamelo.
 
     Example
     -------
@@ -78,7 +78,7 @@ class LinearConstants(NamedTuple):
 
 class State(NamedTuple):
     J: Any
-    sigma: Any  # Cauchy
+    sigma: Any  # Cauchy stress
 
 
 gain(
@@ -113,7 +113,7 @@ def _kirchhoff_stress_linear_elastic(law, kin, state):
 
 @laws.wave_speed_squared.on(LinearElastic)
 def _wave_speed_squared_linear_elastic(law, kin, state):
-    # (lam + 2 G) / rho with constant moduli; the volume per unit mass is multiplied by det F.
+    # (lam + 2 G) / rho with constant moduli; the volume per mass is proportional to det F.
     return (law.lam + 2 * law.G) * law.specific_volume * state.J
 
 

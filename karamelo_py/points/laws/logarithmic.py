@@ -7,7 +7,7 @@ from karamelo_py.points.kinematics.principal import exponential_of, logarithm_of
 
 
 class Logarithmic(NamedTuple):
-    """Tag of the elastic strain ln V, V being the left elastic stretch."""
+    """Tag of the elastic strain ln V, with the left elastic stretch V."""
 
     in_lanes = True
     scalarised = ("elastic_trial",)

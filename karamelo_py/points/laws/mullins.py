@@ -88,7 +88,7 @@ class State(NamedTuple):
 
 
 def swollen(law, kin, state):
-    """Return the state at the same volume and temperature without distortion."""
+    """Return the state without distortion, at the same volume and temperature."""
     size = power(laws.jacobian(law, kin, state), 1 / 3) - 1
     start = laws.initial_state(law, SPACE, size)
     start = laws.with_temperature(law, SPACE, start, laws.temperature(law, kin, state))
@@ -105,7 +105,7 @@ def distortional_energy(law, kin, state):
 
 @point_function()
 def softened(law, W, peak):
-    """Return eta, its derivative with respect to W, and phi of Ogden and Roxburgh."""
+    """Return eta, its derivative with respect to W, and Ogden and Roxburgh's phi."""
 
 
 @softened.on(Mullins)

@@ -59,7 +59,7 @@ class Axes:
         return made
 
     def rotations(self, values: Values, x0: np.ndarray) -> np.ndarray:
-        """Return rotations (n, 3, 3) with the axes as columns at positions `x0` (n, d)."""
+        """Return rotations (n, 3, 3) at positions `x0` (n, d), with the axes as columns."""
         refuse_absent(self.formulas, x0.shape[1], self.mark)
         numbers = [one.evaluate_points(values, x0) for one in self.formulas]
         if len(numbers) == 1:
@@ -105,7 +105,7 @@ def _axes_lean(law: Any, scene: Any) -> bool:
     return any(inclined(law.place.rotations(scene.hub.values, x0), F) for x0 in at)
 
 
-LEANING[Oriented] = _axes_lean  # a run refuses them
+LEANING[Oriented] = _axes_lean  # the run refuses such axes
 
 
 def oriented(law: Any, axes: Axes | None) -> Any:
@@ -125,13 +125,13 @@ def _initial_state_oriented(law, kin, template):
     return State(laws.initial_state(law.elastic, kin, template), ())
 
 
-# Without laws.deformation, as F of the inner law is different.
+# Functions are wrapped without laws.deformation, as F of the inner law is different.
 laws.wraps(Oriented, "elastic", "elastic", (*ELASTIC, laws.with_stress))
 laws.answers(Oriented, {has_short_trials: True, laws.is_round: False})
 
 
 class AxisShown(NamedTuple):
-    """Output column of a component of the present direction of axis 1, a line of the body."""
+    """Output column: a component of the present direction of axis 1, a line of the body."""
 
     index: int
 

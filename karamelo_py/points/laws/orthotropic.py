@@ -17,14 +17,14 @@ from karamelo_py.points.laws.oriented import Axes, oriented
 from karamelo_py.points.laws.parameters import AboveZero, ByName
 from karamelo_py.script.errors import ScriptError
 
-# Voigt's order
+# Components in Voigt's order.
 VOIGT = (0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)
 INDEX = (0, 5, 4), (5, 1, 3), (4, 3, 2)  # numbers of components in Voigt's order
 PAIRS = tuple(combinations_with_replacement(range(6), 2))
 STIFFNESS = tuple(
     tuple(2 + PAIRS.index((min(a, b), max(a, b))) for b in range(6)) for a in range(6)
 )
-COUPLED = 1e-9  # relative out-of-plane shear that counts as none
+COUPLED = 1e-9  # relative out-of-plane shear that counts as 0
 
 _Fields = namedtuple(
     "_Fields", ("specific_volume", "fastest", *(f"c{a + 1}{b + 1}" for a, b in PAIRS))
@@ -133,14 +133,14 @@ class Transverse(NamedTuple):
     E, nu
         Young's modulus and Poisson's ratio in planes normal to the direction.
     E3, nu3
-        Young's modulus along the direction, and lateral contraction / stretch along it.
+        Young's modulus along the direction; contraction across it / stretch along it.
     G3
         Shear modulus of planes that contain the direction.
     angle, tilt
         Rotation of the direction from z, in degrees: by `tilt` about x, then by `angle` about z.
         The normal of bedding that dips by 30 degrees about z has angle 30 and tilt 90.
     axes
-        As for orthotropic; `angle` and `tilt` rotate the direction from axis 3.
+        As for orthotropic; `angle` and `tilt` rotate the direction from axis 3 within them.
 
     Example
     -------
@@ -148,7 +148,7 @@ class Transverse(NamedTuple):
 
     Notes
     -----
-    An orthotropic law with axis 3 along the direction and equal axes 1 and 2.
+    The law is orthotropic, with axis 3 along the direction and equal axes 1 and 2.
 
     See Also
     --------
@@ -172,7 +172,7 @@ class Transverse(NamedTuple):
                 argument="nu3",
                 expected="nu above -1 and below 1, and nu3^2 < E3/E (1 - nu)/2",
             )
-        across = self.nu3 * self.E / self.E3  # contraction along 3 over stretch across
+        across = self.nu3 * self.E / self.E3  # contraction along 3 / stretch across it
         shear = 0.5 * self.E / (1 + self.nu), self.G3, self.G3
         moduli, ratios = (self.E, self.E, self.E3), (self.nu, across, across)
         turns = self.angle, self.tilt, 0.0
@@ -202,16 +202,16 @@ def rotated(C: np.ndarray, R: np.ndarray) -> np.ndarray:
 
 
 def fastest(C: np.ndarray) -> float:
-    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l for any n."""
+    """Return the largest rho c^2 of plane waves: an eigenvalue of C_ijkl n_j n_l over all n."""
     z, turn = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 2 * np.pi, 121))
     r = np.sqrt(1 - z * z)
     n = np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=-1).reshape(-1, 3)
     acoustic = np.einsum("ijkl,nj,nl->nik", C, n, n)
-    # allows for directions between the samples, 3 degrees apart
+    # The factor covers directions between the samples, which are 3 degrees apart.
     return 1.003 * float(np.linalg.eigvalsh(acoustic).max())
 
 
-# by dimension: stress components within a body's plane or line, and shears out of it
+# By dimension: stress components within a body's plane or line, and shears out of it.
 OUT_OF_SCENE = {1: ((0,), (3, 4, 5)), 2: ((0, 1, 2, 5), (3, 4)), 3: ((), ())}
 
 

@@ -13,11 +13,11 @@ from karamelo_py.script.errors import ScriptError
 AboveZero = Annotated[float, Positive]
 FromZero = Annotated[float, NonNegative]
 Type = TypeVar("Type")
-Temperature = Annotated[Type, Keyword("T")]  # annotation of a field initial_temperature
+Temperature = Annotated[Type, Keyword("T")]  # annotation of the field initial_temperature
 
 
 class MaterialArgument:
-    """Script argument: the ID of a material that fits."""
+    """Script argument: the ID of a material of a suitable kind."""
 
     script_kind: ClassVar[str] = "the ID of a material"
 
@@ -31,7 +31,7 @@ class MaterialArgument:
 
     @classmethod
     def refusal(cls, law: Any) -> tuple[str, str] | None:
-        """Return what is wrong with a law, and what is expected instead."""
+        """Return what is wrong with a law and what is expected, or None if it is suitable."""
 
 
 LOCKED = 0.49  # Poisson's ratio above which a linear basis is 20 % too stiff

@@ -22,7 +22,7 @@ from karamelo_py.script.expressions import FIRST, Expression
 from karamelo_py.script.values import Values
 
 Vector = tuple[float, ...]
-SOME = 1000  # points of a solid whose directions are checked before a run
+SOME = 1000  # number of points per solid whose directions are checked before a run
 
 
 class Direction:
@@ -82,7 +82,7 @@ def names_in(formulas: Sequence[Expression]) -> frozenset[str]:
 
 
 def formulas_of_place(hub: Scene, argument: Argument) -> tuple[Expression, ...]:
-    """Return the numbers or formulas of x0, y0, z0 in parentheses, or none if one is a text."""
+    """Return the numbers or formulas of x0, y0, z0 in parentheses; () if one of them is a text."""
     parts = [part for one in argument.listed() for part in one.listed()]  # (a), or ((a), (b))
     values = [one.value(hub) for one in parts]
     formulas = tuple(Expression(one) for one in values if not isinstance(one, str))
@@ -167,7 +167,7 @@ def place_of(law: Any) -> Place | None:
 
 
 def with_directions(state: tuple, column: np.ndarray, values: Values, solid: Any) -> np.ndarray:
-    """Return a solid's state at rest (k, 1), or (k, n) if the directions of points differ."""
+    """Return a solid's state at rest (k, 1), or (k, n) if directions differ between points."""
     place = place_of(solid.material.law)
     if place is None:
         return column
@@ -210,7 +210,7 @@ class Placed(NamedTuple):
 
 
 class Oriented(NamedTuple):
-    """A law of F alone, whose F starts as the rotation to the point's axes."""
+    """A law of F alone, with an F that starts as the rotation to the point's axes."""
 
     in_lanes = True
 
@@ -243,7 +243,7 @@ laws.wraps(Placed, "elastic", "elastic", (*ELASTIC, laws.deformation))
 
 
 class DirectionShown(NamedTuple):
-    """Output column of a component of the point's directions."""
+    """Output column: a component of the point's directions."""
 
     index: int
 

@@ -18,7 +18,7 @@ class ConstantPermeability(NamedTuple):
 
 
 class KozenyCarman(NamedTuple):
-    """Permeability in proportion to n^3 / (1 - n)^2."""
+    """Permeability proportional to n^3 / (1 - n)^2."""
 
     in_lanes = True
 
@@ -28,10 +28,10 @@ class Saturated(NamedTuple):
 
     law: Any
     n: float  # initial porosity
-    drag: float  # force per pore volume and water velocity: rho g / permeability
+    drag: float  # force per pore volume and water velocity, rho g / permeability
     K: float  # bulk modulus of the water
     rho: float  # density of the water at zero pressure
-    permeability: Any  # tag: how it depends on porosity
+    permeability: Any  # tag of a dependence on porosity
     suction: float  # suction at which the saturation is 1/e; K: pores remain full
     K_of_waves: float  # K, or 0 if the pressure is solved for and does not limit the step
 
@@ -98,7 +98,7 @@ def _wave_speed_squared_saturated(law, kin, state):
 
 @laws.wave_speed_bound.on(Saturated)
 def _wave_speed_bound_saturated(law, kin, state):
-    # The trace alone is so much larger that the root would be taken at every point.
+    # The trace alone is so much larger that every point would compute the root.
     return _fast_wave(law, kin, state, laws.wave_speed_bound(law.law, kin, state.skeleton))
 
 
@@ -114,7 +114,7 @@ def pore_pressure(law, kin, state):
 
 @laws.number
 def pore_stiffness(law, kin, state):
-    """Return K/n."""
+    """Return K/n, the bulk modulus of water / porosity."""
     return law.K / porosity(law, kin, state)
 
 

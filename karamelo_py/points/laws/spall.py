@@ -118,7 +118,7 @@ class CochranBanner(NamedTuple):
 
     sigma0: float
     D0: float
-    cell_size: float = 0.0  # set when the scene is lowered
+    cell_size: float = 0.0  # cell size h, set when the scene is lowered
 
     @classmethod
     def given(cls, sigma0: AboveZero, D0: AboveZero):
@@ -131,7 +131,7 @@ column(CochranBanner, "damage_init", damage_initiation)
 
 class Opened(NamedTuple):
     w: Any  # opening / D0
-    left: Any  # lost fraction of the stress
+    left: Any  # fraction of the stress that is lost
 
 
 @initial_damage.on(CochranBanner)
@@ -151,7 +151,7 @@ def _damage_after_cochran_banner(damage, memory, step):
 
 
 def cracked(w):
-    """Return the fraction of the tension left by cracks with the opening `w`."""
+    """Return the fraction of the tension that cracks with the opening `w` sustain."""
     some = w > 0
     return 1 - where(some, power(where(some, w, 1), 2 / 3), 0)
 
@@ -173,7 +173,7 @@ class ByRate:
     scalarised = ("damage_after",)
     start: ClassVar[int]
     rate: ClassVar[Code]
-    directed: ClassVar[bool]  # s1 is needed
+    directed: ClassVar[bool]  # whether s1 is needed
 
 
 DamageFields = namedtuple("DamageFields", ("brittleness", "initial_temperature"))

@@ -18,13 +18,13 @@ class Expansion(NamedTuple):
 
     cp: float
     kappa: float
-    alpha: float  # coefficient of linear expansion
+    alpha: float  # coefficient alpha of linear expansion
     pressure: float  # 3 K alpha, per kelvin
     initial_temperature: float  # T0 of the solid, set when the scene is lowered
 
 
 class Thermoelastic(NamedTuple):
-    """An elastic law with a temperature; T follows the elastic state."""
+    """An elastic law with a temperature; T follows the elastic state in the state."""
 
     in_lanes = True
     traits = LawTraits(rebounds=True)
@@ -46,7 +46,7 @@ suggestion(
 def expanding(
     law: Any, cp: float | None, kappa: float | None, alpha: float, T: float = 0.0
 ) -> NamedTuple:
-    """Add a temperature to `law`, initially `T` unless its solid sets it, if cp is given."""
+    """If cp is given, add a temperature to `law`, initially `T` unless the solid sets one."""
     if cp is None or kappa is None:
         if cp is not None:
             raise ScriptError(
@@ -89,7 +89,7 @@ def expansion_pressure(law, state):
 
 @point_function(otherwise=True)
 def is_warm(law):
-    """Return True, constant when compiled, if an elastic law has a temperature."""
+    """Return True, known when compiled, if an elastic law has a temperature."""
     return False
 
 
@@ -97,7 +97,7 @@ laws.answers(Thermoelastic, {is_warm: True, laws.temperature: "T"})
 
 
 def heated_by(law, kin, state, loss):
-    """Warm the state by energy `loss` per reference volume, if it has a temperature."""
+    """Warm the state by an energy `loss` per reference volume, if it has a temperature."""
     if not is_warm(law):
         return state
     warmer = loss * laws.specific_volume(law) / laws.heat_capacity(law, loss)

@@ -15,7 +15,7 @@ from karamelo_py.points.kinematics import Axisymmetric, LargeIncrement, large, n
 WHOLE = Axisymmetric()
 ENOUGH = 10  # number of trials for increments of any size
 UNROLLED = 9  # number of trials up to which there is no loop
-FURTHEST = 0.3  # largest change of the stretch across, in a trial
+FURTHEST = 0.3  # largest change of the stretch across the body, in a trial
 FLATTEST, STEEPEST = 1e-6, 4.0  # accepted slopes of the stress across / (rho c^2)
 
 
@@ -25,7 +25,7 @@ class Thin(NamedTuple):
     law: Any
 
     in_lanes = True
-    trials = 3  # enough for small increments
+    trials = 3  # number of trials for small increments
 
 
 class ThinInLargeIncrements(Thin):
@@ -36,12 +36,12 @@ class ThinInLargeIncrements(Thin):
 class State(NamedTuple):
     whole: Any  # history variables of the inner law
     across: Any  # thickness / initial thickness
-    left: Any  # largest stress across that the trials of a step have left
+    left: Any  # largest stress across the body that the trials of a step have left
     largest: Any  # largest component of stress so far
 
 
 def with_strain_across(law, kin, dl, q):
-    """Return the increment `dl` with q across, for the inner law."""
+    """Return the increment `dl` with a strain q across the body, for the inner law."""
     if isinstance(dl, LargeIncrement):
         step = with_strain_across(law, kin, dl.dl, q)
         return large(step) if laws.by_rates(law) else step
@@ -66,7 +66,7 @@ def _advance_thin(law, kin, state, dl, dt):
     volume = laws.specific_volume(inner) * laws.jacobian(inner, WHOLE, old)
     squared = laws.wave_speed_squared(inner, WHOLE, old)
     modulus = squared / volume
-    # stress across per strain q: 2 G + lambda in a plate, 2 G + 2 lambda in a bar
+    # Stress across per strain q: 2 G + lambda in a plate, 2 G + 2 lambda in a bar.
     rest = squared - min(laws.shear_part(inner, WHOLE, old), squared)
     first = modulus + (2 - kin.dimension) * rest / volume
 
@@ -102,7 +102,7 @@ laws.wraps(
 
 @laws.by_rates.on(Thin)
 def _by_rates_thin(law):
-    return True  # load steps use logarithmic strain, and need more trials anyway
+    return True  # load steps use logarithmic strain and need more trials
 
 
 @laws.wave_speed_squared.on(Thin)
@@ -146,13 +146,13 @@ def _with_stress_thin(law, kin, state, stress):
 
 @laws.number
 def thickness(law, kin, state):
-    """Return the thickness / initial thickness."""
+    """Return thickness / initial thickness."""
     return state.across
 
 
 @laws.number
 def stress_left(law, kin, state):
-    """Return the largest stress across that a step has left / largest stress so far."""
+    """Return (largest stress across the body after a step) / (largest stress so far)."""
     return state.left / where(state.largest > 0, state.largest, 1)
 
 

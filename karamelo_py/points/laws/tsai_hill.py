@@ -127,7 +127,7 @@ class _Fields(NamedTuple):
     Yc: float
     S: float
     residual: float
-    turn: Turn  # columns: the axes of strength
+    turn: Turn  # axes of strength, as columns
 
 
 class Ply(OfDeformation):

@@ -30,8 +30,8 @@ from karamelo_py.points.laws.parameters import MaterialArgument
 from karamelo_py.points.laws.thermoelastic import heated_by, is_warm
 from karamelo_py.script.errors import Mark, ScriptError, plural
 
-ENOUGH = 1e3  # strain increment / round-off above which its stiffness is known
-LEAST = 0.01  # smallest stiffness / stiffness at rest that is used
+ENOUGH = 1e3  # strain increment / round-off above which the stiffness of an increment is used
+LEAST = 0.01  # smallest stiffness / stiffness at rest of an increment that is used
 SMALL = 0.01  # step / relaxation time below which a series is exact
 
 
@@ -63,7 +63,7 @@ def is_isotropic(law: Any) -> bool:
     along = [strained(law, 4 * k)[k] for k in range(3)]
     shears = [strained(law, component)[k] for k, component in ((3, 1), (4, 2), (5, 5))]
     across = strained(law, 0)[1]
-    # 2 G from shear, and from the stresses along and across an axial strain
+    # 2 G from shear, and from the stresses along and across an axial strain.
     even = [2 * shears[0] / (along[0] - across), 1.0]
     return max(map(np.ptp, (along, shears, max(along) * np.array(even)))) < 1e-3 * max(along)
 
@@ -126,9 +126,9 @@ def shifted(shift, dt, T):
 class Branch(NamedTuple):
     in_lanes = True
 
-    g: float  # relaxing fraction of stiffness
+    g: float  # relaxing fraction of the stiffness
     tau: float
-    softness: float  # 1/(4 g G): stored energy / stress squared
+    softness: float  # stored energy / squared stress, 1/(4 g G)
     rest: Any
 
 
@@ -221,10 +221,10 @@ known_failure(
 
 class State(NamedTuple):
     elastic: Any
-    branches: Any  # h of the first branch, and of the rest
+    branches: Any  # h of the first branch, and h of all other branches
     loss: Any  # dissipated energy per reference volume
-    gone: Any  # energy of the elastic law not stored, per reference volume
-    stiffness: Any  # shear stiffness of the last strain / stiffness at rest
+    gone: Any  # elastic energy that is not stored, per reference volume
+    stiffness: Any  # shear stiffness of the last increment / stiffness at rest
 
 
 def at_rest(branches, kin):
@@ -276,13 +276,13 @@ def stiffness_along(branches, added, strain, last):
     """Return shear stiffness along a strain increment / stiffness at rest, or the `last` one."""
     square = inner(strain, strain)
     known = square > (ENOUGH * round_off(square)) ** 2
-    # 1/(2 G) at rest is 2 g softness
+    # At rest, 1/(2 G) is 2 g softness.
     rise = inner(added, strain) / where(known, square, 1) * (2 * branches.g * branches.softness)
     return where(known & (rise > LEAST), rise, last)
 
 
 def strain_of(dl):
-    """Return Almansi's strain of I + dl, conjugate to the Kirchhoff stress after the step."""
+    """Return Almansi's strain of I + dl, the conjugate of the Kirchhoff stress after the step."""
     back = dl @ inv(I + dl)
     return sym(back) - 0.5 * sym(back.transposed() @ back)
 
@@ -305,7 +305,7 @@ def _advance_viscoelastic(law, kin, state, dl, dt):
     stiffness = stiffness_along(law.branches, added, dev(strain), state.stiffness)
     branches, loss = decayed(law.branches, state.branches, plain, added, dt)
     loss /= stiffness
-    # work that is not done because of relaxation
+    # Work that relaxation prevents.
     lost = lost_stress(law, kin, before, state.branches).carried(plain)
     lost += lost_stress(law, kin, after, branches)
     gone = state.gone + loss + 0.5 * inner(lost, strain)
@@ -349,7 +349,7 @@ def around_elastic(outer, stiffening):
 
 
 def _stiffening(law, kin, state):
-    # the relaxed part of the elastic stress
+    # The relaxed part of the elastic stress.
     s = dev(laws.kirchhoff_stress(law.elastic, kin, state.elastic))
     lost = lost_stress(law, kin, s, state.branches).largest_row_sum()
     return 2 * lost * laws.specific_volume(law)

@@ -1,7 +1,7 @@
 """Artificial viscosity, which spreads shocks over a few cells.
 
-An equation of state adds it to `eos_strength` as a part, with a pressure q as history variable.
-A heat flux may accompany it (Noh 1987, "Errors for calculations of strong shocks using an
+An equation of state adds viscosity to `eos_strength` as a part, with a pressure q as history
+variable. A heat flux may accompany it (Noh 1987, "Errors for calculations of strong shocks using an
 artificial viscosity and an artificial heat flux", J. Comput. Phys. 72): viscosity alone overheats
 gas at a wall, an axis or a point.
 """

@@ -18,14 +18,14 @@ from karamelo_py.points import noise
 class TransferTraits(NamedTuple):
     inverts_spread: bool = False  # uses the inverse of D = sum_I N_I (X_I - x)(X_I - x)^T
     retains: bool = False  # points retain the fraction `alpha` of their velocity
-    per_time: bool = False  # alpha is for a stable step
+    per_time: bool = False  # alpha applies to a stable step
     keeps_gradient: bool = False  # `Moment` is the velocity gradient
     series: bool = False  # the new velocity is a series, which needs further passes over the points
-    # fraction of the stable step with musl in the total frame
+    # Fraction of the stable step with musl in the total frame.
     share_in_total: float = 1.0
-    # fractions of the stable step of isolated points in flowing material, with musl and with usl
+    # Fractions of the stable step of isolated points in flowing material, with musl and with usl.
     lone_shares: tuple[float, float] = (1.0, 1.0)
-    # points retain more of their gradients at walls if other points are near
+    # Points at walls retain more of their gradients if other points are near.
     by_company: bool = False
     restrictions: Restrictions | None = None
 
@@ -62,7 +62,7 @@ def in_step(transfer, kept):
 
 @point_function()
 def lost_fractions(transfer, template):
-    """Return fractions (2,) of the energy that mapping to the nodes and back removes for good.
+    """Return the fractions (2,) of energy lost for good in mapping to the nodes, and back.
 
     Stored moments return the rest. If the function is not defined, the loss is not recorded.
     """
@@ -70,7 +70,7 @@ def lost_fractions(transfer, template):
 
 @point_function(otherwise=True)
 def displacing_velocity(transfer, v, v_pic, j):
-    """Return the velocity that moves a point, from `v` after the step and its `known_volume` j."""
+    """Return the velocity that moves a point, given `v` after the step and the `known_volume` j."""
     return v_pic
 
 
@@ -123,7 +123,7 @@ def fraction(transfer, moment, kept):
 
 @point_function(otherwise=True)
 def affine_part(transfer, moment):
-    """Return the tensor of a moment, which alone is stored of an angular velocity."""
+    """Return the tensor of a moment; for an angular velocity, only the tensor is stored."""
     return moment
 
 
@@ -145,7 +145,7 @@ def gradient_weight(transfer, node):
 
 @point_function(otherwise=True)
 def forces_by_arms(transfer, kin):
-    """Return True (a compile-time constant) if `gradient_weight` is N_I D^-1 (X_I - x)."""
+    """Return True, known when compiled, if `gradient_weight` is N_I D^-1 (X_I - x)."""
     return False
 
 
@@ -161,7 +161,7 @@ def terms(transfer):
 
 
 def _inside_out(moment, scene):
-    # strain computed from moments, as in MLS
+    # The strain is computed from moments, as in MLS.
     by_moments = gradient_weight.defined(type(scene.transfer))
     growing = not scene.transfer.traits.inverts_spread or by_moments
     return scene.moments and scene.vanishing and growing

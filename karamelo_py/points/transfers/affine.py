@@ -1,8 +1,8 @@
 """Affine transfers: the point stores the moment B = sum_I N_I v*_I (X_I - x_p)^T of velocity.
 
-It gives a node m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Unlike C = B D^-1, B conserves angular
-momentum to round-off even if D varies within the cell (Jiang, Schroeder & Teran 2017, "An angular
-momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
+A point gives a node m_p (N_I v_p + B_p N_I D^-1 (X_I - x_p)). Unlike C = B D^-1, B conserves
+angular momentum to round-off even if D varies within the cell (Jiang, Schroeder & Teran 2017, "An
+angular momentum conserving affine-particle-in-cell method", eqs. 15 to 18).
 """
 
 from typing import Annotated, NamedTuple
@@ -17,7 +17,7 @@ from karamelo_py.points.transfers import Moment, TransferTraits
 from karamelo_py.points.transfers.flip import Share, blend, take_nodal_velocity, warn_of_vibrations
 
 COMPRESSED = 1e-3  # volume strain above which a compressed point moves with the grid
-SEPARATE = 0.1  # tolerable separation of elastic bodies
+SEPARATE = 0.1  # tolerated separation of elastic bodies
 
 
 class APIC(NamedTuple):
@@ -43,7 +43,7 @@ class APIC(NamedTuple):
 class AFLIP(NamedTuple):
     """FLIP's mean velocity with APIC's moment.
 
-    It has less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021,
+    AFLIP has less noise than FLIP and less damping than APIC (Fei, Guo, Wu, Huang & Gao 2021,
     "Revisiting integration in the material point method", section 4).
 
     Parameters
@@ -66,8 +66,8 @@ class AFLIP(NamedTuple):
 class ASFLIP(NamedTuple):
     """AFLIP in which points need not move with the grid velocity where the material separates.
 
-    It is meant for granular flow and splashes (Fei et al. 2021, section 5). Points compressed by
-    more than 0.1 % of their volume move with the grid.
+    Use it for granular flow and splashes (Fei et al. 2021, section 5). Points compressed by more
+    than 0.1 % of their volume move with the grid.
 
     Parameters
     ----------

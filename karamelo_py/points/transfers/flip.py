@@ -119,7 +119,7 @@ def _lost_fractions_flip(transfer, template):
 
 
 def warn_of_vibrations(transfer: type) -> None:
-    """Warn of large vibrations, which only usl damps."""
+    """Warn of large vibrations, which are damped only by usl."""
     known_failure(
         transfer,
         "large vibrations",

@@ -14,7 +14,7 @@ from karamelo_py.points.basis.product import item, places_of, weights_of
 from karamelo_py.points.kinematics import outer, planar, product, vector, zero
 from karamelo_py.points.transfers import Moment, TransferTraits
 
-# sets of directions with stored mixed derivatives, by dimension
+# Sets of directions whose mixed derivatives are stored, by dimension.
 MIXED = (), (), ((0, 1),), ((0, 1), (0, 2), (1, 2), (0, 1, 2))
 
 
@@ -36,8 +36,8 @@ class Modes(Moment):
 class PolyPIC(NamedTuple):
     """PolyPIC: a point stores the multilinear velocity of its cell (4 modes in 2D, 8 in 3D).
 
-    It is for the total frame with a linear basis. A disk that vibrates for 20 periods loses 4 % of
-    its energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
+    Use PolyPIC in the total frame with a linear basis. A disk that vibrates for 20 periods loses 4
+    % of its energy with 4 cells in the radius and less than 0.1 % with 8 (APIC: 20 and 13 %).
 
     Example
     -------
@@ -51,7 +51,7 @@ class PolyPIC(NamedTuple):
     point_fields = (Modes,)
     traits = TransferTraits(
         keeps_gradient=True,
-        share_in_total=0.75,  # a vibrating block gains energy at 0.9 h/c, none at 0.7
+        share_in_total=0.75,  # a vibrating block gains energy at 0.9 h/c, but not at 0.7
         restrictions=Restrictions(
             "transfer PolyPIC", "APIC",
             only={"method": ("tlmpm",), "basis": ("linear",)},

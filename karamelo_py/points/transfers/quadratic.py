@@ -17,17 +17,17 @@ from karamelo_py.points.kinematics import outer, planar, vector, zero
 from karamelo_py.points.transfers import Moment, NodalMass, TransferTraits
 from karamelo_py.points.transfers.flip import take_nodal_velocity
 
-# Squared mode under the weights, in cells, below which points at walls lose it. Away from walls it
-# is 0.16 to 0.22 along a line and 1/9 of mixed modes.
+# Smallest square of a mode under the weights, in cells; points at walls lose modes below it. Away
+# from walls it is 0.16 to 0.22 along a line and 1/9 of mixed modes.
 LEAST = 0.002
 
 
 class Quadratic(NamedTuple):
     affine: Any  # (d, d) B = sum N v r^T
-    curved: tuple  # (d,) sum N v q for each mode, r in cells
+    curved: tuple  # (d,) sum N v q of each mode, with r in cells
 
 
-# directions of each mode, by dimension
+# Directions of each mode, by dimension.
 PAIRS = tuple(tuple((i, j) for i in range(d) for j in range(i, d)) for d in range(4))
 
 
@@ -40,9 +40,9 @@ class QuadraticModes(Moment):
 class PolyPICQuadratic(NamedTuple):
     """PolyPIC with a quadratic velocity field around each point (6 modes in 2D, 10 in 3D).
 
-    It is for cubic splines. It damps vortices and vibrations less than APIC: with 20 cells, the
-    velocities of `inputs/defaults/in.taylor_green` err by 2 %, with APIC by 7 %. Liquids take
-    shorter steps, as splashes gain energy otherwise.
+    Use PolyPIC/quadratic with cubic splines. It damps vortices and vibrations less than APIC: with
+    20 cells, the velocities of `inputs/defaults/in.taylor_green` err by 2 %, with APIC by 7 %.
+    Liquids take shorter steps, as splashes gain energy otherwise.
 
     Example
     -------
@@ -100,7 +100,7 @@ def modes(node):
 
 
 def inverse(square):
-    """Return 1 / square, but towards 0 below the least one."""
+    """Return 1 / square, or a smaller number if the square is below the least one."""
     return where(square > LEAST, 1 / max(square, LEAST), square * square / LEAST**3)
 
 

@@ -24,7 +24,7 @@ class Reflected(StepField):
 
 
 class Series(SummedField):
-    """Term of the series at a node, and the sum that becomes the next term."""
+    """Term k of the series at a node, and the sum that becomes term k + 1."""
 
     shape = numbers(0, 2)
 

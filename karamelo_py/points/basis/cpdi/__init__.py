@@ -34,22 +34,22 @@ class Element(NamedTuple):
 
 
 class ConvectedDomain(NamedTuple):
-    """Base of CPDI bases with 2^d corners; subclasses add `dimension` and `shape`.
+    """Base of CPDI bases with 2^d corners; subclasses define `dimension` and `shape`.
 
-    Affine transfers use distances of nodes from the centre sum_I N_I X_I. It differs from the point
-    if corners are beyond the grid, or if the domain is not a parallelogram or parallelepiped.
-    Angular momentum is conserved about the centres; about the points it varies by 0.1 % of its
-    variation with FLIP (a spinning square, Q4).
+    Affine transfers use distances of nodes from the centre sum_I N_I X_I. The centre differs from
+    the point if corners are beyond the grid, or if the domain is not a parallelogram or
+    parallelepiped. Angular momentum is conserved about the centres; about the points it varies by
+    0.1 % of its variation with FLIP (a spinning square, Q4).
     """
 
     traits = BasisTraits(cells=3, least_nodes=2, steady_moment=True, steep_edge=False)
-    line_nodes = 2  # per corner
+    line_nodes = 2  # nodes per corner and direction
     in_lanes = True
     element = None
 
 
 class CarriedDomain(ConvectedDomain):
-    """Base of domains with corners moved by the grid; subclasses add `element`."""
+    """Base of domains whose corners move with the grid; subclasses define `element`."""
 
     __slots__ = ()
     traits = ConvectedDomain.traits._replace(shape=("corners",))
@@ -94,7 +94,7 @@ def upright(basis, kin, location):
 
 
 class Corner(NamedTuple):
-    cell: tuple[int, ...]  # per direction
+    cell: tuple[int, ...]  # cell of a corner, per direction
     fractions: tuple[float, ...]
     at: Any  # cell + fractions, a vector
 
@@ -125,7 +125,7 @@ def along_cell(grid, direction, x):
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
+    a = min(max(real(0, a), a), real(cells, a))  # this order turns NaN into 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 

@@ -1,6 +1,6 @@
 """Sums over the corners of a 2D domain at its 3 x 3 nodes, so that each node is loaded once.
 
-In 3D, with 27 nodes and eight corners, this would cost more than it saves.
+In 3D, with 27 nodes and eight corners, such sums would cost more than they save.
 """
 
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ WIDTH = 3  # nodes per direction
 
 
 class NodeBlock(NamedTuple):
-    first: tuple[int, ...]  # node number per direction
+    first: tuple[int, ...]  # number of the first node, per direction
     weights: tuple[float, ...]
     gradients: tuple[Any, ...]  # gradients of corners, without N / r
     holds: bool  # all corners are inside and walls remove no node

@@ -90,7 +90,7 @@ def _extent_parallel(basis, kin, grid, location):
         total([abs(a) for a in parts]) for parts in zip(*half_edges(kin, location), strict=True)
     ]
     far = away[0]
-    for other in away[1:]:  # so that NaN remains NaN
+    for other in away[1:]:  # NaN remains NaN
         far = far + max(other - far, 0)
     return max(far * grid.inv_h, cpdi.LEAST[kin.dimension])
 
@@ -169,7 +169,7 @@ class Q4(cpdi.CarriedDomain):
 @cpdi.domain.on(Q4)
 def _domain_q4(basis, kin, location):
     x1, y1, x2, y2, x3, y3, x4, y4 = location[2:]
-    # Diagonals, whose cross product is 2 V.
+    # Products of the diagonals, whose cross product is 2 V.
     px, py = x3 - x1, y3 - y1
     qx, qy = x4 - x2, y4 - y2
     double = px * qy - qx * py

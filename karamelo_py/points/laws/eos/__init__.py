@@ -16,7 +16,7 @@ def initial_energy(eos, template):
 
 
 class VolumeStep(NamedTuple):
-    before: Any  # volume ratio
+    before: Any  # volume ratio before the step
     j: Any  # volume ratio after the step
     dt: Any
 
@@ -80,7 +80,7 @@ def compression_energy(eos, j, memory):
 
 @point_function()
 def ratio_at_pressure(eos, p, heat):
-    """Return the volume ratio at the pressure p, or nearest to it."""
+    """Return the volume ratio at the pressure p, or at the nearest pressure that exists."""
 
 
 @point_function(otherwise=True)

@@ -54,7 +54,7 @@ class ByPressure:
     start: ClassVar[int]
     p: ClassVar[Code]
     slopes: ClassVar[tuple[Code, ...]]  # derivatives of p with respect to J and E
-    linear: ClassVar[bool]  # p is linear in E
+    linear: ClassVar[bool]  # True if p is linear in E
 
 
 class GasByPressure(ByPressure):
@@ -234,7 +234,7 @@ class MieGrueneisen(NamedTuple):
 
 
 class EnergyAndHeat(NamedTuple):
-    E: Any  # per reference volume
+    E: Any  # internal energy per reference volume
     heat: Any  # part of E that is not work of the pressure
 
 

@@ -67,11 +67,11 @@ class Tait(NamedTuple):
     specific_volume: float
     K: float  # bulk modulus / gamma
     gamma: float
-    tension: float = inf  # largest tension; the formula itself limits it to K
+    tension: float = inf  # largest tension; the formula itself limits tension to K
 
     @classmethod
     def given(cls, rho0: AboveZero, K: AboveZero, gamma: AboveZero, *, tension: FromZero = inf):
-        if gamma > 100 > K:  # exponents of liquids are below 15
+        if gamma > 100 > K:  # such constants are swapped: exponents of liquids are below 15
             raise ScriptError(
                 f"K = {K:g} and gamma = {gamma:g} are swapped: gamma is an exponent",
                 argument="gamma",
@@ -185,7 +185,7 @@ class IdealGas(NamedTuple):
 
     specific_volume: float
     gamma: float
-    energy: float  # initial E, per reference volume
+    energy: float  # initial E per reference volume
 
     @classmethod
     def given(
@@ -257,7 +257,7 @@ known_failure(
 
 
 class InternalEnergy(NamedTuple):
-    E: Any  # per reference volume
+    E: Any  # internal energy per reference volume
 
 
 @initial_energy.on(IdealGas)
@@ -350,7 +350,7 @@ class Jwl(NamedTuple):
     R1: float
     R2: float
     omega: float
-    energy: float  # initial E, per reference volume
+    energy: float  # initial E per reference volume
     D: float
     cell_size: float  # set when the scene is lowered
 
@@ -365,7 +365,7 @@ known_failure(
 
 
 class Burning(NamedTuple):
-    E: Any  # per reference volume
+    E: Any  # internal energy per reference volume
     since: Any  # time since ignition, negative before
 
 

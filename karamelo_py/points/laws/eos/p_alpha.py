@@ -157,7 +157,7 @@ def _compressed_p_alpha(eos, memory, step, heating):
         new = p - excess / (1 - (K - solid) * slope / (alpha * alpha))
         new = where((low < new) & (new < high), new, 0.5 * (low + high))
         settled = abs(new - p) <= 4 * round_off(p) * eos.ps
-        p = where(moves, new, p)  # the same number of passes in all lanes
+        p = where(moves, new, p)  # makes the number of passes the same in all lanes
         moves = moves & (not settled)
         if not any_lane(moves):
             break

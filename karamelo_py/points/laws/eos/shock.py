@@ -59,7 +59,7 @@ class ShockConstants(NamedTuple):
 
     Voids open at constant tension and close before the material sustains pressure again. In the
     acoustic approximation the free surface velocity drops by 2 tension/(rho0 c0) (Antoun et al.
-    2003, Spall Fracture, section 4.2). The remaining tension slows the spalled layer further,
+    2003, Spall Fracture, section 4.2). The tension that remains slows the spalled layer further,
     unless a damage releases it.
 
     In compression, with the rate of volume change d < 0, cell size h and speed of sound c, the
@@ -106,7 +106,7 @@ class Shock(NamedTuple):
     S: float
     thermal: float  # Gamma rho0 cv, per kelvin above Tr
     Tr: float
-    tension: float = inf  # largest
+    tension: float = inf  # largest tension
 
 
 known_failure(
@@ -172,7 +172,7 @@ def _compression_energy_shock(eos, j, memory):
     flat = 1 - y
     in_tension, near = closed < 0, y < 1e-3
     log_of = logarithm(where(in_tension, j, flat))
-    # near 1 the closed form is a small difference
+    # near 1 the closed form is a small difference of large terms
     few = inside * inside * (0.5 + y * (2 / 3 + 0.75 * y))
     log_of_flat = log_of + ((1 - flat) - y) / flat  # corrects the rounding of 1 - y
     energy = where(near, few, (y / flat + log_of_flat) / where(near, 1, eos.S * eos.S))

@@ -20,11 +20,11 @@ class StrainStep(NamedTuple):
     strain: Any  # strain increment, including volume change
     j: Any  # volume ratio after the step
     dt: Any
-    extra: Any  # pressure in the nodal forces minus the point's (F-bar)
+    extra: Any  # pressure in the nodal forces minus pressure of the point (F-bar)
 
 
 class FrictionTrial(NamedTuple):
-    s: Any  # deviatoric
+    s: Any  # deviatoric stress
     p: Any
     K: Any
 
@@ -63,7 +63,7 @@ def initial_memory(strength, template):
 
 @point_function(otherwise=True)
 def respond(strength, law, kin, step, memories):
-    """Return deviatoric stress, history and dissipated work per unit volume after a `StrainStep`.
+    """Return deviatoric stress, history, and dissipated work per volume after a `StrainStep`.
 
     `memories` holds the history variables of all parts of the `law`.
     """

@@ -83,7 +83,7 @@ class JohnsonHolmquist2(NamedTuple):
     """
 
     in_lanes = True
-    crushing_breaks = False  # crushed pores count as damage
+    crushing_breaks = False  # True if crushed pores count as damage
 
     G: AboveZero
     A: AboveZero
@@ -195,7 +195,7 @@ answers(JohnsonHolmquist2, {added_pressure: "bulking"})
 
 @added_energy.on(JohnsonHolmquist2)
 def _added_energy_johnson_holmquist(strength, law, elastic, memories):
-    # (p + dP)^2/(2 K) - p^2/(2 K)
+    # Elastic energy of the added pressure, (p + dP)^2/(2 K) - p^2/(2 K).
     p = pressure(law.eos, elastic, memories.energy, memories.heat)
     p += sum(thermal_pressure(law.temperature, memories.heat))
     added = memories.strength.bulking
@@ -258,7 +258,7 @@ def _respond_johnson_holmquist(strength, law, kin, step, memories):
         lost = x + crushed_strain(law.eos, memories.energy, energy)
     damage = min(memory.damage + lost / failure, 1)
     weaker = intact - damage * (intact - broken)
-    # shear energy released beyond the plastic work
+    # Shear energy that is released beyond the plastic work.
     released = where(x > 0, (flow * flow - weaker * weaker) / (6 * strength.G), 0)
     K = stiffness_at_rest(law, memories)
     gained = where(p > 0, strength.beta * released, 0)

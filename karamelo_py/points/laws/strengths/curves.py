@@ -73,7 +73,7 @@ class Tabulated(NamedTuple):
 
 
 def _points(curve: tuple) -> np.ndarray:
-    """Return (n, 2) plastic strain and flow stress."""
+    """Return plastic strain and flow stress (n, 2) of a curve."""
     if len(curve) == 1 and isinstance(curve[0], Path):
         path = curve[0]
         try:
@@ -234,6 +234,6 @@ def _flow_stress_by_flow(strength, before, increment, dt):
     flow = evaluated(strength.flow, strength, at)
     by_strain, by_rate = [evaluated(code, strength, at) for code in strength.slopes]
     slope = by_strain + by_rate / dt
-    # With a slope of -3 G or less there is no solution; ep^0.3 at 0, and kinks, have no slope.
+    # There is no solution for slopes of -3 G or less; ep^0.3 at 0, and kinks, have no slope.
     slope = where(slope > -2 * strength.G, min(slope, STEEPEST * strength.G), -2 * strength.G)
     return max(flow, 0), slope

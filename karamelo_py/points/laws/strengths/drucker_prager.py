@@ -84,9 +84,9 @@ class DruckerPrager(NamedTuple):
     friction: float
     dilation: float
     tension: float
-    residual_cohesion: float  # after softening
+    residual_cohesion: float  # value after softening
     residual_friction: float
-    softening: float  # softening per unit of plastic strain; or 0
+    softening: float  # loss of the coefficients per unit of plastic strain; 0 without softening
 
     @classmethod
     def given(
@@ -117,7 +117,7 @@ def _tension_bound_drucker_prager(strength, lowest):
 
 @sines.on(DruckerPrager)
 def _sines_drucker_prager(strength, friction, dilation):
-    # half the in-plane principal stress difference in flow over sqrt(J2), and the dilatancy
+    # In flow: half of the in-plane principal stress difference over sqrt(J2), and the dilatancy.
     in_plane = sqrt(max(1 - dilation * dilation / 3, 1e-6))
     return friction * in_plane / max(1 - friction * dilation / 3, 1e-6), dilation / in_plane
 
@@ -135,7 +135,7 @@ def _pressure_response_drucker_prager(strength, kin, trial, strain):
         p += K * dilation * x
         root = cohesion + friction * p
         if p < lowest:
-            # Beyond the apex the trial pressure is used, see below.
+            # Beyond the apex the trial pressure is used (below).
             p -= K * dilation * x
     if p < lowest:
         p = lowest

@@ -55,7 +55,7 @@ def lowest_pressure(strength, strain):
 
 @point_function(otherwise=True)
 def tension_bound(strength, lowest):
-    """Return the lowest pressure if the yield surface ends at `lowest`."""
+    """Return the lowest pressure of a yield surface that ends at `lowest`."""
     return lowest
 
 
@@ -69,7 +69,7 @@ def fraction_by_dilatancy(strength, memory):
     (f - d)/(f (1 - d)) it is a square and never negative.
     """
     f, d = sines_after(strength, memory.ep)
-    # the sine of a steep cone in plane strain may exceed 1
+    # The sine of a steep cone in plane strain may exceed 1.
     return where(f > d, min((f - d) / (where(f > d, f, 1) * max(1 - d, 1e-3)), 1), 0)
 
 
@@ -94,7 +94,7 @@ def respond_by_friction(strength, law, kin, step, memories):
     trial = elastic_trial(strength.G, step.s, step.strain)
     elastic = elastic_ratio(strength, memory, step.j)
     warm = sum(thermal_pressure(law.temperature, heat))
-    # including pores that are crushed in the trial
+    # The pressure includes pores that are crushed in the trial.
     energy = compressed(law.eos, memories.energy, VolumeStep(elastic, elastic, step.dt), 0)
     p_point = pressure(law.eos, elastic, energy, heat) + warm
     extra = fbar_fraction(strength, memory) * step.extra
@@ -184,7 +184,7 @@ def _vibrates(strength, scene):
     alone = f < STEEP or strength.cohesion > 0
     if not f or scene.simulation.implicit or scene.d == 1 or (alone and not averaged):
         return None
-    least = f - (FED if averaged else FED_ALONE) / f  # G/(K + G/3)
+    least = f - (FED if averaged else FED_ALONE) / f  # bound of G/(K + G/3)
     for solid in scene.hub.solids.values():
         law = solid.material.law
         if parameter(law, "strength") is strength:
@@ -208,7 +208,7 @@ def _poisson(K_over_G):
 
 
 class Soil(NamedTuple):
-    """Constants as in scripts: angles in degrees, None without softening."""
+    """Constants as in scripts: angles are in degrees, None means no softening."""
 
     cohesion: float
     phi: float

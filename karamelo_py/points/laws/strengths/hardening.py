@@ -21,7 +21,7 @@ from karamelo_py.points.laws.temperatures import temperature_or, thermal_pressur
 
 
 def elastic_trial(G, s, strain):
-    # Deviator of the sum, as otherwise rounding in many steps would give s a trace.
+    # dev() acts on the sum, as rounding in many steps would give s a trace.
     return dev(s + 2 * G * strain)
 
 
@@ -144,7 +144,7 @@ def radial_return(strength, kin, step, memory, heat):
 
 
 class Around(NamedTuple):
-    """Arguments of a flow stress that depends on pressure, instead of `heat`."""
+    """Arguments of a flow stress that depends on pressure, used instead of `heat`."""
 
     T: Any
     p: Any
@@ -175,13 +175,13 @@ _MOST_ITERATIONS = 80
 
 @shared
 def plastic_increment(strength, q, memory, heat, dt):
-    """Solve q - 3 G x = flow stress for the plastic strain x of a step; 0 for smaller q.
+    """Solve q - 3 G x = flow stress for the plastic strain x of a step; x is 0 for smaller q.
 
     The left side falls with x and the flow stress does not fall, so x is unique for any step size.
     Newton's method is safeguarded by bisection.
     """
     slope = 3 * strength.G
-    enough = 4 * round_off(q) * q  # rounding of the three terms
+    enough = 4 * round_off(q) * q  # round-off of the three terms
     small = sqrt(round_off(q)) * q
     low, high = 0.0, q / slope
     active = q > 0
@@ -203,7 +203,7 @@ def plastic_increment(strength, q, memory, heat, dt):
         done = (abs(excess) <= enough) | (next_is_small & (abs(excess) <= small))
         within = (low < new) & (new < high)
         middle = 0.5 * (low + high)
-        # rounding must not reduce plastic strain
+        # Rounding must not reduce the plastic strain.
         x = where(active, max(where(done | within, new, middle), 0), x)
         last = change
         active = active & (not (done | (middle <= low) | (middle >= high)))
@@ -215,7 +215,7 @@ def plastic_increment(strength, q, memory, heat, dt):
 @implements(plastic_increment, Dual)
 def _plastic_increment_slopes(strength, q, memory, heat, dt):
     # The excess e(x, q, ...) vanishes: x' = -e' / (de/dx), with e' at fixed x.
-    plain = value_of(strength)  # the modulus may depend on pressure
+    plain = value_of(strength)  # the modulus in it may depend on pressure
     x = plastic_increment(plain, value_of(q), value_of(memory), value_of(heat), dt)
     flow, hardening = flow_stress(strength, before_flow(strength, memory, heat), x, dt)
     excess = q - 3 * strength.G * x - flow

@@ -153,5 +153,5 @@ def _inviscid_viscous(strength):
 
 @strengths.damped_speed_squared.on(Viscous)
 def _damped_speed_squared_viscous(strength, squared, density):
-    # nu = 4/3 mu/rho
+    # The viscosity is nu = 4/3 mu/rho.
     return damped(squared, 4 / 3 * strength.mu / (density * strength.cell_size))

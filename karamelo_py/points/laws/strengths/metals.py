@@ -150,7 +150,7 @@ def power_law(factor, exponent, strain, value, increment):
 def power_law_guess(exponent, strain, hard, excess, slope):
     """Return `first_guess` from two derivatives of the power law `hard` (Chebyshev's method).
 
-    `excess` is stress minus flow stress; it decreases by `slope` per unit of strain.
+    `excess` is stress minus flow stress, which decreases by `slope` per unit of strain.
     """
     some = strain > round_off(strain)
     inverse = where(some, 1 / where(some, strain, 1), 0)
@@ -172,7 +172,7 @@ def _precompute_johnson_cook(strength, memory, heat):
 @first_guess.on(JohnsonCook)
 def _first_guess_johnson_cook(strength, before, q, slope):
     if not isinstance(strength.rate, Absent):
-        return real(0, q), real(0, q)  # the precomputed part does not include the rate
+        return real(0, q), real(0, q)  # without a precomputed part, which does not include the rate
     hard, soft = before.precomputed
     excess = q - (strength.A + hard) * soft
     return power_law_guess(strength.n, before.memory.ep, hard * soft, excess, slope)
@@ -323,7 +323,7 @@ def _flow_stress_zerilli_armstrong(strength, before, increment, dt):
     ep = before.memory.ep
     athermal, slope = power_law(strength.C5, strength.n, ep, athermal, increment)
     root, root_slope = power_law(strength.C2, 0.5, ep, root, increment)
-    # exp(C4 T ln(rate)) is the rate to a power
+    # exp(C4 T ln(rate)) is computed as a power of the rate.
     exponent = strength.C4 * temperature_or(before.heat, strength.initial_temperature)
     rate = increment / (dt * strength.epsdot0)
     at_rate = power_of_strain(1, exponent, rate)

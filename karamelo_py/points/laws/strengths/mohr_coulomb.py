@@ -62,9 +62,9 @@ class MohrCoulomb(NamedTuple):
     cohesion: float  # c cos(phi)
     friction: float  # sin(phi)
     dilation: float  # sin(psi)
-    residual_cohesion: float  # after softening
+    residual_cohesion: float  # value after softening
     residual_friction: float
-    softening: float  # per unit of plastic strain; or 0
+    softening: float  # softening per unit of plastic strain, or 0
 
     @classmethod
     def given(
@@ -94,24 +94,24 @@ def returned_to_plane(s, yield_surface, G, K):
     """
     k, sin_phi, sin_psi = yield_surface
     lam = K - 2 / 3 * G
-    # normals of yield function and plastic potential: (1 + sin, 0, sin - 1)
+    # Normals of yield function and plastic potential are (1 + sin, 0, sin - 1).
     mean = 4 * lam * sin_phi * sin_psi
     up = 2 * G * (1 + sin_phi) * (1 + sin_psi)
     down = 2 * G * (1 - sin_phi) * (1 - sin_psi)
     f = s[0] - s[2] + (s[0] + s[2]) * sin_phi - 2 * k
     volume = 2 * lam * sin_psi  # lam tr(m)
-    rise = 2 * G * (1 + sin_psi) + volume  # C m of the largest
+    rise = 2 * G * (1 + sin_psi) + volume  # C m of the largest stress
     fall = volume - 2 * G * (1 - sin_psi)  # fall of the smallest; `volume` of the other
     x = f / (up + down + mean)
     s1, s2, s3 = s[0] - x * rise, s[1] - x * volume, s[2] - x * fall
     if s1 >= s2 and s2 >= s3:
         return s1, s2, s3
     if s2 > s1:
-        # triaxial extension: planes 1-3 and 2-3
+        # Triaxial extension: both planes 1-3 and 2-3 are active.
         other = s[1] - s[2] + (s[1] + s[2]) * sin_phi - 2 * k
         cross = down + mean
     else:
-        # triaxial compression: planes 1-3 and 1-2
+        # Triaxial compression: both planes 1-3 and 1-2 are active.
         other = s[0] - s[1] + (s[0] + s[1]) * sin_phi - 2 * k
         cross = up + mean
     a = up + down + mean
@@ -121,7 +121,7 @@ def returned_to_plane(s, yield_surface, G, K):
     if s2 > s1:
         t1 = s[0] - x * rise - y * volume
         t3 = s[2] - (x + y) * fall
-        # from both planes, which give equal values except for rounding
+        # From both planes, which give equal values except for round-off.
         t1 = (2 * k + (1 - sin_phi) * t3) / (1 + sin_phi)
         if t1 >= t3:
             return t1, t1, t3
@@ -138,7 +138,7 @@ def returned_to_plane(s, yield_surface, G, K):
 def _pressure_response_mohr_coulomb(strength, kin, trial, strain):
     s, p, K = trial
     k, sin_phi, _ = yield_surface = surface(strength, strain)
-    # cheap bound of the yield function
+    # A cheap bound of the yield function.
     root = sqrt(0.5 * inner(s, s))
     bound = 2 * root + sin_phi * (root / sqrt(3) - 2 * p) - 2 * k
     if bound <= 0:

@@ -64,7 +64,7 @@ class MuI(NamedTuple):
     rho_s: AboveZero
 
     def checked(self):
-        """Refuse friction that decreases with the rate, as flow would be unstable."""
+        """Refuse friction that decreases with the rate, with which flow would be unstable."""
         if self.mu_2 < self.mu_s:
             raise ScriptError(
                 f"the friction of fast flow, {self.mu_2:g}, is below the friction of slow flow",
@@ -97,7 +97,7 @@ SLOW = 0.05  # numerical viscosity / viscosity of the grains, for a warning
 def _slows(strength, scene):
     """Compare numerical viscosity (PIC) with the viscosity mu p/(rho gamma') of the grains.
 
-    p is taken at half a body's height, I as I0 / 2.
+    In this estimate, p is taken at half a body's height, and I as I0 / 2.
     """
     added = scene.grid_viscosity
     for solid in scene.hub.solids.values():
@@ -128,7 +128,7 @@ remembers(MuI, ep=0.0, inertial=0.0)
 
 @elastic_ratio.on(MuI)
 def _elastic_ratio_mu_i(strength, memory, j):
-    return min(j, 1)  # separated grains have no strain
+    return min(j, 1)  # separated grains are not strained
 
 
 @fbar_fraction.on(MuI)

@@ -19,7 +19,7 @@ from karamelo_py.points.laws.strengths.hardening import elastic_trial, onto_yiel
 from karamelo_py.points.laws.temperatures import thermal_pressure
 from karamelo_py.script.errors import ScriptError
 
-MOST_PASSES = 80  # Newton's method with bisection
+MOST_PASSES = 80  # iterations of Newton's method with bisection
 DENSE = 0.999999  # largest strain / strain of densification
 NO_VOIDS = 1e-12  # void fraction below which pressure does not yield
 
@@ -163,7 +163,7 @@ class Trial(NamedTuple):
 
 class PlasticStep(NamedTuple):
     x: float  # equivalent strain of a foam
-    work: float  # plastic, per unit volume
+    work: float  # plastic work per unit volume
     opening: float  # plastic volume strain
     tension: bool
 
@@ -235,7 +235,7 @@ def _returned_foam(strength, memory, trial):
     x, moves = low, outside
     for _ in range(MOST_PASSES):
         Y, slope = foam_flow(strength, memory.ep + x)
-        # q = q_t Y/(Y + 3 G x/c), and p likewise
+        # q = q_t Y/(Y + 3 G x/c), and p follows the same rule.
         a, b = 1 / (Y + stiff * x), 1 / (Y + bulk * x)
         q, p = trial.q * Y * a, trial.p * Y * b
         size = sqrt((q * q + strength.squared * p * p) / c)
@@ -274,7 +274,7 @@ def matrix(strength, ep):
 
 @most_recovered.on(Gurson)
 def _most_recovered_gurson(strength, memory):
-    return 1 / (1 - memory.f)  # all voids are closed
+    return 1 / (1 - memory.f)  # ratio at which all voids are closed
 
 
 @returned.on(Gurson)
@@ -282,7 +282,7 @@ def _returned_gurson(strength, memory, trial):
     Y, c = matrix(strength, memory.ep), voids(strength, memory.f)
     b = 1.5 * strength.q2 / Y
     size = abs(trial.p)
-    # acosh of (1 + c^2)/(2 c) is -ln c; beyond it q is 0.
+    # acosh of (1 + c^2)/(2 c) is -ln c; q is 0 for larger pressures.
     highest = where(c > NO_VOIDS, -logarithm(max(c, NO_VOIDS)) / b, size)
     top = min(size, highest)
     q, _, _ = on_gurson(Y, c, b, top)
@@ -304,7 +304,7 @@ def _returned_gurson(strength, memory, trial):
         if not any_lane(moves):
             break
     q, _, _ = on_gurson(Y, c, b, x)
-    # Voids that close within the step leave the matrix and its pressure.
+    # Voids that close within the step leave the matrix, and its pressure.
     least = where(trial.p > 0, size + trial.K * logarithm(1 - memory.f), 0)
     q, x = where(x < least, Y, q), max(x, least)
     p = where(trial.p < 0, -x, x)

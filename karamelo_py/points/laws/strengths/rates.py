@@ -27,7 +27,7 @@ from karamelo_py.points.laws.strengths.hardening import (
 )
 from karamelo_py.points.laws.temperatures import temperature_or
 
-MELTED = 1e-6  # smallest fraction of the shear modulus
+MELTED = 1e-6  # smallest factor g of the shear modulus
 LEAST = 1e-30  # smallest plastic strain in a step that counts as a rate
 
 
@@ -153,7 +153,7 @@ class Norton(NamedTuple):
     in_lanes = True
 
     G: float
-    log_A: float  # as A itself may be too small for single precision
+    log_A: float  # logarithm, as A itself may be too small for single precision
     n: float
     Q: float
     initial_temperature: float
@@ -187,7 +187,7 @@ def _flow_stress_norton(strength, before, increment, dt):
 
 @first_guess.on(Norton)
 def _first_guess_norton(strength, before, q, slope):
-    # Half the strain that relaxes all stress: Newton's method then converges from either side.
+    # Half of the strain that relaxes all stress: Newton's method then converges from either side.
     return 0.5 * q / slope, q - q
 
 
