@@ -115,8 +115,8 @@ def boundary(
     ----------
     style
         ``error`` (the default): the run ends with an explanation. ``delete``: the point is removed,
-        with its mass and momentum. ``reflect``: it is mirrored back inside, and its normal velocity
-        reversed. ``periodic``: it returns at the other end.
+        with its mass and momentum. ``reflect``: the point is mirrored back inside, and its normal
+        velocity reversed. ``periodic``: the point returns at the other end.
     directions
         The periodic directions (``periodic`` only).
     shear
@@ -265,7 +265,7 @@ def _domain(hub: Hub, forms: Forms, bounds: tuple[Argument, ...], count: int) ->
         raise
     domain.mark = hub.mark
     longest = max(b - a for a, b in zip(lo, hi, strict=True))
-    # A domain of a single cell is allowed: it is an element test.
+    # A domain may be a single cell, for an element test.
     if h is not None and h > longest * (1 + RELATIVE_TOLERANCE) and not own_grids(hub):
         hub.warn(
             f"cells of {h:g} are larger than the domain, whose longest side is {longest:g}: the "
@@ -310,7 +310,7 @@ def solid(hub: Hub, ID: str, kind: Annotated[str, StyleOf("solid")], *arguments:
     hub.solids.refuse(ID)
     refuse_late(hub)
     if not registry.knows("solid", kind):
-        # Scripts of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
+        # In scripts of 2020: solid(ID, regionID, ppc, ...) and solid(ID, cylinder, regionID, ...).
         if kind in hub.regions:
             arguments = (Argument(parse_text(kind)[0], hub.interpreter), *arguments)
             kind = "region"
@@ -378,8 +378,8 @@ def group(
     region
         ID of the region that selects the members, or name of the mesh file.
     of
-        ``all``, or ``solid`` followed by IDs of solids. For a mesh: name or number of its set, as
-        in region mesh.
+        ``all``, or ``solid`` followed by IDs of solids. For a mesh: name or number of a set in it,
+        as in region mesh.
     solids
         Select only points of these solids, or nodes of their grids.
 
@@ -426,7 +426,7 @@ def group(
     if count or region.unknown:
         return
     if kind == "nodes" and not solids and own_grids(hub):
-        members.awaits_solids = True  # the run warns if the group is still empty
+        members.awaits_solids = True  # the run warns if the group is then still empty
     else:
         none_yet = "no solid is made yet: groups of particles come after the solids"
         hub.warn(

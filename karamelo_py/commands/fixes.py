@@ -42,7 +42,7 @@ def fix(hub: Hub, ID: str, style: Annotated[str, StyleOf("fix")], *arguments: Ar
 
 
 def delete_fix(hub: Hub, ID: str) -> None:
-    """Remove a fix. Its published values stay available.
+    """Remove a fix. The published values of the fix stay available.
 
     Example
     -------
@@ -80,7 +80,7 @@ def compute(
 
 
 def delete_compute(hub: Hub, ID: str) -> None:
-    """Remove a compute. Its published values stay available.
+    """Remove a compute. The published values of the compute stay available.
 
     Example
     -------
@@ -138,7 +138,7 @@ def _refuse_wrong_order(kind: str, ID: str, style: str, arguments: tuple[Argumen
         expected = f"{kind}({ID}, {third}, {style}, ...)"
         raise ScriptError(message, mark=arguments[0].mark, expected=expected)
     if third and instead(kind, third):
-        registry.find(kind, third)  # raises an error that suggests a name
+        registry.find(kind, third)  # find() raises an error that suggests a name
 
 
 def _check_names(hub: Hub, kind: str, ID: str, style: type) -> None:
@@ -209,10 +209,10 @@ def internal_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes, it is the sum of the forces due to the stress of points and to fixes on points
-    (contact, tools, tractions). At held nodes it is the negative reaction, if accelerations are
-    small. For points it is the rate of change of their momentum in the last step, sum m a. It is 0
-    before the first step.
+    For nodes, the value is the sum of the forces due to the stress of points and to fixes on points
+    (contact, tools, tractions). At held nodes, the value is the negative reaction, if accelerations
+    are small. For points, it is the rate of change of their momentum in the last step, sum m a.
+    Before the first step, the value is 0.
 
     See Also
     --------
@@ -243,10 +243,10 @@ def external_force(hub: Hub, group: AnyGroup, direction: Direction) -> Expressio
 
     Notes
     -----
-    For nodes it is the force of fixes on nodes, such as body_force and force_nodes; for points, it
-    is the force of fixes on points (contact, tools, tractions). Reactions of prescribed velocities
-    are not included; their fixes publish them. It is 0 before the first step. (Karamelo returns
-    internal forces.)
+    For nodes, the value is the force of fixes on nodes, such as body_force and force_nodes; for
+    points, it is the force of fixes on points (contact, tools, tractions). Reactions of prescribed
+    velocities are not included; their fixes publish them. Before the first step, the value is 0.
+    (Karamelo returns internal forces.)
 
     See Also
     --------

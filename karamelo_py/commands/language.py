@@ -70,7 +70,7 @@ def value(hub: Hub, expression: Expression) -> float:
         return expression.constant
     if not expression.names.intersection(POINT_SEEDS):
         if hub.rehearsing:
-            return math.nan  # the value depends on earlier runs
+            return math.nan  # unknown here: the value depends on earlier runs
         if hub.interpreter.replay is not None:
             number = hub.interpreter.replay.value()
         else:

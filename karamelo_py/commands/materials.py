@@ -43,7 +43,7 @@ def material(
     solid
     """
     if style in hub.parts["eos"] and arguments and not registry.knows("material", style):
-        # Scripts of 2020 have no style: material(ID, eosID, strengthID).
+        # In scripts of 2020, there is no style: material(ID, eosID, strengthID).
         arguments = (Argument(parse_text(style)[0], hub.interpreter), *arguments)
         style = "eos-strength"
     define(hub, hub.materials, ID, style, arguments)
@@ -159,7 +159,8 @@ def load_path(
     turn
         Angle in radians by which the point rotates about z, in fixed axes.
     duration
-        Duration, for rate-dependent laws; default 1. Without strains or stresses, a hold time.
+        Duration, for rate-dependent laws; default 1. With neither strains nor stresses, the
+        duration of a hold.
 
     Example
     -------
@@ -221,8 +222,8 @@ def element(
 ) -> None:
     """Take one point of a material along a load path, to check its law before a run.
 
-    The command writes the table element_ID.txt and the plot element_ID.png. It needs no domain and
-    no compilation. The point begins stress-free; cam-clay begins at its pressure p0.
+    The command writes the table element_ID.txt and the plot element_ID.png. The test needs no
+    domain and no compilation. The point begins stress-free; cam-clay begins at its pressure p0.
 
     Parameters
     ----------

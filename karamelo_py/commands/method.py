@@ -202,7 +202,7 @@ def scheme(
         if (pair := arguments[-1].keyword() if arguments else None) and not error.hint:
             error.hint = meant(pair[0], ["start"])
             error.expected = "start=full or start=half" if error.hint else error.expected
-        for name in PUBLISHED:  # avoids follow-up errors about these names
+        for name in PUBLISHED:  # publishes the names, to avoid follow-up errors about them
             hub.values.publish(name)
         raise
     if start == "half" and chosen.traits.implicit:
@@ -301,7 +301,7 @@ class _Call:
         errors: list[ScriptError] = []
         for family, name in self.names.items():
             if family == "basis" and not errors:
-                break  # the word may be a shape of domains
+                break  # a word that may be a shape of domains
             try:
                 styles[family] = registry.find(family, name)
             except ScriptError as error:

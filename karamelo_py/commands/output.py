@@ -80,7 +80,7 @@ dump.syntax = "ID, all, style, every, file[, ...]"
 
 
 def delete_dump(hub: Hub, ID: str) -> None:
-    """Stop a dump. Its files remain.
+    """Stop a dump. The files of the dump remain.
 
     Example
     -------
@@ -93,7 +93,7 @@ def delete_dump(hub: Hub, ID: str) -> None:
     old = hub.dumps[ID]
     hub.dumps.remove(ID)
     if old.one_file_per_step:
-        # A file with several snapshots stays reserved, since another dump would overwrite it.
+        # A file with several snapshots stays reserved: another dump would overwrite it.
         hub.output.files.pop(old.file, None)
 
 

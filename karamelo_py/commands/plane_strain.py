@@ -79,7 +79,7 @@ def plane_strain(hub: Hub, *, ezz: Expression) -> None:
         message = "the scene has plane stress, in which ezz follows from the law"
         raise ScriptError(message, expected="plane_stress(false)")
     if ezz.is_constant and ezz.constant == 0:
-        return  # plane strain
+        return  # plane strain, without a prescribed ezz
     if domain.across is not None:
         message = f"ezz is prescribed already (line {domain.across.mark.line})"
         raise ScriptError(message, expected="one plane_strain, whose formula depends on time")

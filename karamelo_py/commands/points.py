@@ -253,7 +253,7 @@ def _polar(values: dict, places: dict) -> Placement:
     dr, dtheta = values["R"] / counts[1], 2 * math.pi / counts[2]
     r, theta = (rings + 0.5) * dr, angles * dtheta
     cosine, sine = np.cos(theta), np.sin(theta)
-    # Bounding box of the polar cell, approximated by a rectangle of r dtheta by dr.
+    # The polar cell is approximated by a rectangle of r dtheta by dr, and its bounding box used.
     along_r, along_theta = dr / 2, r * dtheta / 2
     columns = [values["c1"] + r * cosine, values["c2"] + r * sine]
     halves = [
@@ -279,7 +279,7 @@ def _polar(values: dict, places: dict) -> Placement:
 
 def _count(value: float, name: str, mark) -> int:
     if math.isnan(value):
-        return 1  # the value is unknown in a rehearsal
+        return 1  # in a rehearsal the value is unknown
     if value < 1 or value != math.floor(value):
         raise ScriptError(f"{name} must be a whole number of at least 1, not {value:g}", mark=mark)
     return int(value)

@@ -30,8 +30,8 @@ _STEPS_OR_NEVER = kind_of(Annotated[int, NonNegative])
 def carry_out(hub: Hub, **length: Any) -> None:
     """Run for `length` (see `RunLoop`), unless the script is only read or resumed.
 
-    A rehearsal only records the run, ``check`` prints a report instead of it, and a Python program
-    pauses before it (`Pause`). A resumed script skips runs that were complete.
+    In a rehearsal the run is only recorded; ``check`` prints a report instead of running, and a
+    Python program pauses before the run (`Pause`). A resumed script skips runs that were complete.
     """
     run = RunLoop(hub, **length, advice=Narrator(hub))
     check_scene(hub)
@@ -149,7 +149,7 @@ def run(hub: Hub, steps: Annotated[int, NonNegative], *, on_trouble: OnTrouble =
     -----
     The log shows positions and stresses at the end of a step, and velocities half a step earlier:
     after n steps of free fall, the kinetic energy is too low by the fraction 1/(n + 1). With
-    ``scheme(musl, start=half)`` all belong to the logged time.
+    ``scheme(musl, start=half)`` all values belong to the logged time.
 
     See Also
     --------

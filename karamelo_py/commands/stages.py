@@ -114,7 +114,7 @@ def _members(hub: Hub, group: ParticleGroup) -> np.ndarray:
 
 
 def _skipped(hub: Hub) -> bool:
-    """Return True to do nothing: in a rehearsal or a resumed script, points have another state."""
+    """Return True if the command does nothing: in a rehearsal or resumed script, points differ."""
     return hub.rehearsing or hub.interpreter.replay is not None
 
 

@@ -35,7 +35,7 @@ class Primitive(region.Region):
         if not self.across:
             return float(np.prod(sides))
         if (sides < (self.box_hi - self.box_lo)[: self.dimension]).take(self.across).any():
-            return None  # cut by the domain
+            return None  # no volume: the domain cuts the shape
         n = len(self.across)
         ball = math.pi ** (n / 2) / math.gamma(n / 2 + 1) * self.radius**n
         return ball * math.prod(float(sides[axis]) for axis, *_ in self.slabs)
@@ -224,7 +224,7 @@ class Plane(Primitive):
 
     @property
     def volume(self) -> None:
-        """None, since the domain cuts the half-space."""
+        """None, since the volume depends on where the domain cuts the half-space."""
 
     def __init__(self, hub: Hub, *plane: Argument):
         numbers, exterior = region.split_exterior(plane)
@@ -348,7 +348,7 @@ class Difference(region.Region):
         depth = np.minimum(first, -np.maximum.reduce(others))
         for operand in self.parts[1:]:
             same = self.parts[0].coincides(operand, x)
-            if same is not None:  # nothing is left; clipping would search for a thin sheet
+            if same is not None:  # nothing is left, and clipping would search for a thin sheet
                 depth[same] = np.minimum(depth[same], -reach)
         return depth
 

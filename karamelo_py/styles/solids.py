@@ -21,14 +21,14 @@ from karamelo_py.scene.tables import FileColumns
 from karamelo_py.script.errors import ScriptError
 
 MISSED = 0.01  # difference in volume, as a fraction, above which a warning is given
-COARSE = 0.08  # the same fraction for boxes and balls
+COARSE = 0.08  # MISSED for boxes and balls
 MANY = 10  # points per cell and direction above which a warning is given
 
 
 class RegionSolid(Solid):
     """A body that fills a region, with `ppc` points per cell and direction.
 
-    Points are placed in the cells of the grid, within the region and the domain. Each has the
+    Points are placed in the cells of the grid, within the region and the domain. Each point has the
     volume ``(h / ppc)^dimension`` (times x in axisymmetric domains).
 
     Parameters
@@ -88,7 +88,7 @@ class RegionSolid(Solid):
         self.ppc = ppc
         corners = {"corners", "half_edges"} & {*hub.update.method.basis.traits.shape}
         method = hub.update.method
-        # Whole boxes would make stair-steps, and the mass of a shape from a file would be wrong.
+        # Whole boxes would form stair-steps, and a shape from a file would have a wrong mass.
         stepped = method.fields_per_solid and not region.aligned
         drawn = region.from_file and not method.regular_points
         if points is None and (stepped or drawn) and not (corners or region.unknown):
@@ -241,7 +241,7 @@ class PointsSolid(Solid):
             )
         half = volumes[:, None] ** (1 / d) / 2 * np.ones(d)
         kept = domain.contains(x)
-        # T comes first: the stress depends on the temperature of the point.
+        # T comes first, as the stress depends on the temperature of the point.
         order = sorted(columns, key=lambda name: name != "T")
         self.initial = {name: columns[name][kept] for name in order}
         near, size = (x[kept], half[kept]) if kept.any() else (x, half)

@@ -108,7 +108,7 @@ class Heights(Enclosed):
         ):
             return None
         apart = np.abs(self.heights - other.heights) > self.tolerance
-        for axis in range(apart.ndim):  # a cell is apart if one of its corners is
+        for axis in range(apart.ndim):  # a cell is apart from the ground if one of its corners is
             ends = np.moveaxis(apart, axis, 0)
             apart = np.moveaxis(ends[1:] | ends[:-1], 0, axis)
         cells = (
@@ -139,7 +139,7 @@ def _filled(z: np.ndarray, nearest: list[np.ndarray]) -> np.ndarray:
 
 
 def _cut(at: np.ndarray, z: np.ndarray, lo: float, hi: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cut the columns of `z` (m, n) to positions (n,) from lo to hi; extend the ends level."""
+    """Cut the columns of `z` (m, n) to positions (n,) from lo to hi; the ends are level."""
     first = max(int(np.searchsorted(at, lo)) - 1, 0)
     last = min(int(np.searchsorted(at, hi)) + 1, len(at))
     at, z = at[first:last], z[:, first:last]

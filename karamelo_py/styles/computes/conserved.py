@@ -91,7 +91,7 @@ class FixStrainEnergy(StrainEnergy, Fix):
 class DissipatedEnergy(Energy):
     """Measure the energy that a group of points has dissipated; published as ID.
 
-    It consists of plastic and viscous work and the energy released by damage.
+    Dissipated energy is plastic and viscous work, and energy released by damage.
 
     Example
     -------
@@ -120,8 +120,8 @@ class LostByContact(Compute):
     Contact at nodes (ulmpm/contacts) is inelastic. A normal impulse dissipates the impulse times
     the mean of the approach velocities before and after the step; friction dissipates the
     tangential impulse times the mean sliding velocity. The sum is the work done by free rigid
-    bodies and by bodies that contact does not move, minus the work done on points. It is exact with
-    FLIP 1 in musl and usavg. It includes damping and friction of contact/surface and
+    bodies and by bodies that contact does not move, minus the work done on points. The sum is exact
+    with FLIP 1 in musl and usavg. It includes damping and friction of contact/surface and
     contact/rigid_body, but not load steps. The group must be all points.
 
     See Also
@@ -168,8 +168,8 @@ class LostByTransfer(Energy):
     Nodal impulses do work on a point, with the mean of its velocities before and after a step. The
     loss is this work minus the change of m v^2 / 2. It is negative while points get energy back
     from the moments that they store (APIC): m v^2 / 2 does not include the energy of moments. With
-    usl it includes the damping of the scheme. Points of gases, which take this energy up as heat,
-    and of soil with pore water are not counted, nor is the loss of points that have been deleted.
+    usl the loss includes the damping of the scheme. The energy of gases, which take it up as heat,
+    of soil with pore water and of deleted points is not counted.
 
     PIC and FLIP below 1 with musl or usavg are always counted. Otherwise this compute makes steps
     10 to 20 % slower.
@@ -203,18 +203,18 @@ class LostByTransfer(Energy):
 
     @property
     def restrictions(self) -> Restrictions:  # type: ignore[override]
-        # Passes of other schemes already scatter to the sums of which XPIC needs the old values.
+        # Passes of other schemes already scatter to the sums whose old values XPIC needs.
         schemes: dict[str, tuple[str, ...]] = {}
         if self.hub.update.transfer.traits.series:
             schemes["scheme"] = "musl", "usavg"
-        elif self.hub.update.scheme.traits.loss is None:  # a scheme of a plug-in
+        elif self.hub.update.scheme.traits.loss is None:  # the scheme of a plug-in
             schemes["scheme"] = "musl", "usavg", "usf", "usl"
         instead = "no compute transfer_loss"
         return Restrictions("transfer_loss", instead, only=schemes, without=("implicit",))
 
 
 class Drift:
-    """Change of a value since its first call, relative to the largest scale so far."""
+    """Change of a value since the first call, relative to the largest scale so far."""
 
     remembers = ("_first", "_scale")
 
@@ -356,7 +356,7 @@ class AngularMomentum(Momentum):
         if twists:
             v[:, 2] = points.particle("vtheta")
         angular = np.cross(arm, v)
-        if twists:  # the sum of all other components over a revolution is 0
+        if twists:  # the sums of all other components over a revolution are 0
             angular *= (0, 1, 0)
         moment = points.velocity_moment
         if moment is not None and d > 1 and not twists:

@@ -111,7 +111,7 @@ class Norm:
 
 
 class Compared:
-    """Mix-in of computes that have `sizes(points)` and a `norm`."""
+    """Mix-in of computes with `sizes(points)` and a `norm`."""
 
     def measured(self) -> tuple[np.ndarray, np.ndarray]:
         """Return norms (2,) of differences and exact values, and the other sums of `sizes`."""

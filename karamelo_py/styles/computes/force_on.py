@@ -48,7 +48,7 @@ class Summand(NamedTuple):
 
     force: str  # ID of ID_x, ID_y, ID_z
     sign: float = 1.0
-    of_second: bool = False  # the torque on the second of two solids
+    of_second: bool = False  # True: torque on the second of two solids
     of_method: bool = False
 
 
@@ -137,7 +137,7 @@ class ForceOn(Compute):
             if load.of_method:
                 names = [f"{kind}_{load.force}" for kind in LOADS]
             elif load.force not in self.hub.fixes:
-                continue  # deleted
+                continue  # the fix has been deleted
             of = [f"{names[0]}_{axis}" for axis in AXES]
             pushes = [values.get(name) if name in values else 0.0 for name in of]
             if load.of_method:

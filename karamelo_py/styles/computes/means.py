@@ -104,8 +104,8 @@ class AverageTemperature(Mean):
 class MaxPlasticStrain(Compute):
     """Measure the largest equivalent plastic strain and temperature of a group of points.
 
-    The values are published as ID_Epmax and ID_Tmax. They are 0 if no material has a yield strength
-    or a temperature.
+    The values are published as ID_Epmax and ID_Tmax. A value is 0 if no material has a yield
+    strength or a temperature.
 
     Example
     -------
@@ -262,7 +262,7 @@ class PositionQuantile(Compute):
 
 
 def _bits(numbers: np.ndarray) -> np.ndarray:
-    """Return integers in the same order as the floating-point numbers."""
+    """Return integers with the same order as the floating-point numbers."""
     bits = (numbers + 0.0).view(np.uint64)  # converts -0 to 0
     return np.where(bits >> np.uint64(63) > 0, ~bits, bits | SIGN)
 
@@ -272,7 +272,7 @@ def _numbers(bits: np.ndarray) -> np.ndarray:
 
 
 class Probe(Mean):
-    """Measure a column of the points, such as a stress: its mean, or its value at one point.
+    """Measure columns of the points, such as a stress: means, or values at one point.
 
     The value is published as ID, or as ID_column if there are several columns. It is NaN for an
     empty group, and for a point that no longer exists.
@@ -348,7 +348,7 @@ class Probe(Mean):
         return [volume, *(volume * points.particle(name) for name in self.columns)]
 
     def nearest(self, points: PointTable) -> list[float] | None:
-        """Return distance, id and columns of the chosen or nearest point."""
+        """Return distance, id and column values of the chosen or the nearest point."""
         ids = points.particle("id")
         if self.point is not None:
             distance = np.where(ids == self.point, 0.0, np.inf)

@@ -50,7 +50,7 @@ class Dump(Rhythmic):
         return folder / str(file).replace("*", str(self.hub.update.step), 1)
 
     def take_part(self) -> None:
-        """Take part in the exchange of data; only rank 0 writes."""
+        """Take part in the exchange of data on ranks other than 0, which write nothing."""
         with discarded():
             self.write()
 
@@ -64,7 +64,7 @@ class Dump(Rhythmic):
 
 
 POSITIONS = ("x", "y", "z")
-# Each row has these columns anyway. In Karamelo, `tag` is another name of the id.
+# Rows begin with these columns anyway. In Karamelo, `tag` is another name of the id.
 LEADING = ("id", "type", "tag")
 
 
@@ -91,7 +91,7 @@ class TableDump(Dump):
 
     to_first = False
     counts_rows = True
-    copies: int | None = None  # `revolve`
+    copies: int | None = None  # number of copies around the axis (`revolve`)
 
     def __init__(self, hub: Hub, every: Every, file: OutputFile, *columns: str):
         columns_available = [*LEADING, *self.names(hub)]

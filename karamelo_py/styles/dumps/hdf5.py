@@ -76,7 +76,7 @@ class Hdf5Dump(TableDump):
         except (
             OSError,
             RuntimeError,
-        ) as error:  # h5py raises both, with the message of the operating system
+        ) as error:  # h5py raises both types, with the message of the operating system
             reason = re.search("error message = '([^']*)'", str(error))
             message = reason[1] if reason else str(error).splitlines()[0]
             raise ScriptError(f"cannot write {path}: {message}") from error
@@ -181,7 +181,7 @@ class Hdf5Dump(TableDump):
             arrays[name].resize((k + 1, count))
         for table in snapshot.tables:
             at = table.ids - first
-            # Blocks of fixed size make the bytes of the file independent of the tables.
+            # Blocks of fixed size make the bytes of the file independent of the size of the tables.
             for begin in range(0, count, PIECE):
                 block, here = (
                     slice(begin, min(begin + PIECE, count)),

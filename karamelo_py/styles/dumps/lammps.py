@@ -17,10 +17,10 @@ from karamelo_py.output.text import rows
 from karamelo_py.scene.hub import Hub
 from karamelo_py.styles.dumps.base import OfNodes, OfPoints, TableDump
 
-# It takes 33 % of the time of level 6 (zlib's default) and gives 4 % more bytes.
+# Level 4 takes 33 % of the time of level 6 (zlib's default) and gives 4 % more bytes.
 COMPRESSION = 4
 PIECE = 1 << 20
-# For the binary format (LAMMPS manual, dump, second revision).
+# First bytes of the binary format (LAMMPS manual, dump, second revision).
 MAGIC = b"DUMPCUSTOM"
 ENDIAN, REVISION = 1, 2
 ELEMENT = "element"
@@ -42,13 +42,13 @@ class Plain:
 
 
 class LammpsDump(TableDump):
-    # For one file with all snapshots: where the next one begins, and the length of all text.
+    # For one file with all snapshots: position of the next snapshot, and length of all text.
     remembers = ("_end", "_length")
     to_first = True
     _end = 0
     _length = 0
     _encoder: Any = None
-    named = False  # the format with ELEMENT
+    named = False  # True: the format with the column ELEMENT
     encoder: Any = Plain
     opened: Any = staticmethod(partial(open, mode="rb"))
 
@@ -82,7 +82,7 @@ class LammpsDump(TableDump):
             self.warn_of_absence()
             self._end = self._length = 0
             return
-        # The state of the encoder is not in the file; encoding the text again restores it.
+        # The file does not contain the state of the encoder; encoding the text again restores it.
         self._encoder = self.encoder()
         with self.opened(path) as file:
             for begin in range(0, self._length, PIECE):
@@ -216,7 +216,7 @@ class GridDump(OfNodes, LammpsDump):
 class ParticleGz(Gzipped, Particle):
     """Write the material points in LAMMPS text format, gzipped, which OVITO opens directly.
 
-    Files are less than half as large; everything else is the same as in dump particle.
+    Files are less than half as large, but otherwise the same as in dump particle.
 
     Example
     -------
@@ -231,7 +231,7 @@ class ParticleGz(Gzipped, Particle):
 class GridGz(Gzipped, GridDump):
     """Write the nodes of the background grids in LAMMPS text format, gzipped.
 
-    Everything else is the same as in dump grid.
+    Except for the compression, the file is the same as in dump grid.
 
     Example
     -------
@@ -246,8 +246,7 @@ class GridGz(Gzipped, GridDump):
 class ParticleBin(BinaryRows, Particle):
     """Write the material points in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers have full precision, and are faster to write than text. The rest is the same as in dump
-    particle.
+    Numbers have full precision, and are faster to write than text; the rest is as in dump particle.
 
     Example
     -------
@@ -264,7 +263,7 @@ class ParticleBin(BinaryRows, Particle):
 class GridBin(BinaryRows, GridDump):
     """Write the nodes of the background grid in the binary format of LAMMPS, which OVITO opens.
 
-    Numbers have full precision and are faster to write; the rest is the same as in dump grid.
+    Numbers have full precision, and are faster to write than text; the rest is as in dump grid.
 
     Example
     -------

@@ -31,7 +31,7 @@ PNG_COMPRESSION = 1
 SIGNED = re.compile(r"[vfb][xyz](_update)?|[se][123]{2}")
 MAP, SIGNED_MAP = "viridis", "coolwarm"
 EDGES = ("xmin", "ymin", "zmin"), ("xmax", "ymax", "zmax")
-SAMPLE = 1 << 16  # points that are sampled for the typical size
+SAMPLE = 1 << 16  # points that are sampled to find the typical size
 
 
 class PyPlot(Dump):
@@ -201,7 +201,7 @@ class PyPlot(Dump):
         self._picture.show(snapshot, self.side(snapshot), title, tools_of(fixes))
 
     def _make(self) -> Any:
-        # the import takes 0.3 s
+        # Importing Matplotlib takes 0.3 s.
         from karamelo_py.output import pictures
 
         units = self.hub.output.units

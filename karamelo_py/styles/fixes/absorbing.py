@@ -20,7 +20,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.script.expressions import Expression
 from karamelo_py.styles.fixes.edges import SIDES
 
-LAYERS = 3.5  # largest extent of the nodes of an edge along its normal, in cells
+LAYERS = 3.5  # largest extent of an edge's nodes along the normal, in cells
 
 
 class Support(Field):
@@ -31,7 +31,7 @@ class Support(Field):
 
 
 def absorb(mass, v, force, normal, support, values, dt):
-    """Apply dashpots rho c A; only the component of `normal` (rho A) along the axis is used."""
+    """Apply dashpots rho c A; of `normal` (rho A), only the component along the axis is used."""
     axis, along, across = values
     weight = total([where(axis == k, abs(area), 0) for k, area in enumerate(normal)])
     made = type(v)
@@ -135,7 +135,7 @@ class Absorbing(Fix):
 
 
 def speeds(material: Material) -> tuple[float, float]:
-    """Return P and S wave speeds; in saturated soil, times saturated / dry density."""
+    """Return P and S wave speeds, in saturated soil multiplied by saturated / dry density."""
     law, kin = material.whole, Space()
     state = initial_state(law, kin, 1.0)
     fast, slow = wave_speed_squared(law, kin, state), 0.5 * shear_part(law, kin, state)

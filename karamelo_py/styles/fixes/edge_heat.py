@@ -119,7 +119,7 @@ class EdgeConvection(EdgeHeat):
         rate = on_points(points, faces, faces.area * h)
         warms = on_points(points, faces, faces.area * h * T_inf)
         capacity = points.mass * from_solids(self.hub, points.ids - 1, _heat_capacities)
-        conducts = capacity > 0  # points of other materials have no temperature
+        conducts = capacity > 0  # points of other materials without a temperature are excluded
         slower = 1 + rate * self.hub.values.get("dt") / np.where(conducts, capacity, 1.0)
         return np.where(conducts, (warms - rate * points.temperature) / slower, 0.0)
 

@@ -27,9 +27,9 @@ PARTS = 4  # sub-boxes per direction of a box, to measure the surface
 class Faces(NamedTuple):
     point: np.ndarray  # (m,) numbers of the points, or their rows in a view
     axis: np.ndarray  # (m,) normal to the face
-    sign: np.ndarray  # (m,) outward: -1 or 1
-    area: np.ndarray  # (m,) per radian in axisymmetry
-    middle: np.ndarray  # (m, d)
+    sign: np.ndarray  # (m,) outward direction along the axis, -1 or 1
+    area: np.ndarray  # (m,) area, per radian in axisymmetry
+    middle: np.ndarray  # (m, d) centre
 
     def some(self, which: np.ndarray) -> "Faces":
         return Faces(*(column[which] for column in self))
@@ -62,8 +62,8 @@ def faces_on(hub: Hub, region: Region, ids: np.ndarray) -> Faces:
 
 
 class EdgePieces(NamedTuple):
-    point: np.ndarray  # (m,)
-    area: np.ndarray  # (m, d) times the outward normal
+    point: np.ndarray  # (m,) number of the point
+    area: np.ndarray  # (m, d) area times outward normal
     length: np.ndarray  # (m,) area of a piece, counting both sides of an edge
     middle: np.ndarray
 
@@ -137,7 +137,7 @@ def _lengths(region: Region, x: np.ndarray, size: float, area: np.ndarray) -> np
 
 
 def faces_cut(solid: Solid, region: Region, ids: np.ndarray) -> Faces:
-    """Return faces of cut boxes: the surface projected along each axis.
+    """Return the faces of cut boxes: the surface, projected along each axis.
 
     Opposite projections within a sub-box cancel, except for their difference.
     """
@@ -225,7 +225,7 @@ class OnEdge(Fix):
             cached = faces._replace(point=before[faces.point])
             faces = joined([new, cached])
             faces = faces.some(np.isin(faces.point, ids))
-            # Sort, so that sums over the faces of a point have a fixed order.
+            # Sorting gives sums over the faces of a point a fixed order.
             faces = faces.some(np.lexsort((faces.sign, faces.axis)))
             order = np.argsort(ids)
             rows = order[np.searchsorted(ids, faces.point, sorter=order)]
@@ -233,7 +233,7 @@ class OnEdge(Fix):
         return self._seen[1]
 
     def cut_faces(self, solid: Solid, ids: np.ndarray) -> Faces | None:
-        """Return faces on the surface, or None to find them from boxes."""
+        """Return faces on the surface, or None if faces follow from the points' boxes."""
         return faces_cut(solid, self.region, ids) if solid.cut else None
 
     @cached_property
@@ -260,7 +260,7 @@ class OnEdge(Fix):
             tables.append(faces.some(np.isin(faces.point, ids)))
         tables.append(faces_on(self.hub, self.region, ids[whole]))
         faces = joined(tables)
-        loaded = faces.area > 0  # not on the axis
+        loaded = faces.area > 0  # faces on the axis have no area
         if self.side is not None:
             loaded &= 2 * faces.axis + (faces.sign > 0) == self.side
         return faces.some(loaded)

@@ -33,7 +33,7 @@ from karamelo_py.styles.fixes.formulas import vector
 
 ACCELERATION = Powers(1, 0, -2)
 TONNES = 1e-10, 1e-6  # densities in t/mm^3, foam to above osmium; rare in other systems
-FOAM = 20.0  # density in kg/m^3, above those in g/cm^3
+FOAM = 20.0  # density of foam in kg/m^3; densities in g/cm^3 are below
 
 
 def accelerate(node):

@@ -9,11 +9,11 @@ from karamelo_py.scene.hub import Hub
 from karamelo_py.script.expressions import FIRST
 
 AXES = "xyz"
-USUAL_FRICTION = 2.0  # 1 for rubber on dry concrete, 1.5 for clean metals that weld
+USUAL_FRICTION = 2.0  # 1 for rubber on dry concrete, 1.5 for clean metals that weld together
 
 
 def vector(formulas: Sequence, hub: Hub, x: np.ndarray, first: Callable) -> np.ndarray:
-    """Return values (n, d or 3), 0 without a formula; `first()` gives reference positions."""
+    """Return values (n, d or 3) of formulas or 0; `first()` gives reference positions."""
     asked = any(formula is not None and formula.names & FIRST for formula in formulas)
     x0 = first() if asked else x
     values = np.zeros((len(x), max(x.shape[1], len(formulas))))

@@ -83,9 +83,9 @@ class GeostaticStress(Fix):
 
 
 def to_middles(x: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return vectors (n, d) from points of a solid to the centres of their boxes.
+    """Return the vectors (n, d) from the points of a solid to the centres of their boxes.
 
-    Gauss points (and Karamelo's three per cell) are not at the centres.
+    Gauss points (and Karamelo's three points per cell) are not at the centres.
     """
     step = np.zeros_like(x)
     for along, length, out in zip(x.T, size.T, step.T, strict=True):
@@ -122,7 +122,7 @@ def load_above(x: np.ndarray, size: np.ndarray, weights: np.ndarray) -> np.ndarr
     boxes = np.tile(np.arange(len(x)), len(corners))
     fraction = np.concatenate([np.where(c == 0, inside, 1 - inside).prod(axis=1) for c in corners])
     columns = np.concatenate([np.minimum(first + c, count - 1) for c in corners])
-    inner = fraction > 1e-9  # round-off adds no second column
+    inner = fraction > 1e-9  # round-off must not add a second column
     boxes, fraction, columns = boxes[inner], fraction[inner], columns[inner]
     column = np.tile(columns @ np.cumprod([1, *count])[:-1], 3)
     # The load in a column is linear between the tops and bottoms of boxes.

@@ -10,13 +10,13 @@ from karamelo_py.styles.fixes.formulas import judge_friction
 
 
 class Grip(Field):
-    """Spring force (d), mean load, unused friction."""
+    """Columns of a friction state: spring force (d), mean load, unused friction."""
 
     shape = staticmethod(lambda kin: kin.dimension + 2)
 
 
 class GripOfTool(Grip):
-    """`Grip`, and the last position (d) at the tool."""
+    """`Grip`, followed by the last position (d) at the tool."""
 
     shape = staticmethod(lambda kin: 2 * kin.dimension + 2)
 
@@ -37,7 +37,7 @@ def memory_for(hub: Hub, kind: type) -> type:
 
 class Gripping(Fix):
     remembers = ("has_touched",)
-    has_touched = False  # if False, grips in a restart file are from an earlier fix
+    has_touched = False  # False: grips in a restart file belong to an earlier fix
     kind_of_grip: type[Grip] = Grip
     grip: type[Grip] | None = None
     memories: tuple[type, ...] = ()  # fields that only this fix uses

@@ -34,7 +34,7 @@ def push_z(normal, force, values, dt):
 
 
 def pushed(axis, normal, force, values):
-    """Add the forces (rho A) c v on an edge normal to `axis`; `values` are c v."""
+    """Add the forces (rho A) c v on an edge normal to `axis`; `values` are the products c v."""
     added = type(force)(*[abs(normal[axis]) * values[k] for k in range(len(force))])
     return force + added, added
 
@@ -78,7 +78,7 @@ class BaseAcceleration:
         since, speed = before
         at = np.array([since, (since + time) / 2, time, time + step])
         a = self.formula.evaluate_columns(self.hub.values, {"time": at})
-        speed += (time - since) * (a[0] + 4 * a[1] + a[2]) / 6  # Simpson
+        speed += (time - since) * (a[0] + 4 * a[1] + a[2]) / 6  # Simpson's rule
         return float(speed), float(a[2]), float((a[3] - a[2]) / step if step > 0 else 0.0)
 
 

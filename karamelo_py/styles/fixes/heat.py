@@ -55,11 +55,11 @@ def check_coefficient(h: Expression) -> None:
         raise ScriptError(message, argument="h", expected=expected)
 
 
-MANY = 1_000_000  # points of a solid above which the check is skipped
+MANY = 1_000_000  # largest number of points of a solid that is checked
 
 
 def hold_node(node):
-    """Set T to the value; the published sum is the heating power that this takes."""
+    """Set T of a node to the value; the published sum is the heating power for this."""
     capacity, T, T_star, flow, value, _, dt, _ = node
     return T, value, flow, capacity * (value - T_star) / dt
 
@@ -87,7 +87,7 @@ class TemperatureNodes(HeatFix):
     temperature_particles, heat_flux_particles, convection_particles, method
     """
 
-    # Prescribe it before heat flows, so that temperature gradients include it.
+    # Temperatures are prescribed before heat flows, so that gradients include them.
     post_heat_to_grid = node_hook(prescribe_mapped, publishes=False)
     post_update_grid_heat = node_hook(hold_node, holds=True)
 
@@ -232,7 +232,7 @@ class ConvectionParticles(FacesOfPoints):
     """
 
     on_edge = "edge_convection"
-    order = LAST  # limits the heat that other fixes have added
+    order = LAST  # after the fixes whose heat it limits
     supply_heat = heat_hook(exchange, holds=True)
 
     def __init__(self, hub: Hub, group: ParticleGroup, h: Expression, T_inf: Expression):

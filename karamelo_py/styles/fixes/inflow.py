@@ -19,7 +19,7 @@ from karamelo_py.script.errors import ScriptError
 from karamelo_py.styles.fixes.erosion import Erosion
 from karamelo_py.styles.fixes.velocity_nodes import Velocity, VelocityNodes
 
-MOST = 20_000_000  # limit of points that have not entered yet
+MOST = 20_000_000  # largest number of points that have not entered yet
 ALIKE = 1e-6  # round-off of positions, in cells
 
 
@@ -104,10 +104,10 @@ class Inflow(VelocityNodes):
         self.entered = 0
         self._fill(hub, until)
         super().__init__(hub, group, *v)
-        self.held_directions = ()  # not a wall: splines are not modified there
+        self.held_directions = ()  # the inlet is not a wall: splines are not modified there
 
     def _inlet(self, hub: Hub) -> Inlet:
-        """Return the cells of the solid, and upstream cells that its points reach."""
+        """Return the cells of the solid, and the upstream cells that its points reach."""
         solid, lattice = self.solid, hub.lattices[0]
         d, h, far = hub.domain.dimension, lattice.h, hub.update.method.basis.traits.cells // 2
         corner = lattice.lo[:d]
@@ -181,7 +181,7 @@ class Inflow(VelocityNodes):
         before = self.entered
         if not self.looked:
             self.looked = True
-            self._refuse_others()  # solids may have been added
+            self._refuse_others()  # solids may have been added since
         while self.entered < self.layers:
             gone = self.hub.update.time - (self.entered + 1) * self.distance / self.speed
             if gone < 0:

@@ -156,7 +156,7 @@ class WaterFlux(Fix):
                 argument="group",
                 expected="pore_water with one rho",
             )
-        way -= (6 - 2 * d) * (way >= 6)  # as `GivenFlux` counts them
+        way -= (6 - 2 * d) * (way >= 6)  # numbers of the ways as in `GivenFlux`
         self.formulas = (q, Expression(float(way)), Expression(densities[0]))
 
     defined = PorePressure.defined

@@ -154,7 +154,7 @@ class Python(Fix):
             setattr(self.keeper.owner, name, value)
 
     def filed(self) -> None:
-        """Warn once of values that are missing in restart files."""
+        """Warn once of values that restart files lack."""
         keeper = self.keeper
         forgotten = [] if self.warned else keeper.forgotten()
         if forgotten:
@@ -206,7 +206,7 @@ class Python(Fix):
 
 
 class Keeper:
-    """Object or module of a function, with the values it stores.
+    """The object or module of a function, with the values that it stores.
 
     `names` are the names in ``remembers``; `title` names the object.
     """

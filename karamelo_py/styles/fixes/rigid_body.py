@@ -250,7 +250,7 @@ class RigidBody(Fix):
                 kept.v = self.state.v
             if self.is_initial[1]:
                 kept.spin = self.state.spin
-            if not self.hub.update.step:  # points may have been moved
+            if not self.hub.update.step:  # points may have been moved before the first step
                 kept.x = self.state.x
             self.state[:] = kept
             self._spin_up()
@@ -307,7 +307,7 @@ class RigidBody(Fix):
         return axis < d
 
     def _spread(self, components: Components | None, ways: Sequence[int], size: int = 3) -> list:
-        """Return a formula or None for each axis; `ways` are directions, from 3 on rotations."""
+        """Return a formula or None for each axis; `ways` are directions, rotations from 3 on."""
         items: list[Expression | None] = [None] * size
         if components is None:
             return items
@@ -373,7 +373,7 @@ class RigidBody(Fix):
             centre[0] = 0
         arm = x - centre
         side = (np.asarray(solid.volume0, float) / self.hub.domain.depth(solid.x0)) ** (1 / d)
-        about_centre = m * side**2 / 12  # inertia of a square or cube
+        about_centre = m * side**2 / 12  # inertia of a square or cube about its centre
         square = np.einsum("n,ni,nj->ij", m, arm, arm)
         square[range(d), range(d)] += about_centre.sum()
         tensor = np.trace(square) * np.eye(3) - square

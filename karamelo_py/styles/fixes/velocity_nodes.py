@@ -51,7 +51,7 @@ def prescribe_mapped_at_least(node):
     return allowed, allowed, node.force, 0.0
 
 
-# By bound: the hooks after the momentum update, and after velocities are mapped again.
+# Hooks by bound: after the momentum update, and after velocities are mapped again.
 HOOKS = {
     bound: (node_hook(update, uses_before=True, holds=True), node_hook(mapped, publishes=False))
     for bound, update, mapped in (
@@ -64,7 +64,7 @@ HOOKS = {
 
 
 class Velocity(Expression):
-    """Script argument: a formula; leq or geq before it makes it a `bound`."""
+    """Script argument: a formula; with leq or geq before it, the formula is a `bound`."""
 
     script_kind = "a number or a formula"
     bound = ""
@@ -150,7 +150,7 @@ class VelocityNodes(Fix):
         drags = drags and len(group.nodes) < hub.fields.node_count
         hooks = HOOKS["moves" if drags else self.bound]
         self.post_update_grid_state, self.post_velocities_to_grid = hooks
-        # Contact moves nodes only in free directions.
+        # Contact moves nodes only in free directions, so bounded nodes do not count.
         self.prescribes_velocity = not self.bound
         self.held_directions = tuple(k for k, v in enumerate(self.formulas) if v is not None)
 

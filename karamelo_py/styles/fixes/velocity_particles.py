@@ -123,7 +123,7 @@ def gradient(
 ) -> np.ndarray:
     """Return derivatives (n, d) with respect to x (if `moves`) or x0.
 
-    They are central differences over `step`.
+    The derivatives are central differences over `step`.
 
     At points that have not moved, x0 is varied together with x.
     """
@@ -151,7 +151,7 @@ def _conflicts(fix: Any, simulation: Any) -> Iterator[dict[str, Any]]:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and len(shared):
             yield _said(other, axes, shared)
-    # A common velocity, followed by another one for some of the points, is intended.
+    # It is intended if all points have a velocity, and some then get another one.
     for other in first[: first.index(fix)] if fix in first else first:
         axes, shared = unlike(other, fix), _shared(simulation, other, fix)
         if axes and 0 < len(shared) == len(simulation.points.members(other.group)):

@@ -40,7 +40,7 @@ def slots_of_loads(hub: Hub, solid: Solid) -> list[int]:
 
 
 def takes_average(law: Any) -> bool:
-    """Return True if the yield surface uses the averaged pressure (F-bar)."""
+    """Return True if the yield surface of a law uses the averaged pressure (F-bar)."""
     if not can(law, fbar_fraction):
         return False
     return bool(fbar_fraction(law.strength, initial_memory(law.strength, 1.0)) > 0)
@@ -76,7 +76,7 @@ class Method:
     basis_name = ""
     thermal = False
     mark: Mark | None = None
-    marks: Mapping[str, Mark] = {}  # of the words of method(...), by family
+    marks: Mapping[str, Mark] = {}  # places of the words of method(...), by family
     corrected = False
     frame: NamedTuple = Updated()
     own_grids: ClassVar[bool] = False
@@ -99,7 +99,7 @@ class Method:
         return NoContact()
 
     def begin(self, hub: Hub, contact: NamedTuple) -> None:
-        """Update `contact` from the fixes, before every run."""
+        """Before every run, update `contact` from the fixes."""
 
     def remembered(self, contact: NamedTuple, spans: np.ndarray) -> list[np.ndarray]:
         """Return the contact state that the next step needs, for node ranges `spans` (k, 2)."""
@@ -139,7 +139,7 @@ class Method:
         return FBarOfSoil() if steps and any(map(takes_average, laws)) else FBar()
 
     def places(self, kin: Any, solid: Solid, real: type) -> np.ndarray:
-        """Return initial positions and domain shapes, (n, w)."""
+        """Return initial positions and domain shapes of a solid, (n, w)."""
         return np.concatenate([solid.x0, self.shapes(kin, solid)], axis=1).astype(real)
 
     def shapes(self, kin: Any, solid: Solid) -> np.ndarray:
@@ -167,10 +167,10 @@ class Method:
         return Lattice(dimension, lo, hi, h, basis.traits.nodes_per_cell, basis.traits.least_nodes)
 
     def check(self, hub: Hub) -> None:
-        """Raise ScriptError for incompatible options; called before every run."""
+        """Raise ScriptError for incompatible options; this is called before every run."""
         transfer, basis, scheme = hub.update.transfer, self.basis, hub.update.scheme
         if scheme.traits.implicit:
-            return  # implicit schemes have other transfers
+            return  # implicit schemes have other transfers, which are checked elsewhere
         unsteady = (
             transfer.traits.inverts_spread and not basis.traits.steady_moment and self.frame.moves
         )

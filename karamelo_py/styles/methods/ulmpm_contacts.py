@@ -44,7 +44,7 @@ def heat_shares(laws: Sequence[NamedTuple], *, conducting: bool) -> np.ndarray:
     """Return the fraction (F, F) of frictional heat that goes into the first of two solids.
 
     With conduction, the fraction follows from the effusivities sqrt(kappa rho cp), as between
-    half-spaces (Carslaw & Jaeger 1959, section 2.15). Otherwise it is 1/2, or 0 without a
+    half-spaces (Carslaw & Jaeger 1959, section 2.15). Otherwise the fraction is 1/2, or 0 without a
     temperature.
     """
     takes = np.array([float(heat_capacity(law, 1.0)) > 0 for law in laws], float)
@@ -93,11 +93,11 @@ class ULMPMContacts(Method):
     and 30 to 46 % (FLIP 1, which retains noise). For 100 steps after contact at
     a node, sand there does not approach the wall, and liquids close 1 % of a gap per step.
 
-    The two solids at a node have a common normal, so momentum is conserved. It is computed from the
-    sums of m grad N of both solids, averaged over neighbouring nodes with the weights 1/4, 1/2, 1/4
-    along each axis. The solid whose sums vary less has more weight, so a face outweighs a corner.
-    If the velocity of a solid is prescribed, only the normal of this solid is used, except at the
-    end of its face. Solids with a gap between them along a grid axis are not in contact.
+    The two solids at a node have a common normal, so momentum is conserved. The normal is computed
+    from the sums of m grad N of both solids, averaged over neighbouring nodes with the weights 1/4,
+    1/2, 1/4 along each axis. The solid whose sums vary less has more weight, so a face outweighs a
+    corner. If the velocity of a solid is prescribed, only the normal of this solid is used, except
+    at the end of its face. Solids with a gap between them along a grid axis are not in contact.
 
     At a node of more than two solids, the impulses of all approaching pairs are computed from the
     same velocities, with reduced impulses for solids in several pairs; up to 16 such passes remove
@@ -135,7 +135,7 @@ class ULMPMContacts(Method):
     def held_with(self, hub: Hub, nodes: np.ndarray) -> np.ndarray:
         """Return `nodes`, and the nodes that points reach from cells with all corners in `nodes`.
 
-        Splines and domains reach more nodes; if these were free, the normal would rotate.
+        Splines and domains reach more nodes; if these were free, the contact normal would rotate.
         """
         if self.basis.traits.cells == 1 and not self.basis.traits.shape:
             return nodes

@@ -125,7 +125,7 @@ def along_cell(grid, direction, x):
     """
     cells = cells_along(grid, direction)
     a = in_cells(grid, direction, x)
-    a = min(max(real(0, a), a), real(cells, a))  # this order turns NaN into 0
+    a = min(max(real(0, a), a), real(cells, a))  # in this order, NaN becomes 0
     i = min(int(a), cells - 1)
     return i, a - i, a
 

@@ -22,7 +22,7 @@ class ToolFix(PointForces):
     """Base of fixes that push points; points are small cubes (in 2D squares)."""
 
     follows_points = presses = True
-    needs_stiffness = False  # the force is proportional to the shear modulus of the point
+    needs_stiffness = False  # True: the force is proportional to the shear modulus of the point
 
     def __init__(self, hub: Hub, group: ParticleGroup):
         super().__init__(hub, group)
@@ -89,12 +89,12 @@ def begin_behind(plane: Any, scene: Any) -> Any:
 
 
 class PlaneTool(ToolFix):
-    """Base of planes, which may move. Points are on the side to which the normal points."""
+    """Base of planes, which may move. Points belong on the side to which the normal points."""
 
     def lay(self, origin: Sequence[Expression], normal: Sequence[Expression]) -> None:
         self.origin = self.of_time("", origin)
         self.towards = self.of_time("n", normal)
-        if not self.hub.rehearsing:  # some values are unknown in a rehearsal
+        if not self.hub.rehearsing:  # in a rehearsal, some values are unknown
             unit(self.now(*self.towards))
 
     def is_endless(self, axis: int) -> bool:

@@ -47,7 +47,7 @@ class StiffTool(Gripping, ToolFix):
             touched = before[:, d, None] > 0
             way = np.where(touched, led - (seen[near] - before[:, d + 2 :]), 0.0)
             pull = one * way
-            # Take velocities from displacements: velocities of points contain null-space noise.
+            # Velocities are from displacements, as velocities of points contain null-space noise.
             slip = way / (2 * points.kick - points.dt)
             slip = np.where(touched, slip, velocity - points.velocity[near].astype(float))
             stop = points.contact_dt * one * slip
